@@ -158,7 +158,7 @@ def _pressing(name: str, seed: int) -> RowSource:
 
 def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
     from palpate.live.recorded_run import of_log, of_run
-    from palpate.logs.own_runs import is_run
+    from palpate.logs.read import is_run
 
     found, along, source = asked.identified_along(path)
     if asked.source.plain and is_run(path):

@@ -93,7 +93,7 @@ def press(
 
 
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
-    from palpate.bench.sequence import DONE, INTERRUPTED
+    from palpate.bench.force_input import DONE, INTERRUPTED
     from palpate.press.prepare import prepared
 
     question, folder = simulated.question(asked), simulated.folder

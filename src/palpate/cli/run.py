@@ -16,9 +16,9 @@ from palpate.cli._streams import noticed
 from palpate.cli._terminal import COMPILING, console, place, show_answer, simulated
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
-from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli.options.names import QUIET, Experiment
 from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
 from palpate.text import printable
@@ -68,7 +68,7 @@ def run(
         Of the noise; the same seed gives the same numbers.
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
-    from palpate.bench.any_experiment import FILES, load_any, parse_any
+    from palpate.bench.build import FILES, load_any, parse_any
 
     if known.list_:
         listed(FILES, lambda one: load_any(one).title)
@@ -77,7 +77,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.sequence import DONE, INTERRUPTED
+    from palpate.bench.force_input import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -188,7 +188,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
 
 
 def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
-    from palpate.bench.any_experiment import build_any, check_parts
+    from palpate.bench.build import build_any, check_parts
 
     experiment = asked.experiment
     try:

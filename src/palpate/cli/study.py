@@ -17,9 +17,9 @@ from palpate.cli._answer import print_answer
 from palpate.cli._terminal import COMPILING, confirmed, console, counted, place, say, show_answer
 from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
-from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli.options.names import QUIET, Study
 from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.text import printable
 

@@ -257,7 +257,7 @@ class LagFound:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result, shown_by="palpate.report.identification.in_python"):
+class Identification(Result, shown_by="palpate.report.identification.answer"):
     """The contact's model, its parameters with verdicts, and warnings.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from palpate.arrays import Array
-from palpate.bench.sequence import CONTACT, DIVERGED, LOST
+from palpate.bench.force_input import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 import numpy as np
 
-from palpate._jit import Bound
-from palpate._vector import Mat3, Vec3
+from palpate._jit import Bound, kernel, law
+from palpate._vector import Mat3, Vec3, Vec6
 from palpate.arrays import Array
+from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, approach_speed, free_motion_level
@@ -18,6 +19,8 @@ from palpate.force.lag import lag_of
 from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
+from palpate.signals.types import Sense
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9
@@ -198,3 +201,59 @@ def mass_note(gains: Gains, mass: float | None = None) -> str | None:
 def series_of(arm: Arm) -> float | None:
     """Stiffness between the encoders and the surface [N/m]; None where the encoders sit on the links."""
     return arm.inner.stiffness if isinstance(arm.inner, PositionLoop) else None
+
+
+@controller
+class Spring(NamedTuple):
+    """F = K (x_d - x) - D xdot + h: a position with a spring in series, which the cautious law moves.
+
+    Args:
+        stiffness: K [N/m, N m/rad].
+        damping: D [N s/m, N m s/rad].
+    """
+
+    stiffness: Vec6
+    damping: Vec6
+
+    def start(self):
+        return 0.0
+
+    def step(self, state, sense, task, model):
+        return self.stiffness * (task.x - sense.x) - self.damping * sense.xd + model.h, state
+
+
+@law
+def half_turn(R):
+    """Sine of the rotation's angle times its axis: the rotation vector for the small turns of a held tip [rad]."""
+    return 0.5 * Vec3(R.r3.y - R.r2.z, R.r1.z - R.r3.x, R.r2.x - R.r1.y)
+
+
+@law
+def tip_torque(axes, held, control, state, force, task, damping, q, qd, found, own, torque):
+    """Fills the joints' torques from encoders and force reading: the controller's state.
+
+    Args:
+        axes: of the task, in rows; the first is the surface's normal.
+        held: axes of the tip when it stands as it should, in columns.
+        control: in six directions.
+        state: its own.
+        force: reading along the normal [N].
+        task: what is asked for, in the task's axes.
+        damping: of joints to spare [1/s].
+        q: measured [rad, m], shape (n,).
+        qd: measured, shape (n,).
+        found: what `described` says of these.
+        own: room for the laws.
+        torque: where it goes, shape (n,).
+    """
+    room, tip = found.room, tip_of(found, qd)
+    model = task_model(axes, room, tip, own)
+    x = into(axes, tip.p, half_turn(tip.R @ held.T))
+    wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
+    sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
+    F, state = control.step(state, sense, task, model)
+    joint_torque(axes, room, model, own, F, damping, qd, torque)
+    return state
+
+
+compiled_tip_torque = kernel(tip_torque)

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate._vector import ZERO3, Vec3, Vec6
 from palpate.arrays import Array
-from palpate.bench.sequence import APPROACH, CONTACT, LOST
+from palpate.bench.force_input import APPROACH, CONTACT, LOST
 from palpate.controllers import Hybrid, Impedance, ProportionalIntegral, ResolvedAcceleration
 from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown

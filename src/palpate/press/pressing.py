@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.sequence import (
+from palpate.bench.force_input import (
     APPROACH,
     CONTACT,
     DIVERGED,

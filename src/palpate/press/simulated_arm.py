@@ -16,10 +16,9 @@ from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Cell, Reading, Touch, body_at
-from palpate.press.engines import ByMuJoCo, Engine, Own
+from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
 from palpate.press.setting import Place
 from palpate.press.tare import TARE
-from palpate.press.tip_control import Spring, compiled_tip_torque
 from palpate.press.tool import Command, Sense
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm

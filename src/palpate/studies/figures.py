@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Mask
 from palpate.bench import Experiment, changed
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import Metric, metric_of
-from palpate.bench.sequence import DONE
 from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report import style

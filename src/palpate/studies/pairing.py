@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import Metric, metric_of
-from palpate.bench.sequence import DONE
 from palpate.errors import unknown
 from palpate.report.study.lines import Scale
 from palpate.studies.parameters import Axis, Label, label

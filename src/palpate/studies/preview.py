@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench import Experiment, build
-from palpate.bench.any_experiment import AnyExperiment, build_any, check_parts
+from palpate.bench.build import AnyExperiment, build_any, check_parts
+from palpate.bench.force_input import DONE, NO_CONTACT
 from palpate.bench.metrics import Look, metric_of
 from palpate.bench.metrics.verdicts import try_metric
-from palpate.bench.sequence import DONE, NO_CONTACT
 from palpate.bench.speed import cores
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import metric_of
-from palpate.bench.sequence import DONE
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
 from palpate.report.study.plain import StudyPage, study_page

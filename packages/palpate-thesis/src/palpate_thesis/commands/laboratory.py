@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter, validators
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, counted, place, say, show_table
 from palpate.cli.options.flags import FLAG
-from palpate.cli.options.known import FolderOptions
+from palpate.cli.options.values import FolderOptions
 
 if TYPE_CHECKING:
     from palpate_thesis.inference.result import Result
