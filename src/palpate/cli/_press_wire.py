@@ -55,7 +55,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             _, note = with_noise_of(air, order)
             notes = [*([] if note is None else [note]), *([] if tool is None else notes_on(tool, air))]
             if options.dry_run:
-                return _looked(air, [*plan, *notes], notes, json)
+                return _look(air, [*plan, *notes], notes, json)
             if not json:
                 print_lines(*notes)
         _ask(options.yes)
@@ -175,7 +175,7 @@ def _ask(yes: bool) -> None:
         raise InputError("not confirmed; nothing was moved")
 
 
-def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
+def _look(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
     drift = f"drift {air.drift:.2g} ± {air.drift_std:.2g} N/s"
     found = f"in free motion: bias {bias} N, noise {air.noise:.2g} N, {drift}, {air.rate:.4g} Hz"

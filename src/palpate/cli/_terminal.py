@@ -133,7 +133,7 @@ class Counted(Protocol):
     """Receives the name of the work, the finished pieces, and their total."""
 
     def __call__(self, what: str, done: int, of: int, /) -> None:
-        """After each piece."""
+        """Show the count after each piece."""
         ...
 
 

@@ -45,7 +45,7 @@ class SurfaceOptions:
     mass: Annotated[str | None, SIGNED] = None
 
     def range(self) -> SurfaceRange:
-        """All of them."""
+        """Range of stiffness, damping and mass."""
         from palpate.excitation import SurfaceRange
         from palpate.excitation.quantities import spread
 
@@ -88,7 +88,7 @@ class BudgetOptions:
     drive: Annotated[str | None, SIGNED] = None
 
     def budget(self) -> Budget:
-        """The limits."""
+        """Limits of force, frequency and speed."""
         from palpate.excitation import Budget
 
         return Budget(
@@ -160,7 +160,7 @@ class SensorOptions:
     lag_std: Annotated[str, SIGNED] = "0"
 
     def sensors(self) -> Sensors:
-        """The sensors."""
+        """Sensors of force and position."""
         from palpate.excitation import Sensors
         from palpate.excitation.spectra import ForceChain, phase_std
         from palpate.signals.low_pass import LowPass
@@ -206,7 +206,7 @@ class LoopOptions:
     integral: Annotated[float | None, SIGNED] = None
 
     def loop(self) -> ForceLoop:
-        """The loop."""
+        """Force loop that follows the desired force."""
         from palpate.excitation import HybridLoop, KnownBandwidth
 
         given = {

@@ -112,7 +112,9 @@ def study(
     folder = output.out if output.out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
         with (own or PluginOptions()).consent():
-            found = _done(_Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn)
+            found = _print_end(
+                _Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
+            )
     except KeyboardInterrupt:
         kept = f"the finished runs are saved in {folder}; the same command resumes"
         say(f"interrupted; {kept}")
@@ -132,7 +134,7 @@ class _Asked:
     replace: bool
 
 
-def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
+def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate.studies.plan import plan
     from palpate.studies.preview import check_cases, check_parts_of

@@ -50,7 +50,7 @@ def outcome(
     options: Options,
     terms: Terms,
 ) -> Identification:
-    """Put everything together."""
+    """Identification from the fit, its verdicts and its evidence."""
     problem, found = choice.problem, choice.answer
     spectrum, press, point = evidence
     mass = parameters.get("M")
@@ -103,7 +103,7 @@ def nothing(
         0,
         warnings,
         cutoff=chain.cutoff,
-        traces=_untouched(channels, chain, terms),
+        traces=_outcome_untouched(channels, chain, terms),
         options=_plain_options(options),
     )
 
@@ -179,7 +179,7 @@ def _clock(
     return max(float(begin), channels.start), float(end)
 
 
-def _untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
+def _outcome_untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
     """The force of a log in which nothing is touched: seen, it says why."""
     step = max(len(channels.force) // _SHOWN, 1)
     none = np.empty(0)

@@ -55,7 +55,7 @@ def sample_clock_of(values: Array) -> SampleClock:
     changed = np.flatnonzero(np.diff(values)) + 1
     if len(changed) < _FEWEST or len(changed) > _EVERY_ROW * len(values):
         return _in_every_row(len(values))
-    counted = [_numbered(changed, *beat) for beat in _beats(changed)]
+    counted = [_number(changed, *beat) for beat in _beats(changed)]
     even = [grid for grid in (_even(number, changed, period) for number, period in counted) if grid]
     as_fast = np.bincount(np.diff(changed)).argmax() == 1
     if not even and as_fast:  # and often the same twice
@@ -128,7 +128,7 @@ def _near(far: NDArray[np.intp]) -> int:
     return max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
 
 
-def _numbered(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
+def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
     """Which sample of an even grid each change is, and the grid's period in rows.
 
     Counted from the middle of the log to both sides, the period made better on the way.

@@ -189,10 +189,10 @@ class Choice:
     @property
     def left(self) -> float:
         """Share of the force's amplitude that is left, in the octaves or in time, whichever is more."""
-        return float(np.sqrt(max(1 - min(self.answer.explained, self._followed), 0.0)))
+        return float(np.sqrt(max(1 - min(self.answer.explained, self._follow), 0.0)))
 
     @property
-    def _followed(self) -> float:
+    def _follow(self) -> float:
         """Share of the force's variance in time that the model explains; drift of the force and its noise left aside.
 
         The octaves do not see a force that sinks over a whole contact, as of a relaxing surface.
@@ -213,7 +213,7 @@ class Choice:
 
 def choose(problem: Problem, options: Options) -> Choice:
     """The model; of a press at constant speed the force by a plain one is that of least squares in time."""
-    choice = _chosen(problem, options)
+    choice = _choose(problem, options)
     found = choice.answer
     if problem.contacts.press is None or found.fit.model.nonlinear:
         return choice
@@ -225,7 +225,7 @@ def choose(problem: Problem, options: Options) -> Choice:
     return replace(choice, answer=replace(found, fit=fitted), tried=tuple(tried))
 
 
-def _chosen(problem: Problem, options: Options) -> Choice:
+def _choose(problem: Problem, options: Options) -> Choice:
     """Answer the plain model, and a richer one if it is asked for or earns its place.
 
     A richer model earns it by explaining at least half of what any plainer one leaves, with everything that it has more
@@ -235,7 +235,7 @@ def _chosen(problem: Problem, options: Options) -> Choice:
     if name in (None, KELVIN_VOIGT.name, KELVIN_VOIGT_MASS.name):
         plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
         best, at, told = plain, problem, plain.explained
-        tried = [_compared(plain, "")]
+        tried = [_comparison_of(plain, "")]
         if (
             name is None
             and options.series_stiffness is None
@@ -247,14 +247,14 @@ def _chosen(problem: Problem, options: Options) -> Choice:
                 rich, own = _one_sided(make, problem)
                 why = _against(rich, told, tolerance)
                 told = max(told, rich.explained)
-                tried.append(_compared(rich, why))
+                tried.append(_comparison_of(rich, why))
                 if not why:
                     best, at = rich, own
         return Choice(best, at, tuple(tried))
     if options.series_stiffness is not None:
         raise InputError(f"{name} is not available with a series stiffness: use --model kelvin-voigt-mass")
     rich, own = _one_sided(_MAKERS[name], problem)
-    return Choice(rich, own, (_compared(rich, "asked for"),))
+    return Choice(rich, own, (_comparison_of(rich, "asked for"),))
 
 
 def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Problem]:
@@ -297,5 +297,5 @@ def _noise_rms(found: Answer) -> float:
     return float(np.sqrt(max(found.noise, 0.0)))
 
 
-def _compared(found: Answer, note: str) -> Comparison:
+def _comparison_of(found: Answer, note: str) -> Comparison:
     return Comparison(found.fit.model.name, found.fit.r2, found.fit.rmse, note)

@@ -132,10 +132,10 @@ def steady_press(
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
     known = tuple(own for own in others if own.half < abs(own.stiffness))
     pairs = [[own for own in curves if own.loads is loads] for loads in (True, False)]
-    return SteadyPress(headline, known, *(_drawn(own) for own in pairs))
+    return SteadyPress(headline, known, *(_draw(own) for own in pairs))
 
 
-def _drawn(curves: Sequence[Curve]) -> Array:
+def _draw(curves: Sequence[Curve]) -> Array:
     if not curves:
         return np.empty((2, 0))
     curve = max(curves, key=lambda own: own.reach[1] - own.reach[0])

@@ -96,7 +96,7 @@ class Perceptron:
         Raises:
             InputError: inputs of another shape, or not finite.
         """
-        x = self._checked(inputs, int(self._sizes[0]), "inputs")
+        x = self._check(inputs, int(self._sizes[0]), "inputs")
         y = np.empty(len(self._amplitude))
         self._forward(self._sizes, self._weights, self._amplitude, self._signals, x, y)
         self._heard = True
@@ -108,7 +108,7 @@ class Perceptron:
         Raises:
             InputError: errors of another shape, or not finite; no `forward` before.
         """
-        e = self._checked(error, len(self._amplitude), "error")
+        e = self._check(error, len(self._amplitude), "error")
         if not self._heard:
             raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
         self._descend(e, self.learning_rate)
@@ -117,7 +117,7 @@ class Perceptron:
         self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, error, rate)
 
     @staticmethod
-    def _checked(values: ArrayLike, n: int, name: str) -> Array:
+    def _check(values: ArrayLike, n: int, name: str) -> Array:
         array = np.ascontiguousarray(values, dtype=np.float64)
         if array.shape != (n,):
             raise InputError(f"{name} must have shape ({n},), got {array.shape}")

@@ -36,13 +36,13 @@ class Engine(Protocol):
 
 
 class Own:
-    """Palpate's laws."""
+    """Physics by palpate's own laws."""
 
     def __init__(self) -> None:
         self._tick = Bound(compiled_tick)
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
-        """See `Engine`."""
+        """One tick, as `Engine` describes it."""
         after: Touch = self._tick(cell, body, touch, setpoint, k, noise)
         return after
 
@@ -79,7 +79,7 @@ class ByMuJoCo:
         self._M, self._J, self._Jdot = np.zeros((model.nv, model.nv)), *np.zeros((2, 6, model.nv))
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
-        """See `Engine`."""
+        """One tick, as `Engine` describes it."""
         from palpate.robots.serial.loading import refusals
 
         touch = touch._replace(mean=0.0)
@@ -87,7 +87,7 @@ class ByMuJoCo:
         with refusals("the simulation"):
             for j in range(cell.steps):
                 self._engine.mj_step1(self._model, data)
-                tip = self._filled(body)
+                tip = self._fill(body)
                 time = (k * cell.steps + j + 1) * cell.step
                 touch = self._step(cell, body, touch, tip, setpoint, time, noise)
                 data.qfrc_applied[dofs] = body.drive - body.normal * max(touch.force, 0.0)
@@ -95,7 +95,7 @@ class ByMuJoCo:
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
         return touch
 
-    def _filled(self, body: Body) -> Tip:
+    def _fill(self, body: Body) -> Tip:
         """Puts M, h, J of this moment into the body's room; the tip."""
         engine, model, data, dofs = self._engine, self._model, self._data, self._dofs
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]

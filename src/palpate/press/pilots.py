@@ -62,7 +62,7 @@ class Cautious:
         self._troubles = Troubles(gains.theta, lambda _: None)
 
     def step(self, sense: Sense, desired: float) -> Acted:
-        """See `Pilot`."""
+        """One tick, as `Pilot` describes it."""
         self.loop.desired = desired
         force, place = float(sense.force[:3] @ self._normal), float(self._normal @ sense.pose[:3, 3])
         speed = self.loop.update(force, place)
@@ -95,9 +95,9 @@ class ByTorque:
         at = place.axes @ place.pose[:3, 3]
         self._at, self._gone, self._phase = Vec3(*map(float, at)), 0.0, APPROACH
         self._approach = ResolvedAcceleration(_six(_POSITION), _six(_RATE))
-        self._controller = self._made(controller, place.place, force)
+        self._controller = self._make(controller, place.place, force)
 
-    def _made(self, name: str, surface: float, force: float) -> Any:
+    def _make(self, name: str, surface: float, force: float) -> Any:
         tick = self._arm.loop.tick
         held, rate, none = _six(_POSITION), _six(_RATE), _six(0.0)
         if name == "hybrid":
@@ -112,7 +112,7 @@ class ByTorque:
         raise unknown("controller", name, CONTROLLERS)
 
     def step(self, sense: Sense, desired: float) -> Acted:
-        """See `Pilot`."""
+        """One tick, as `Pilot` describes it."""
         force = float(sense.force[:3] @ self._normal)
         if self._phase == CONTACT and force <= 0.0:
             self._phase = LOST

@@ -120,7 +120,7 @@ def prepared(question: Question) -> Pressing:
     """
     _check_words(question)
     Plan(question.force, question.seconds, question.probe)
-    arm = _loaded(question, arm_of(question.arm, question.site))
+    arm = _load(question, arm_of(question.arm, question.site))
     place = place_of(arm, _array(question.at), _array(question.normal))
     gains = _gains(question, arm, place)
     _check_surface(question, gains)
@@ -134,7 +134,7 @@ def prepared(question: Question) -> Pressing:
     return Pressing(asked, plan_for(question.force, question.seconds, question.probe, GAP, gains.approach))
 
 
-def _loaded(question: Question, arm: SerialArm) -> SerialArm:
+def _load(question: Question, arm: SerialArm) -> SerialArm:
     """The arm with its tool, if there is one."""
     if question.payload is None:
         return arm

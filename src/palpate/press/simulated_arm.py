@@ -125,7 +125,7 @@ class SimulatedArm:
         """
         self._aim(command)
         if self._tip is None:
-            self._advance(self._followed() + self._sag)
+            self._advance(self._follow() + self._sag)
         else:
             self._act(self._tip.spring, self._tip.towards(self._goal))
 
@@ -174,7 +174,7 @@ class SimulatedArm:
         self._goal[:3, 3] += moved[:3]
         self._goal[:3, :3] = _turn(moved[3:]) @ self._goal[:3, :3]
 
-    def _followed(self) -> Array:
+    def _follow(self) -> Array:
         """Set-points of the motors whose pose follows the goal, by resolved rates of least size."""
         q, tick = self._setpoint, self.loop.tick
         J = self.arm.jacobian(q)

@@ -54,10 +54,10 @@ def with_tool(arm: SerialArm, payload: Payload) -> SerialArm:
         + _point(chain.mass[last], chain.com[last] - com)
         + _point(mass, at - com)
     )  # fmt: skip
-    least, spread = spread_of(_changed(chain.inertia, last, moment))
+    least, spread = spread_of(_change(chain.inertia, last, moment))
     loaded = chain._replace(
-        mass=_changed(chain.mass, last, whole),
-        com=_changed(chain.com, last, com),
+        mass=_change(chain.mass, last, whole),
+        com=_change(chain.com, last, com),
         least=least,
         spread=spread,
     )
@@ -69,7 +69,7 @@ def _point(mass: float, off: Array) -> Array:
     return np.asarray(mass * (off @ off * np.eye(3) - np.outer(off, off)))
 
 
-def _changed(values: Array, i: int, value: float | Array) -> Array:
+def _change(values: Array, i: int, value: float | Array) -> Array:
     new = values.copy()
     new[i] = value
     return new

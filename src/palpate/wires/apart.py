@@ -52,8 +52,8 @@ class ApartWire:
         theirs.close()
         self._link.setblocking(False)
         try:
-            self._answered(realtime.STARTED, _START)
-            about = self._answered(realtime.READY, self.answer)
+            self._answer(realtime.STARTED, _START)
+            about = self._answer(realtime.READY, self.answer)
         except BaseException as error:
             self._driver.kill()  # nothing moves yet
             self.close()
@@ -63,7 +63,7 @@ class ApartWire:
         self.title, self.watchdog, self._source = about.split("\n")
 
     def read(self, timeout: float) -> Sense:
-        """The newest reading."""
+        """The newest reading of the arm."""
         end, found = time.monotonic() + timeout, None
         while True:
             message = self._next(0.0 if found is not None else end - time.monotonic())
@@ -97,7 +97,7 @@ class ApartWire:
         self._begun = False
         try:
             self._send(realtime.text(realtime.REST))
-            self._answered(realtime.RESTED, _PATIENCE)
+            self._answer(realtime.RESTED, _PATIENCE)
         except (LostError, InputError):
             self._driver.kill()
 
@@ -114,7 +114,7 @@ class ApartWire:
     def _ask(self, message: bytes, answer: int) -> None:
         try:
             self._send(message)
-            self._answered(answer, self.answer)
+            self._answer(answer, self.answer)
         except LostError as error:
             raise InputError(f"{self.title} does not answer: {error}") from None
 
@@ -124,7 +124,7 @@ class ApartWire:
         except OSError as error:
             raise LostError(f"a command could not be sent: {error.strerror or error}") from None
 
-    def _answered(self, kind: int, timeout: float) -> str:
+    def _answer(self, kind: int, timeout: float) -> str:
         """The words of the next message of a kind."""
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0.0:

@@ -231,11 +231,11 @@ def unlike(tool: Payload, rest: AtRest) -> str | None:
     if apart <= sure:
         return None
     return (
-        f"the sensor shows {_told(rest.bias)} N in the air, and the tool as it was weighed makes {_told(expected)} N,"
+        f"the sensor shows {_show(rest.bias)} N in the air, and the tool as it was weighed makes {_show(expected)} N,"
         f" {apart:.2g} N apart in one axis: the sensor was zeroed since or drifts, the tool is another, or wrench and"
         " pose are of other frames. The tare takes it off as long as the tool does not turn"
     )
 
 
-def _told(force: np.ndarray) -> str:
+def _show(force: np.ndarray) -> str:
     return ", ".join(f"{value:.3g}" for value in force)

@@ -87,9 +87,9 @@ class Driver:
         except BlockingIOError:  # nobody has read for a while
             return
         except OSError:
-            self._gone()
+            self._lose()
 
-    def _gone(self) -> None:
+    def _lose(self) -> None:
         self._left = self._ending = True
 
     def _listen(self) -> None:
@@ -107,7 +107,7 @@ class Driver:
             if message:
                 self._obey(message)
             else:
-                self._gone()
+                self._lose()
 
     def _obey(self, message: bytes) -> None:
         if message[0] == realtime.MOVE:

@@ -156,7 +156,7 @@ class Rows:
         self.count += 1
 
     def record(self) -> Record:
-        """All rows."""
+        """Record of all rows until now."""
         return _record(np.array(self._rows[: self.count]), self.about)
 
     def finish(self, outcome: dict[str, Any]) -> Path | None:
@@ -164,7 +164,7 @@ class Rows:
         if self.folder is None:
             return None
         self._rows.flush()
-        path = _finished(self.folder, self.record(), {**self.about, **outcome})
+        path = _finish(self.folder, self.record(), {**self.about, **outcome})
         return path if self.count else None
 
 
@@ -200,10 +200,10 @@ def recover(folder: Path) -> Path:
     numbers = np.fromfile(rows, dtype=np.float64)
     numbers = numbers[: len(numbers) // len(UNITS) * len(UNITS)].reshape(-1, len(UNITS))
     written = numbers[numbers[:, 1] != 0.0]  # a time of receipt is never 0
-    return _finished(folder, _record(written, about), {**about, "ended": "broken off", "ok": False})
+    return _finish(folder, _record(written, about), {**about, "ended": "broken off", "ok": False})
 
 
-def _finished(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
+def _finish(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
     if len(record):
         write_record(record, folder / RECORD)
     outcome = {name: value for name, value in outcome.items() if name != "written_by"}

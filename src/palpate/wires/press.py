@@ -292,7 +292,7 @@ class _Press:
         self._stiffness: tuple[float, float] | None = None
 
     def run(self) -> Outcome:
-        """All of it."""
+        """Run the press from its start to its end."""
         self._guard.begin()
         try:
             self._hold()

@@ -31,7 +31,7 @@ def hurried(wanted: bool) -> Iterator[str]:
     # Memory first: to lock it takes up to a second, in which an equal priority would let nobody else run.
     locked, fifo = (_locked(), _fifo()) if wanted else (False, False)
     try:
-        yield _told(wanted, fifo, locked)
+        yield _describe(wanted, fifo, locked)
     finally:
         if fifo:
             schedule(os.getpid(), os.SCHED_OTHER, 0)
@@ -40,7 +40,7 @@ def hurried(wanted: bool) -> Iterator[str]:
         gc.enable()
 
 
-def _told(wanted: bool, fifo: bool, locked: bool) -> str:
+def _describe(wanted: bool, fifo: bool, locked: bool) -> str:
     if not wanted:
         return "ordinary priority, as asked"
     if fifo and locked:
@@ -108,7 +108,7 @@ class Lateness:
     allowed: float | None
 
     def sentences(self) -> list[str]:
-        """Sentences."""
+        """Warnings about lateness, as sentences."""
         a, b, c, most = (1e3 * v for v in self.late)
         late = (
             f"late by {a:.3g} ms (50 %), {b:.3g} (99 %), {c:.3g} (99.9 %), {most:.3g} at most, in {self.ticks} ticks;"
@@ -173,7 +173,7 @@ class Stopwatch:
             self._n += 1
 
     def summary(self) -> Lateness:
-        """The measured lateness."""
+        """Measured lateness, for the summary."""
         ages = self._ages[: self._n] if self._n else np.zeros(1)
         a, b, c = (float(v) for v in np.percentile(ages, SHARES))
         return Lateness(self._n, (a, b, c, float(ages.max())), self._missed, self._jumps, self._allowed)
@@ -189,7 +189,7 @@ _BEGIN = struct.Struct("<Bd")
 
 
 def state(sense: Sense) -> bytes:
-    """A reading."""
+    """Message that carries a reading."""
     s = sense
     return _STATE.pack(STATE, s.received, s.stamp, *s.force, *s.torque, *s.position, *s.quaternion)
 
@@ -201,7 +201,7 @@ def read_state(message: bytes) -> Sense:
 
 
 def move(command: Command) -> bytes:
-    """A command."""
+    """Message that carries a command."""
     return _MOVE.pack(MOVE, *command.velocity, *command.position)
 
 

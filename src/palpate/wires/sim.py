@@ -30,7 +30,7 @@ class State(NamedTuple):
 
 
 def packed(kind: int, session: int, body: bytes = b"") -> bytes:
-    """A datagram."""
+    """Bytes of a datagram."""
     return _HEAD.pack(MAGIC, kind, session) + body
 
 
@@ -76,7 +76,7 @@ def welcome(rate: float) -> bytes:
 
 
 def read_welcome(body: bytes) -> float | None:
-    """Readings a second."""
+    """Readings a second, by the arm's welcome."""
     return float(_WELCOME.unpack(body)[0]) if len(body) == _WELCOME.size else None
 
 
@@ -102,7 +102,7 @@ class SimWire:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.connect((host, port))
-            self.rate = self._greeted()
+            self.rate = self._greet()
         except OSError as error:
             self._socket.close()
             raise InputError(
@@ -115,7 +115,7 @@ class SimWire:
 
     @property
     def title(self) -> str:
-        """Its far end."""
+        """Name of the far end."""
         return f"a simulated arm at {self._where}, {self.rate:g} readings a second"
 
     @property
@@ -123,7 +123,7 @@ class SimWire:
         """Its stop if this process dies."""
         return "the simulated arm rests after 10 ticks without a command"
 
-    def _greeted(self) -> float:
+    def _greet(self) -> float:
         end = time.monotonic() + _ANSWER
         while (left := end - time.monotonic()) > 0:
             self._socket.send(packed(HELLO, self._session))
@@ -189,7 +189,7 @@ class SimWire:
         """The greeting has taken it over; the arm rests after ten ticks without a command."""
 
     def write(self, command: Command) -> None:
-        """Send the speed."""
+        """Send the desired speed."""
         self._sent += 1
         try:
             self._socket.send(packed(MOVE, self._session, move(self._sent, command.velocity)))
@@ -205,5 +205,5 @@ class SimWire:
                 return
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the wire's socket."""
         self._socket.close()

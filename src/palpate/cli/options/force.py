@@ -83,7 +83,7 @@ class SurfaceOptions:
 
     @property
     def cap(self) -> float | None:
-        """The stiffest [N/m]."""
+        """Stiffness of the stiffest surface [N/m]."""
         return in_si_if_given("--stiffness-cap", self.stiffness_cap, "stiffness")
 
 
@@ -105,7 +105,7 @@ class PressOptions:
 
     @property
     def desired(self) -> float:
-        """F_d [N]."""
+        """Desired force F_d [N]."""
         return in_si("--force", self.force, "force")
 
     @property

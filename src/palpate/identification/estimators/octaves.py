@@ -50,7 +50,7 @@ class Segment:
 
     @property
     def length(self) -> int:
-        """Rows."""
+        """Number of rows from first to last."""
         return self.last - self.first
 
 
@@ -170,7 +170,7 @@ def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: in
 @lru_cache(maxsize=64)
 def _window(length: int, numbers: tuple[float, ...]) -> Array:
     """Response of a spectral line to each frequency, the mean of all lines of a block, shape (length + 1,)."""
-    spectra = np.abs(np.fft.rfft(_seen(length, numbers), 2 * length, axis=0)) ** 2
+    spectra = np.abs(np.fft.rfft(_seen_octaves(length, numbers), 2 * length, axis=0)) ** 2
     found: Array = spectra.mean(axis=1) / (2 * length)
     found[1:-1] *= 2
     return found
@@ -180,7 +180,7 @@ def _sums(
     own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: tuple[float, ...]
 ) -> list[tuple[int, tuple[Array, int]]]:
     """Products and lines of the blocks of each group."""
-    seen, width = _seen(length, numbers), own.shape[1]
+    seen, width = _seen_octaves(length, numbers), own.shape[1]
     found: dict[int, tuple[Array, int]] = {}
     some = max(_AT_ONCE // (length * width), 1)
     views = np.lib.stride_tricks.sliding_window_view(own, length, axis=0)
@@ -196,7 +196,7 @@ def _sums(
 
 
 @lru_cache(maxsize=64)
-def _seen(length: int, numbers: tuple[float, ...]) -> Array:
+def _seen_octaves(length: int, numbers: tuple[float, ...]) -> Array:
     """The transform of a block without its mean and slope, real parts and then imaginary ones, shape (length, 2 lines).
 
     The power of white noise stays what it is.

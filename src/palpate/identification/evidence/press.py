@@ -51,10 +51,10 @@ def relaxation(
     rows = slice(*best)
     moved = depth[rows] - depth[best[1] - 1]
     given, doubt = (0.0 * moved, 0.0) if slope is None else (slope.stiffness * moved, slope.half)
-    return _relaxed(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
+    return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
 
 
-def _relaxed(force: Array, doubt: float, time: Array) -> Relaxation | None:
+def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
     """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
 
     Args:

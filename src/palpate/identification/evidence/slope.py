@@ -73,7 +73,7 @@ def loadings_in(problem: Problem, lag: float, segments: list[Segment]) -> list[L
             x, v, f, t = channels
             whole = Loading(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
             loading = Loading(x[advance], v[advance], f[advance], t[advance], whole)
-            found.append(replace(_sharpened(loading, motion.chain), read=_as_read(problem, lag, loading)))
+            found.append(replace(_sharpen(loading, motion.chain), read=_as_read(problem, lag, loading)))
     return found
 
 
@@ -100,7 +100,7 @@ def _as_read(problem: Problem, lag: float, loading: Loading) -> Array | None:
     return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
 
-def _sharpened(loading: Loading, chain: object) -> Loading:
+def _sharpen(loading: Loading, chain: object) -> Loading:
     """The same without what the filter adds to a curve.
 
     The mean of a square is the square of the mean and the variance: behind a filter a force of bend c over the depth is
@@ -109,7 +109,7 @@ def _sharpened(loading: Loading, chain: object) -> Loading:
     if not isinstance(chain, Chain):
         return loading
     way = (chain.delay / ORDER**0.5 * loading.speed) ** 2
-    u = loading.depth - loading.depth[_met(loading)].mean()
+    u = loading.depth - loading.depth[_meeting_point(loading)].mean()
     bend = _last(np.column_stack([np.ones(len(u)), u, u**2 + way]), loading, 1e-6)
     return replace(loading, force=loading.force - bend * way)
 
@@ -125,7 +125,7 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 
 
-def _met(loading: Loading) -> Mask:
+def _meeting_point(loading: Loading) -> Mask:
     """Rows in which the surface is met."""
     low, high = np.percentile(loading.force, [2, 98])
     rows: Mask = loading.force >= low + _MET * (high - low)
@@ -134,16 +134,16 @@ def _met(loading: Loading) -> Mask:
 
 def _last(columns: Array, loading: Loading, least: float) -> float:
     """Coefficient of the last column in the force where the surface is met; 0 for directions below a share."""
-    own = columns[_met(loading)]
+    own = columns[_meeting_point(loading)]
     size = np.sqrt((own**2).sum(axis=0))
     size[size == 0] = 1.0
-    theta, *_ = np.linalg.lstsq(own / size, loading.force[_met(loading)], rcond=least)
+    theta, *_ = np.linalg.lstsq(own / size, loading.force[_meeting_point(loading)], rcond=least)
     return float(theta[-1] / size[-1])
 
 
 def of_speed(loading: Loading) -> float:
     """Dependence of the force on the speed over a whole loading, beside a spring that may curve [N s/m]."""
-    u = loading.depth - loading.depth[_met(loading)].mean()
+    u = loading.depth - loading.depth[_meeting_point(loading)].mean()
     return _last(np.column_stack([np.ones(len(u)), u, u**2, loading.speed]), loading, 1e-3)
 
 

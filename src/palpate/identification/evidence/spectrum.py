@@ -99,7 +99,7 @@ def dynamic_stiffness(
     """
     dt = float(np.median(np.diff(problem.time)))
     position = problem.motion.moved(0, lag)
-    channels = position, problem.motion.moved(1, lag), problem.force, *_rounded(problem, position, lag)
+    channels = position, problem.motion.moved(1, lag), problem.force, *_round(problem, position, lag)
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
     length = max(s.last - s.first for s in segments)
@@ -114,7 +114,7 @@ def dynamic_stiffness(
     return tuple(found)
 
 
-def _rounded(problem: Problem, position: Array, lag: float) -> list[Array]:
+def _round(problem: Problem, position: Array, lag: float) -> list[Array]:
     """Error of an encoder in this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
 
     A coarse encoder's error goes with the motion: of a sine of a few counts it is part of the sine (the describing
@@ -161,7 +161,7 @@ def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segmen
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
     power = float((np.abs(blocks.position) ** 2).sum())
-    line = _fitted(blocks)
+    line = _fit(blocks)
     omega, parts = line.omega, line.parts
     by_lag = 1.96 * omega * lag_std
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
@@ -180,7 +180,7 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     )  # fmt: skip
 
 
-def _fitted(blocks: _Blocks) -> _Line:
+def _fit(blocks: _Blocks) -> _Line:
     """Least squares of the force on position and velocity, both stiffnesses straight lines of the frequency."""
     x, v, f = blocks.position, blocks.velocity, blocks.force
     power = np.abs(x) ** 2
@@ -231,7 +231,7 @@ def working_point(
         value, half = slope_without_series(slope.stiffness, slope.half, *series)
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
         gain = half / slope.half if slope.half else 1.0
-        slope = replace(slope, stiffness=value, half=half, each=each, budget=_scaled(slope.budget, gain))
+        slope = replace(slope, stiffness=value, half=half, each=each, budget=_scale(slope.budget, gain))
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     depths = problem.motion.moved(0, lag)[inside]
     octave = _octave_point(spectrum, tolerance)
@@ -256,7 +256,7 @@ def working_point(
         half = float(np.hypot(half, budget["unseen way"]))
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
-    stiffness = replace(_judged(value, half, tolerance, unit), budget=_largest(budget, half))
+    stiffness = replace(_judge(value, half, tolerance, unit), budget=_largest(budget, half))
     against = ""
     if not contacts.signed or (contacts.bonded and value < 0 and not options.bonded):
         against = "the signs of force and position are not known (give --force-sign)"
@@ -287,8 +287,8 @@ def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> 
         gain = slope_without_series(value, 0.0, *series)[0] / value
         value, half = slope_without_series(value, half, *series)
         again = None if again is None else gain**2 * again
-    budget = _scaled(own.budget, half / own.half if own.half else 1.0)
-    stiffness = replace(_judged(value, half, options.tolerance, unit), budget=_largest(budget, half))
+    budget = _scale(own.budget, half / own.half if own.half else 1.0)
+    stiffness = replace(_judge(value, half, options.tolerance, unit), budget=_largest(budget, half))
     interval = None if again is None else (value - again, value + again)
     depth = own.depth - problem.origin
     return WorkingPoint(
@@ -296,7 +296,7 @@ def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> 
     )
 
 
-def _scaled(budget: dict[str, float], gain: float) -> dict[str, float]:
+def _scale(budget: dict[str, float], gain: float) -> dict[str, float]:
     return {cause: gain * part for cause, part in budget.items()}
 
 
@@ -332,7 +332,7 @@ def _again(slope: Slope) -> tuple[float, float] | None:
     return slope.stiffness - half, slope.stiffness + half
 
 
-def _judged(value: float, half: float, tolerance: float, unit: str) -> Parameter:
+def _judge(value: float, half: float, tolerance: float, unit: str) -> Parameter:
     share = half / abs(value) if value else np.inf
     interval = (value - half, value + half)
     if share <= tolerance:

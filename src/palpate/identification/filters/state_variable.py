@@ -133,7 +133,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
     first = int(np.floor(lag / chain.dt)) - 1
     count = int(np.ceil(_LENGTH / (chain.rate * chain.dt))) + 3
     time = (first + np.arange(count)) * chain.dt - lag
-    curve = _integrated(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
+    curve = _integrate(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
     taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / chain.dt
     if derivative == 0:
         taps /= taps.sum()  # the cut-off tail would otherwise cost 1e-9 of the level
@@ -141,7 +141,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
     return taps, first
 
 
-def _integrated(w: float, derivative: int, time: Array) -> Array:
+def _integrate(w: float, derivative: int, time: Array) -> Array:
     """The impulse response integrated twice and then differentiated `derivative` times."""
     tau = w * np.maximum(time, 0.0)
     if derivative == 0:

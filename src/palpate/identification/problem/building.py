@@ -41,7 +41,7 @@ def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options:
     if contacts.payload is not None:
         force = force - contacts.payload.mass * chain(position, 2, lag.value)
     memory = int(np.ceil(chain.settling / chain.dt))
-    usable = _settled(channels.valid, memory)
+    usable = _settle(channels.valid, memory)
     rows, spans = numbered(_rows(channels, chain, contacts, usable), channels)
     origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
@@ -91,7 +91,7 @@ def _settling(chain: Chain, begin: int, length: int) -> int:
     return min(int(np.ceil((chain.settling - eaten) / chain.dt)), length // 4)
 
 
-def _settled(valid: Mask, memory: int) -> Mask:
+def _settle(valid: Mask, memory: int) -> Mask:
     """Where nothing invalid lies within the filter's memory."""
     if valid.all():
         return valid

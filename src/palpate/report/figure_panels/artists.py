@@ -138,7 +138,7 @@ def label_of(one: Artist) -> str:
 
 
 def _of_line(axes: Axes, line: Line2D) -> Drawn:
-    x, y = (_filled(v) for v in line.get_data(orig=False))
+    x, y = (_fill(v) for v in line.get_data(orig=False))
     along, up = _by_data(axes, line)
     label, look = label_of(line), look_of(line)
     if not len(x):
@@ -154,7 +154,7 @@ def _of_line(axes: Axes, line: Line2D) -> Drawn:
     return Curve(x, y, label, kind_of(line), look)
 
 
-def _filled(values: Any) -> Array:
+def _fill(values: Any) -> Array:
     return np.ma.filled(np.ma.asarray(values, dtype=float), np.nan)
 
 

@@ -51,7 +51,7 @@ def residual(axes: Axes, found: Identification, traces: Traces) -> None:
 
 
 def contacts(axes: Axes, found: Identification) -> None:
-    """Shade the contacts."""
+    """Shade the spans in contact."""
     for i, (start, end) in enumerate(found.contacts):
         axes.axvspan(start, end, color=style.F, alpha=0.09, lw=0, label="in contact" if i == 0 else None)
 

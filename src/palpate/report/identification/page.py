@@ -180,14 +180,14 @@ def page(found: Identification, source: Source) -> str:
         json=json.dumps(as_json(found, source), indent=1),
         source=source,
         options=", ".join(
-            f"{printable(str(k))} {printable(str(v))}" for k, v in _told(found, source).items()
+            f"{printable(str(k))} {printable(str(v))}" for k, v in _describe(found, source).items()
         ),
         file=printable(source.file),
         command=printable(source.command),
     )
 
 
-def _told(found: Identification, source: Source) -> dict[str, Any]:
+def _describe(found: Identification, source: Source) -> dict[str, Any]:
     return {**source.options, **found.options}
 
 

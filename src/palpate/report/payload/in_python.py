@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def line(found: Weighed) -> str:
-    """The sentence."""
+    """The answer in one line."""
     return printable(pages.sentence(found))
 
 

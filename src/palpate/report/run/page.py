@@ -210,10 +210,10 @@ def _columns(record: Record) -> dict[str, Array]:
         columns[f"{name}_low"], columns[f"{name}_high"] = columns[name] - half, columns[name] + half
     columns["depth"] = 1e3 * record["penetration"]
     columns["wall"] = record["x"] - record["penetration"]
-    return {name: _bounded(values) for name, values in columns.items()}
+    return {name: _limit(values) for name, values in columns.items()}
 
 
-def _bounded(values: Array) -> Array:
+def _limit(values: Array) -> Array:
     """Without the few values from far away that would leave no steps for the others: gaps in their place."""
     known = values[np.isfinite(values)]
     if not len(known):
@@ -249,7 +249,7 @@ def _range(parts: Sequence[Array], known: float | None) -> list[float]:
 
 
 def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
-    """Touches and losses."""
+    """Marks at touches and losses of contact."""
     found = []
     for i in np.flatnonzero(np.diff(phase, prepend=0.0))[:40]:
         if phase[i] == CONTACT:

@@ -107,7 +107,7 @@ def _contact(summary: dict[str, Any]) -> str:
 
 
 def alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
-    """Warnings, failures first."""
+    """Warnings of a run, failures first."""
     found = []
     end = summary["end"]
     if end != "done":

@@ -31,7 +31,7 @@ def numbers(values: Any) -> list[float | None]:
 
 
 def scale(one: Scale) -> dict[str, Any]:
-    """An axis."""
+    """Scale of an axis, with its ticks."""
     shown = [f"{v:g}" if isinstance(v, float) else str(v) for v in one.values]
     return {
         "label": one.label,
@@ -111,7 +111,7 @@ def _line(one: Line) -> dict[str, Any]:
 
 
 def heat(one: Heat) -> dict[str, Any]:
-    """A map."""
+    """A map as cells of colour."""
     words = one.values.dtype.kind in "US"
     flat = one.values.ravel()
     return {
