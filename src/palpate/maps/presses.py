@@ -51,6 +51,20 @@ class Presses:
     units: dict[str, str] = field(default_factory=dict)
 
 
+def merge_presses(parts: Sequence[Presses]) -> Presses:
+    """The presses of several readings; a quantity that one lacks is NaN there."""
+    fields = {name: unit for part in parts for name, unit in part.units.items()}
+    columns = {
+        name: np.concatenate([p.fields.get(name, np.full(len(p.stiffness), np.nan)) for p in parts])
+        for name in fields
+    }
+    return Presses(
+        np.vstack([p.places for p in parts]), np.concatenate([p.stiffness for p in parts]),
+        np.concatenate([p.half for p in parts]), [name for p in parts for name in p.names],
+        {name: why for p in parts for name, why in p.refused.items()}, columns, fields,
+    )  # fmt: skip
+
+
 def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] = ()) -> Presses:
     """Presses from a table with a row each.
 
@@ -173,9 +187,7 @@ def read_logs(
         raise InputError("some logs have a place of two coordinates and some of three; a map has one frame")
     stiffness, half = np.array(numbers).T
     columns = np.array(further, dtype=float).T
-    fields = {
-        name: each for name, each in zip(FIELDS, columns, strict=True) if np.isfinite(each).sum() >= LEAST
-    }
+    fields = {name: each for name, each in zip(FIELDS, columns, strict=True) if np.isfinite(each).any()}
     units = {name: FIELDS[name][0] for name in fields}
     return Presses(np.array(places), stiffness, half, names, refused, fields, units)
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -22,6 +23,9 @@ from palpate.maps.surface import Grid
 
 SHOWN = 2500
 """Places of the grid that is shown and printed: finer than presses lie, and a page of 200 kB."""
+
+FRAMES = 16
+"""Of the map as it grew."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,24 @@ class MapResult:
             with suppress(InputError):
                 found[name] = field.predict(self.grid.places)
         return found
+
+    @cached_property
+    def film(self) -> list[tuple[int, Prediction]]:
+        """The map of the first presses, of ever more of them, at `coarse`, all with the scales of the whole map."""
+        whole, n = self.map.process.likeliest, len(self.map)
+        counts = np.unique(np.linspace(min(n, 4), n, FRAMES).round().astype(int))
+        distance = cdist(whole.places, self.coarse.places)
+        frames = []
+        for k in map(int, counts):
+            first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
+            mean, variance = first.predict(distance[:k])
+            frames.append((k, Prediction(mean, np.sqrt(variance), np.sqrt(variance), self.request.common)))
+        return frames
+
+    @cached_property
+    def coarse(self) -> Grid:
+        """Places of the film."""
+        return self.map.grid(SHOWN // 4)
 
     @property
     def repeat(self) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.maps.lumps import Lump
+from palpate.maps.presses import AXES
 from palpate.maps.result import MapResult
 from palpate.report import style
 from palpate.report.answer import Answer, Card, answer_page
@@ -118,8 +119,8 @@ def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
     ][: result.request.next]
 
 
-def page(result: MapResult, title: str, command: str) -> str:
-    """The page as HTML."""
+def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
+    """The page as HTML; a live one loads itself again."""
     field, interval = draw_map(result), draw_interval(result)
     answer = Answer(
         title=title,
@@ -142,8 +143,8 @@ def page(result: MapResult, title: str, command: str) -> str:
                 {
                     "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
                     "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
-                    f"{plain(_shown(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
-                    f"{_shown(result, name)[1]}.",
+                    f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_display_unit(result, name)[1]}.",
                 }
                 for name, field in result.fields.items()
             ),
@@ -166,6 +167,7 @@ def page(result: MapResult, title: str, command: str) -> str:
         package="palpate.report.map",
         codes=(text_of("map.js", "palpate.report.map"),),
         readout=data(_readout(result, field)),
+        live=live,
     )
 
 
@@ -220,7 +222,7 @@ def _title(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
-def _shown(result: MapResult, name: str) -> tuple[float, str]:
+def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
     """Factor and symbol of the unit in which a field is shown."""
     unit = result.presses.units[name]
     return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
@@ -259,7 +261,7 @@ def draw_interval(result: MapResult) -> Figure:
 
 def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
-    (factor, symbol), known = _shown(result, name), np.isfinite(result.presses.fields[name])
+    (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
     with style.inked(9.0):
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
@@ -339,7 +341,7 @@ def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
     axis = figure.axes[0]
     box = axis.get_position()
     grid, seen = result.grid, result.prediction
-    columns = (seen.stiffness, *seen.ci95.T, *seen.next95.T)
+    columns = (*grid.places.T, seen.stiffness, *seen.ci95.T, *seen.next95.T)
     values = [
         [float(f"{column[i]:.4g}") for column in columns] if inside else None
         for i, inside in enumerate(grid.inside)
@@ -348,5 +350,38 @@ def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
         "box": [box.x0, 1.0 - box.y1, box.x1, 1.0 - box.y0],
         "x": list(axis.get_xlim()), "y": list(axis.get_ylim()),
         "columns": [float(1e3 * x) for x in grid.across], "rows": [float(1e3 * y) for y in grid.along],
-        "values": values,
+        "values": values, "axes": AXES[: grid.places.shape[1]],
+        "names": ["stiffness", "low", "high", "next_low", "next_high"], "film": _film(result),
     }  # fmt: skip
+
+
+def _film(result: MapResult) -> dict[str, Any]:
+    """The map as it grew, in levels of a ramp of colours."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    grid, levels = result.coarse, 64
+    means, stds = (np.array([getattr(frame, name) for _, frame in result.film]) for name in ("mean", "std"))
+    scaled = [
+        (levels - 1) * (each - low) / max(float(each[:, grid.inside].max()) - low, 1e-12)
+        for each in (means, stds) for low in (float(each[:, grid.inside].min()),)
+    ]  # fmt: skip
+    shown = [
+        [[int(v) if i else None for v, i in zip(frame, grid.inside, strict=True)] for frame in each]
+        for each in scaled
+    ]
+    at = result.map.surface.coordinates(result.map.places)
+    size = np.array([grid.across[-1] - grid.across[0], grid.along[-1] - grid.along[0]]) + np.sqrt(grid.cell)
+    corner = np.array([grid.across[0], grid.along[0]]) - 0.5 * np.sqrt(grid.cell)
+    return {
+        "shape": grid.shape,
+        "frames": [
+            {"count": count, "stiffness": k, "half": half}
+            for (count, _), k, half in zip(result.film, *shown, strict=True)
+        ],
+        "ramps": [
+            [to_hex(colormaps[name](i / (levels - 1))) for i in range(levels)]
+            for name in ("Blues_r", "Greys_r")
+        ],
+        "presses": np.round((at - corner) / size, 3).tolist(),
+    }
