@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.wires import Command, Limits, LostError, press
+from palpate.wires import Command, Limits, LostError
 from palpate.wires.press import Guard, unsafe
 from palpate.wires.protocol import EndedError, SilentError
 
@@ -53,7 +54,7 @@ class Wire:
 @pytest.fixture
 def clock(monkeypatch):
     made = Clock()
-    monkeypatch.setattr(press, "_now", made)
+    monkeypatch.setattr(sys.modules[Guard.__module__], "_now", made)
     return made
 
 
