@@ -18,9 +18,9 @@ from palpate.report.run import page as pages
 PRELUDE = """
 import os, signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from palpate.cli import _interrupts
+from palpate.cli import _streams
 from palpate.cli._streams import guarded
-_interrupts.keep()
+_streams.keep()
 """
 
 
