@@ -159,7 +159,7 @@ def command(words: list[str], folder: Path, codes: tuple[int, ...] = (0,)) -> st
 def exported(name: str, folder: Path) -> ExportedLaw:
     if name == "force":
         path = folder / "gains.toml"
-        path.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml(), encoding="utf-8")
+        path.write_text(gains_for(load_arm("ur5e"), 20.0, limit=60.0).to_toml(), encoding="utf-8")
         return exported_law(LawRequest(gains=path))
     if name == "squares":
         return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))
@@ -191,15 +191,20 @@ def builds(given: argparse.Namespace) -> Iterator[tuple[str, str, list[str], lis
         )
 
 
-def of_law(bench: Bench, name: str, given: argparse.Namespace) -> dict[str, str]:
-    """The cells of a law's column, by the first word of their row."""
-    law, folder = exported(name, bench.folder), bench.folder
+def write_sources(law: ExportedLaw, folder: Path) -> None:
     own = law.module.name
     for file, text in (
         (f"{own}.c", law.sources.source), (f"{own}.h", law.sources.header), ("timer.c", timer(law)),
         ("replay.c", program(law.module, law.recording.inputs)), ("startup.c", STARTUP), ("sections.ld", SECTIONS),
     ):  # fmt: skip
         (folder / file).write_text(text, encoding="utf-8")
+
+
+def of_law(bench: Bench, name: str, given: argparse.Namespace) -> dict[str, str]:
+    """The cells of a law's column, by the first word of their row."""
+    law, folder = exported(name, bench.folder), bench.folder
+    own = law.module.name
+    write_sources(law, folder)
     cells: dict[str, list[str]] = {}
     for title, level, build, run, ticks in builds(given):
         if own == "palpate_identifier" and "M7" in title:

@@ -32,7 +32,7 @@ class ProofOptions:
     damping_time
         Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
     jitter
-        Largest change of a reading's age from tick to tick while the law adapts, in ticks.
+        Ticks by which a reading may be older than the sensor's period while the law adapts.
     margin
         Factor by which the gains may grow.
     held_only
@@ -97,13 +97,15 @@ def certify(
 
     palpate certify gains.toml --check certificate.json
 
+    palpate certify force_loop/palpate_force.h --check certificate.json
+
     A check needs no solver: it takes norms of matrices. With gains given, it also refuses a certificate of another
     arm, rate or law. Exit code 1: a part could not be proved, or the certificate does not hold.
 
     Parameters
     ----------
     gains
-        The file of palpate tune.
+        The file of palpate tune; for a check also the header of its law in C.
     check
         A certificate to check.
     """
@@ -151,7 +153,11 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     from palpate.force import Certificate, load_gains
 
     certificate = Certificate.load(path)
-    if gains is not None:
+    if gains is not None and gains.suffix == ".h":
+        from palpate.native.header import check_header
+
+        check_header(certificate, gains)
+    elif gains is not None:
         certificate.check_of(load_gains(gains))
     verdict = certificate.check()
     _print(certificate, verdict, output)

@@ -169,7 +169,7 @@ def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:
     _spell_out(drawing)
     with whole(path) as draft:
         if kind == ".svg":
-            from palpate.report.page import svg
+            from palpate.report.svg import svg
 
             draft.write_bytes(svg(drawing, signed=True))
             return path

@@ -16,7 +16,8 @@ from palpate.report.excitation.table import describe_remedy, describe_wave, perc
 from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import CHARTS, TABLES, data, packed, scripts, text_of, thinned
 from palpate.report.numbers import plain, quantity
-from palpate.report.page import embedded, render, svg
+from palpate.report.page import embedded, render
+from palpate.report.svg import svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,7 +23,8 @@ from palpate.report.figure_panels.artists import (
     unit,
 )
 from palpate.report.look.assets import ABSENT, CHARTS, TABLES, data, packed, scripts, text_of, thinned
-from palpate.report.page import embedded, svg
+from palpate.report.page import embedded
+from palpate.report.svg import svg
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

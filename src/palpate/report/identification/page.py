@@ -32,7 +32,8 @@ from palpate.report.identification.words import (
     units_of,
 )
 from palpate.report.numbers import plain, quantity, with_half
-from palpate.report.page import embedded, render, svg
+from palpate.report.page import embedded, render
+from palpate.report.svg import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:

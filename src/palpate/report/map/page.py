@@ -15,7 +15,8 @@ from palpate.report.answer import Answer, Card, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import Table, embedded, svg
+from palpate.report.page import Table, embedded
+from palpate.report.svg import svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

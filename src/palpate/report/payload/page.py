@@ -9,7 +9,8 @@ import numpy as np
 from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
-from palpate.report.page import Table, embedded, render, svg
+from palpate.report.page import Table, embedded, render
+from palpate.report.svg import svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,9 +18,10 @@ from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed, scripts, text_of, thinned
 from palpate.report.numbers import quantity
-from palpate.report.page import embedded, render, svg
+from palpate.report.page import embedded, render
 from palpate.report.run.figures import drawings
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
+from palpate.report.svg import svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
 
