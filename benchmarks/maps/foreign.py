@@ -101,10 +101,10 @@ def repeats(count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarra
 
 
 def lines(count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of twenty presses, each line an error of its own."""
-    group = np.arange(count) // 20
+    """Ten lines of presses, each line an error of its own."""
+    group, long = np.arange(count) * 10 // count, count // 10
     height = (np.arange(group[-1] + 1) + 0.5) / (group[-1] + 1) * SIDE
-    x = (np.arange(count) % 20 + 0.5) / 20 * SIDE
+    x = (np.arange(count) % long + 0.5) / long * SIDE
     return np.column_stack([x, height[group]]) + 5e-4 * rng.normal(size=(count, 2)), group
 
 

@@ -21,7 +21,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from palpate.files import write_json, write_text
+from palpate.files import write_json
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.native.exporting import ExportedLaw, LawRequest, exported_law
@@ -123,8 +123,12 @@ class Bench:
         text = re.sub(r"palpate/\S+\.py:\d+", "", text)
         key = f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {law.module.name}: {title}, {ticks}"
         if key not in self.known:
-            self.known[key] = ask()
-            write_json(self.file, {"written_by": "palpate", **self.known})
+            value = ask()
+            now = (
+                json.loads(self.file.read_text()) if self.file.exists() else {}
+            )  # another run may have written
+            self.known = {"written_by": "palpate", **self.known, **now, key: value}
+            write_json(self.file, self.known)
         print(f"{law.module.name}: {title}: {self.known[key]}", flush=True)
         return self.known[key]
 
@@ -308,7 +312,7 @@ def main() -> int:
         page = Path("docs/native.md")
         before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
         after = rest.split(MARKS[1])[1]
-        write_text(page, f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}")
+        page.write_text(f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}", encoding="utf-8")
     bad = [
         cell
         for cells in columns.values()

@@ -66,6 +66,7 @@ def test_parts_of_a_prediction_are_those_of_the_whole():
     assert mean == pytest.approx(process.weights @ means, rel=1e-9)
     spread = process.weights @ (variances + (means - mean) ** 2)
     assert variance == pytest.approx(spread, rel=1e-7)
+    assert [len(each) for each in process.predict(at[:0])] == [0, 0]
 
 
 def test_the_scale_of_the_places_does_not_matter():

@@ -227,7 +227,7 @@ class GaussianProcess:
         size = max(CHUNK // len(self.likeliest.values), 16)
         parts = [places[first : first + size] for first in range(0, len(places), size)]
         with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
-            mean, variance = np.concatenate(list(pool.map(moments, parts)), axis=1)
+            mean, variance = np.concatenate([np.empty((2, 0)), *pool.map(moments, parts)], axis=1)
         return mean, variance
 
 

@@ -344,7 +344,7 @@ def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
     grid, seen = result.grid, result.prediction
     columns = (*grid.places.T, seen.stiffness, *seen.ci95.T, *seen.next95.T)
     values = [
-        [float(f"{column[i]:.4g}") for column in columns] if inside else None
+        [float(f"{column[i]:.5g}") for column in columns] if inside else None
         for i, inside in enumerate(grid.inside)
     ]
     return {
