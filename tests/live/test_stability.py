@@ -10,7 +10,7 @@ from palpate.force.certificate import Claim
 from palpate.force.steps import margins as margins_on
 from palpate.live import stability
 from palpate.live.stability import OfArm, OfBench, Stability, answers
-from palpate.press.loops import gains_for, loop_of
+from palpate.press.engines import gains_for, loop_of
 from palpate.report.numbers import plain
 
 

@@ -10,11 +10,10 @@ from palpate.cli import main
 from palpate.contact_frame import Payload
 from palpate.errors import InputError
 from palpate.press.prepare import Question, prepared, surface_of
-from palpate.press.protocol import Command
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
-from palpate.press.tool import held_tool, with_tool
+from palpate.press.tool import Command, held_tool, with_tool
 from palpate.report.press.page import notes
 from palpate.robots import SerialArm
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.wires.lateness import Stopwatch
+from palpate.wires.realtime import Stopwatch
 
 TICK = 0.002
 

@@ -71,7 +71,7 @@ class ProofOptions:
 
     @property
     def longest(self) -> float | None:
-        """B/K [s]."""
+        """Longest damping time B/K [s]."""
         from palpate.excitation.quantities import spread
 
         if self.damping_time is None:

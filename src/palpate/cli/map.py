@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._interrupts import noticed
 from palpate.cli._one_log import OneLog
 from palpate.cli._program import command
-from palpate.cli._progress import bar
-from palpate.cli._terminal import console, show_answer
+from palpate.cli._streams import noticed
+from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
@@ -247,7 +246,7 @@ def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: Outp
 
 def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Known) -> Presses:
     """The presses by now; a file is read when it has rested since the last look, and once."""
-    from palpate.logs.gathered import gather_logs
+    from palpate.logs.columns import gather_logs
     from palpate.maps.presses import merge_presses
 
     for path in [places.table] if places.table is not None else gather_logs(logs):
@@ -280,7 +279,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
         return read_table(places.table, columns, fields)
     if places.columns is not None or places.fields is not None:
         raise InputError("--columns and --fields are of --table; the place in logs is given with --place")
-    from palpate.logs.gathered import gather_logs
+    from palpate.logs.columns import gather_logs
 
     with bar(console(stderr=True)) as progress:
 

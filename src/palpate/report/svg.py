@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from palpate.files import SIGNATURE
-from palpate.report.look.tokens import PAIRS
+from palpate.report.look.assets import PAIRS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,8 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
-from palpate.press.plan import Plan
 from palpate.press.tare import TARE
+from palpate.press.tool import Plan
 from palpate.wires.protocol import Triple, triple
 
 
