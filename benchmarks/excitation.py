@@ -19,7 +19,7 @@ from palpate.bench.tables import changed, parse
 from palpate.excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
 from palpate.identification import identify
 from palpate.records import Record
-from palpate.report.excitation.files import experiment
+from palpate.report.excitation.table import experiment
 from palpate.signals.low_pass import LowPass
 
 RUNS = 20

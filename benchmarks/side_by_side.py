@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import build, load, march, start_at
-from palpate.bench.sequence import COLUMNS
-from palpate.bench.tick import Loop, compiled_march
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers.hybrid import Hybrid
 from palpate.environments import KelvinVoigt
 from palpate.environments.surface_state import contact_force

@@ -3,7 +3,7 @@
 import numpy as np
 
 from palpate.bench import build, changed, load, march, start_at
-from palpate.bench.sequence import COLUMNS
+from palpate.bench.force_input import COLUMNS
 
 near = {
     "robot.start": (0.4635, 0.0, 0.0),

@@ -38,7 +38,7 @@ sys.path.insert(0, str(TESTS))
 from slow_cell import ALONE, WORDS, child, rows_came, slower_cell  # noqa: E402
 
 from palpate.logs import read_record  # noqa: E402
-from palpate.wires.recording import UNITS  # noqa: E402
+from palpate.wires.outcome import UNITS  # noqa: E402
 
 STATE = ROOT / "build" / "wire-faults.json"
 WIRES = ("sim", "rtde", "franka", "ros2")

@@ -124,10 +124,10 @@ def install(fault: Fault, trace) -> None:
 def stamped(module: str, fault: Fault) -> None:
     """Put the fault between the arm's clock and its protocol."""
     if module == "sim_arm":
-        from palpate.wires import sim_protocol
+        from palpate.wires import sim
 
-        state = sim_protocol.state
-        sim_protocol.state = lambda number, now, values: state(number, fault.stamp(now), values)
+        state = sim.state
+        sim.state = lambda number, now, values: state(number, fault.stamp(now), values)
     if module == "rtde_arm":
         from palpate.wires.rtde_arm import Controller
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pages import put
 
-from palpate.press.loops import MODES
+from palpate.press.engines import MODES
 from palpate.press.prepare import Question, prepared, surface_of
 from palpate.press.summary import summarise
 from palpate.report.numbers import with_half

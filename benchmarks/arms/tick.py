@@ -20,7 +20,7 @@ from palpate._vector import ZERO3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import UNTOUCHED, touch
 from palpate.press.cell import Reading, Touch, body_at, compiled_tick
-from palpate.press.loops import loop_of
+from palpate.press.engines import loop_of
 from palpate.press.setting import cell_of, place_of
 from palpate.robots import SerialArm
 from palpate.robots.serial.serial_arm import mjcf, scene_of

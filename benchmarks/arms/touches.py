@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from pages import put
 
-from palpate.bench.sequence import CONTACT
+from palpate.bench.force_input import CONTACT
 from palpate.force import gains
 from palpate.press.prepare import Question, prepared, surface_of
 from palpate.robots.serial.from_toml import names

@@ -19,7 +19,7 @@ from pages import put
 
 from palpate.cli import main as palpate
 from palpate.force import load_arm
-from palpate.press.loops import gains_for
+from palpate.press.engines import gains_for
 
 STIFFNESS, SERIES, FORCE = 6000.0, 5e4, 20.0
 HEAD = (

@@ -37,8 +37,8 @@ class Lasted:
 def lasted(name: str, seconds: float) -> Lasted:
     """Runs an experiment for so long, whatever becomes of its contact, and keeps no row."""
     from palpate.bench import build, load
-    from palpate.bench.sequence import COLUMNS
-    from palpate.bench.tick import compiled_march, start_at
+    from palpate.bench.force_input import COLUMNS
+    from palpate.bench.plant import compiled_march, start_at
 
     bench = build(load(name))
     loop, state = bench.loop, start_at(bench.loop, bench.q)

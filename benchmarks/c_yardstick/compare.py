@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from palpate.analysis.linear_loop import vector
 from palpate.analysis.linear_model import exact
 from palpate.bench import build, load, start_at
-from palpate.bench.sequence import COLUMNS
-from palpate.bench.tick import Loop, compiled_march
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers import alone
 from palpate.environments.surface import alone as alone_surface
 

@@ -23,7 +23,7 @@ import numpy as np
 from touches import Key, resumed
 
 from palpate.bench.build import build
-from palpate.bench.sequence import COLUMNS
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.tables import changed, load
 from palpate.environments.surface import alone, join
 from palpate.force.law import CautiousState

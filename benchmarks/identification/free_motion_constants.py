@@ -26,7 +26,7 @@ from foreign.logs import Cell, Log, make_log
 from foreign.scoring import record_of
 
 from palpate.errors import InputError
-from palpate.identification import free_motion, payload
+from palpate.identification import free_motion
 from palpate.identification.contacts import contacts_of
 from palpate.identification.options import Options
 from palpate.identification.sampling import channels_of
@@ -37,8 +37,8 @@ VALUES: dict[tuple[Any, str], tuple[Any, ...]] = {
     (free_motion, "FLAT"): (0.1, 0.2, 0.4, 0.6, 0.8),
     (free_motion, "_TWICE"): (1.0, 1.5, 2.0, 4.0),
     (free_motion, "_OUTLYING"): (3.0, 5.0, 8.0),
-    (payload, "_MOST"): (0.3, 0.5, 0.7, 0.9),
-    (payload, "_OTHERS"): (1.0, 1.5, 2.0, 4.0),
+    (free_motion, "_EXPLAINED"): (0.3, 0.5, 0.7, 0.9),
+    (free_motion, "_OTHERS"): (1.0, 1.5, 2.0, 4.0),
 }
 
 

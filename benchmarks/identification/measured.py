@@ -24,7 +24,7 @@ from palpate.files import write_text
 from palpate.identification import Identification, Parameter, identify
 from palpate.logs import read_log
 from palpate.report.identification.page import page
-from palpate.report.identification.source import Source, sha256_of
+from palpate.report.identification.words import Source, sha256_of
 
 
 @dataclass(frozen=True)

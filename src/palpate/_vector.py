@@ -205,7 +205,7 @@ def angular(b):
 
 
 def outer(a, b):
-    """a b^T."""
+    """Outer product a b^T of two vectors."""
     return a.map_outer(b) if isinstance(a, tuple) else np.outer(a, b)
 
 

@@ -106,7 +106,7 @@ def plugin(name: str) -> Plugin:
     with _IMPORTING:
         _check_permitted(name)
     with _IMPORTING, _findable():
-        module = _imported(module_name, name)
+        module = _import(module_name, name)
         _attribute(module_name, attribute)
     file = Path(getattr(module, "__file__", None) or "").resolve()
     return Plugin(name, str(_top(module_name, file)), _STAMPS[module_name])
@@ -163,7 +163,7 @@ def _parts(name: str) -> tuple[str, str]:
 @contextmanager
 def _findable() -> Iterator[None]:
     """The folders at the end of the path, so that no file in them takes the place of an installed module."""
-    added = [folder for folder in map(str, _searched()) if folder not in sys.path]
+    added = [folder for folder in map(str, _search()) if folder not in sys.path]
     sys.path.extend(added)
     importlib.invalidate_caches()
     try:
@@ -174,18 +174,15 @@ def _findable() -> Iterator[None]:
                 sys.path.remove(folder)
 
 
-def _searched() -> Sequence[Path]:
+def _search() -> Sequence[Path]:
     return list(dict.fromkeys([*reversed(_FOLDERS), Path.cwd()]))
 
 
-def _imported(module: str, name: str) -> ModuleType:
+def _import(module: str, name: str) -> ModuleType:
     before = set(sys.modules)
     top = module.partition(".")[0]
     beside = [
-        f
-        for folder in _searched()
-        for f in (folder / f"{top}.py", folder / top / "__init__.py")
-        if f.is_file()
+        f for folder in _search() for f in (folder / f"{top}.py", folder / top / "__init__.py") if f.is_file()
     ]
     try:
         with redirect_stdout(sys.stderr):  # what it prints is no part of a command's output
@@ -256,8 +253,8 @@ def _attribute(module: str, attribute: str) -> Any:
 
 
 def _not_there(module: str, name: str) -> str:
-    here = {f.stem for folder in _searched() for f in folder.glob("*.py")}
+    here = {f.stem for folder in _search() for f in folder.glob("*.py")}
     near = get_close_matches(module, sorted(here), n=1)
     hint = f"did you mean '{near[0]}:{name.partition(':')[2]}'? " if near else ""
-    places = " and ".join(dict.fromkeys(map(str, _searched())))
+    places = " and ".join(dict.fromkeys(map(str, _search())))
     return f"{name}: there is no module {module!r}; {hint}It is looked for among the installed ones, and in {places}"

@@ -103,7 +103,7 @@ class Result(Compared):
         """
         if path is None:
             return self._looks().draw(self)
-        return import_module("palpate.report.result_text").write_figure(self, self._looks().draw, Path(path))
+        return import_module("palpate.report.numbers").write_figure(self, self._looks().draw, Path(path))
 
     def report(self, path: str | Path) -> Path:
         """Write a page with everything, an HTML file that opens without a network.
@@ -111,6 +111,4 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(
-            import_module("palpate.report.result_text").write_page(self, self._looks().page, Path(path))
-        )
+        return Path(import_module("palpate.report.numbers").write_page(self, self._looks().page, Path(path)))

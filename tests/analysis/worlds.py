@@ -4,9 +4,9 @@ import numpy as np
 
 from palpate._vector import Vec3, solve
 from palpate.bench import load
-from palpate.bench.sequence import COLUMNS
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import compiled_march
 from palpate.bench.tables import changed
-from palpate.bench.tick import compiled_march
 
 NONE = (0.0, 0.0, 0.0)
 

@@ -10,7 +10,7 @@ from palpate.bench.build import build
 from palpate.bench.metrics.window import summarise
 from palpate.bench.tables import changed, load
 from palpate.controllers.cautious_press import without_last_joint
-from palpate.report.run.words import alerts
+from palpate.report.run.table import alerts
 
 
 @pytest.mark.long

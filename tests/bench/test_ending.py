@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.bench.sequence import COLUMNS, StopCondition
+from palpate.bench.force_input import COLUMNS, StopCondition
 
 
 def rows(phases, start=0):

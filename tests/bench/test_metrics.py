@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from palpate.bench.force_input import APPROACH, COLUMNS, CONTACT, LOST
 from palpate.bench.metrics import METRICS, Look
-from palpate.bench.sequence import APPROACH, COLUMNS, CONTACT, LOST
 from palpate.records import Record
 
 TICK = 1e-3

@@ -6,7 +6,7 @@ import pytest
 from bench.quick import quick
 from palpate._vector import Vec3
 from palpate.bench import build, march, start_at
-from palpate.bench.sequence import COLUMNS, put
+from palpate.bench.force_input import COLUMNS, put
 from palpate.robots import Planar3R
 
 UNITS = {"1", "s", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "N m/s", "kg", "N s/m", "N/m"}

@@ -87,7 +87,7 @@ def test_how_often_progress_is_looked_at_changes_nothing(foam, monkeypatch, chun
 def test_a_run_may_start_where_another_left_off(foam):
     """The state is all there is: two marches are one."""
     from palpate.bench import march, start_at
-    from palpate.bench.sequence import COLUMNS
+    from palpate.bench.force_input import COLUMNS
 
     noise, whole, parts = np.random.default_rng(0).standard_normal(60), *np.empty((2, 60, len(COLUMNS)))
     start = start_at(foam.loop, foam.q)

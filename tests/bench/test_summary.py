@@ -8,8 +8,8 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build, summarise
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.metrics.window import settling_time
-from palpate.bench.sequence import COLUMNS
 from palpate.records import Record
 
 TICKS = 4000

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from palpate.cli import main
-from palpate.cli._edge import guarded
 from palpate.cli._program import COMMANDS, program
+from palpate.cli._streams import guarded
 from palpate.errors import InputError, PalpateError
 
 
@@ -154,7 +154,7 @@ def test_a_full_disk_is_one_line(words):
 
 def test_control_c_ends_a_running_command():
     code = (
-        "import time\nfrom palpate.cli._edge import guarded\nprint('up', flush=True)\n"
+        "import time\nfrom palpate.cli._streams import guarded\nprint('up', flush=True)\n"
         "raise SystemExit(guarded(lambda: time.sleep(60)))"
     )
     child = subprocess.Popen(

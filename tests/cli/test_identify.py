@@ -15,7 +15,7 @@ from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate import identify, read_log
 from palpate.cli import main
-from palpate.identification.warning_codes import Code
+from palpate.identification.causes import Code
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
 FIELDS = {"value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verdict", "reason"}

@@ -10,7 +10,7 @@ import pytest
 
 from cli.test_run import text_of
 from palpate.cli import main
-from palpate.cli._interrupts import noticed
+from palpate.cli._streams import noticed
 from palpate.logs import read_record
 from palpate.report.run import figures
 from palpate.report.run import page as pages
@@ -18,9 +18,9 @@ from palpate.report.run import page as pages
 PRELUDE = """
 import os, signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from palpate.cli import _interrupts
-from palpate.cli._edge import guarded
-_interrupts.keep()
+from palpate.cli import _streams
+from palpate.cli._streams import guarded
+_streams.keep()
 """
 
 

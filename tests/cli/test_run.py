@@ -18,8 +18,8 @@ from cli import asked
 from cli.asked import References
 from palpate.bench import bench as running
 from palpate.bench import names, simulation, source
-from palpate.bench.any_experiment import FILES as EXPERIMENTS
-from palpate.bench.sequence import COLUMNS
+from palpate.bench.build import FILES as EXPERIMENTS
+from palpate.bench.force_input import COLUMNS
 from palpate.cli import main
 from palpate.logs import read_record
 
@@ -368,7 +368,7 @@ def test_the_first_run_says_what_it_waits_for_and_the_second_does_not(mine):
 @pytest.mark.long
 def test_a_warm_run_compiles_nothing():
     code = (
-        "from palpate.bench import build, load\nfrom palpate.bench.tick import compiled_march\n"
+        "from palpate.bench import build, load\nfrom palpate.bench.plant import compiled_march\n"
         "build(load('foam-hybrid')).run(0.01)\nprint(compiled_march.from_cache)"
     )
     for _ in range(2):

@@ -23,7 +23,7 @@ WAYS = {
         "asyncio.run(main())"
     ),
 }
-START = "from palpate.cli import _interrupts, _streams; _interrupts.keep(); _streams.prepare()\n"
+START = "from palpate.cli import _streams; _streams.keep(); _streams.prepare()\n"
 
 
 def said(code, *options):

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 
 from palpate.bench import build, load, speed
-from palpate.bench.sequence import COLUMNS, CONTACT
+from palpate.bench.force_input import COLUMNS, CONTACT
 from palpate.bench.tables import changed
 from palpate.cli import main
 

@@ -6,7 +6,7 @@ import pytest
 
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.bench import build, load
-from palpate.bench.tick import compiled_march
+from palpate.bench.plant import compiled_march
 from palpate.controllers import Hybrid, Neural, join
 from palpate.errors import InputError
 from palpate.networks import Perceptron, layers_of, network, random_layers

@@ -3,7 +3,7 @@
 import numpy as np
 
 from errata.page import fails, holds
-from palpate.networks.thesis_weights import HIDDEN, OUTPUT
+from palpate.networks.perceptron import HIDDEN, OUTPUT
 
 AMPLITUDE = np.array([20.0, 10.0, 1.0])
 HIDDEN_WEIGHTS, OUTPUT_WEIGHTS = 1e-3 * np.array(HIDDEN), 1e-3 * np.array(OUTPUT)

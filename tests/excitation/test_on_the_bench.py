@@ -10,7 +10,7 @@ from palpate.bench import build
 from palpate.bench.tables import changed, parse
 from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
-from palpate.report.excitation.files import experiment
+from palpate.report.excitation.table import experiment
 from palpate.signals.low_pass import LowPass
 
 FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}

@@ -11,8 +11,7 @@ from scipy.stats import multivariate_normal
 from identification.test_budget import NOISE, flat_columns, stiffer_about
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators.averaging import averaged, members, of_octaves
-from palpate.identification.estimators.by_octave import LARGEST, System, solve
-from palpate.identification.estimators.octaves import PERIODS
+from palpate.identification.estimators.octaves import LARGEST, PERIODS, System, solve
 
 COUNT = 60
 

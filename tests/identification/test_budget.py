@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
-from palpate.identification.estimators.by_octave import System, estimate, solve
+from palpate.identification.estimators.octaves import System, estimate, solve
 
 NOISE = 0.1
 

@@ -9,8 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.estimators.by_octave import estimate, held, solve, system_of
-from palpate.identification.estimators.octaves import Segment, longest_of, octaves_of
+from palpate.identification.estimators.octaves import (
+    Segment,
+    estimate,
+    held,
+    longest_of,
+    octaves_of,
+    solve,
+    system_of,
+)
 
 DT = 1e-2
 ROWS = 2000

@@ -5,10 +5,9 @@ import pytest
 
 from identification.problems import problem
 from identification.sensor_logs import TRUTH, sensor_log
-from palpate.identification.estimators.errors_in_variables import compensation, resting
-from palpate.identification.estimators.fit import fit
+from palpate.identification.estimators.fit import compensation, fit, resting
 from palpate.identification.models import KELVIN_VOIGT_MASS, without_noise
-from palpate.identification.prior import Lag
+from palpate.identification.options import Lag
 
 
 def regression(seed, noise, count=400):

@@ -11,11 +11,9 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.loadings import Loading
 from palpate.identification.evidence.press import press_of
-from palpate.identification.evidence.slope import slope_of
-from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness
-from palpate.identification.evidence.working_point import working_point
+from palpate.identification.evidence.slope import Loading, slope_of
+from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
 from palpate.identification.filters.state_variable import low_pass_once
 from palpate.identification.options import Options
 from palpate.identification.result import DynamicStiffness

@@ -15,9 +15,9 @@ from identification.synthetic_contacts import pressed, record, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify, in_series
 from palpate.identification.estimators.budget import Spread
-from palpate.identification.estimators.robust import answer
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import DynamicStiffness, Press, Tangent
+from palpate.identification.selection import answer
 
 SERIES = 8000.0
 TRUTH = {"K": 5000.0, "B": 40.0, "M": 0.5}

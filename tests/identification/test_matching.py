@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.identification.estimators.fit import fit
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import KELVIN_VOIGT_MASS
-from palpate.identification.prior import USUAL_LAG, USUAL_LAG_STD, Lag
+from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD, Lag
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import channels_of
 from palpate.signals.low_pass import LowPass

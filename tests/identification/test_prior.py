@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.fit import fit
 from palpate.identification.models import KELVIN_VOIGT, KELVIN_VOIGT_MASS
-from palpate.identification.prior import LAG, NOTHING, Lag, Prior, prior_of
+from palpate.identification.options import LAG, NOTHING, Lag, Prior, prior_of
 
 NAMES = ("K", "B", "M", "offset", LAG)
 NOISE = 0.6

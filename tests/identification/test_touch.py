@@ -4,9 +4,8 @@ import numpy as np
 
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import Motion
-from palpate.identification.prior import Lag
-from palpate.identification.problem.seen import Seen
-from palpate.identification.problem.touch import touching
+from palpate.identification.options import Lag
+from palpate.identification.problem.problem import Seen, touching
 
 FORCE = np.arange(200.0)
 USABLE = np.ones(200, bool)

@@ -13,7 +13,7 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
-from palpate.report.identification.source import sha256_of
+from palpate.report.identification.words import sha256_of
 
 RNG = np.random.default_rng(5)
 T = np.arange(400) / 100

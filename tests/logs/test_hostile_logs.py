@@ -25,7 +25,7 @@ from palpate.logs import read_log, read_record
 from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
 from palpate.logs.listing import list_log
-from palpate.logs.own_runs import measured_by
+from palpate.logs.read import measured_by
 
 T = np.arange(50) / 100
 COLUMNS = {"time": "t", "position": "x", "force": "f"}

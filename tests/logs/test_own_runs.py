@@ -12,7 +12,7 @@ from identification.synthetic_contacts import coloured, force_of, press_path
 from logs.ros_bags import pose, wrench, write_bag
 from palpate.cli import main
 from palpate.logs import write_record
-from palpate.logs.own_runs import is_run, measured_by
+from palpate.logs.read import is_run, measured_by
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

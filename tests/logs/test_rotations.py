@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.errors import InputError
 from palpate.logs import read_wrench_and_pose
-from palpate.logs.rotations import ROTATIONS
+from palpate.logs.arm_logs import ROTATIONS
 
 RNG = np.random.default_rng(0)
 TURNS = Rotation.random(60, rng=RNG)

@@ -1,40 +1,25 @@
 """A law in C is the law in Python, to the last bit; and a law that is changed is not."""
 
+import argparse
 import dataclasses
+import importlib.util
 import json
 import math
 import shutil
 import subprocess
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from palpate._jit import kernel, law
 from palpate._jit.elementary import log
 from palpate.cli import main
-from palpate.force import load_arm
-from palpate.force.gains import gains_for
 from palpate.native.exporting import LawRequest, exported_law
 from palpate.native.replay import program, write_rows
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-
-
-@pytest.fixture(scope="module")
-def gains(tmp_path_factory):
-    path = tmp_path_factory.mktemp("gains") / "gains.toml"
-    path.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml())
-    return path
-
-
-@pytest.fixture(scope="module")
-def force(gains):
-    return exported_law(LawRequest(gains=gains))
-
-
-@pytest.fixture(scope="module")
-def squares():
-    return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))
 
 
 @needs_compiler
@@ -154,6 +139,28 @@ def test_the_header_names_law_and_gains(force, gains):
     assert f"// law: {own.law}\n// gains: {own.digest}\n" in force.sources.header
 
 
+def test_a_certificate_knows_the_header_of_its_gains(force, gains, tmp_path, capsys):
+    from palpate.force import Certificate, load_gains
+
+    header, proof = tmp_path / "palpate_force.h", tmp_path / "proof.json"
+    header.write_text(force.sources.header)
+    own = load_gains(gains)
+
+    def answer(of):
+        Certificate("palpate force certificate 1", of, ()).save(proof)
+        code = main(["certify", str(header), "--check", str(proof)])
+        return code, capsys.readouterr().err
+
+    assert answer(own) == (1, ""), "it is of this law and these gains, and claims nothing"
+    code, says = answer(msgspec.structs.replace(own, cap=0.9 * own.cap))
+    assert (code, says.count("\n")) == (2, 1)
+    assert "other gains" in says
+    header.write_text(force.sources.header.replace(f"law: {own.law}", "law: cautious adaptive control 6"))
+    assert "another law" in answer(own)[1]
+    header.write_text("int main(void);")
+    assert "no header" in answer(own)[1]
+
+
 @needs_compiler
 def test_the_command_writes_checks_and_answers(gains, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -195,9 +202,11 @@ def test_bad_input_is_one_line(gains, tmp_path, capsys, monkeypatch):
     (tmp_path / "mine" / "thesis.tex").write_text("mine")
     assert "exists" in refused(capsys, own, "--to", "c", "--out", "mine")
     assert "thesis.tex" in refused(capsys, own, "--to", "c", "--out", "mine", "--replace")
+    (tmp_path / "file").write_text("mine")
+    assert "file: File exists" in refused(capsys, own, "--to", "c", "--out", "file/law")
     monkeypatch.setenv("CC", "no-such-compiler")
     assert "install gcc or clang" in refused(capsys, own, "--to", "c", "--check")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "older.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "mine", "older.toml"]
 
 
 def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
@@ -206,22 +215,27 @@ def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
     assert np.isnan(next(iter(squares.recording.presses(4000, 1)))[:, 1:4]).any()
 
 
-CROSS = ("aarch64-linux-gnu-gcc", "qemu-aarch64-static")
+def equality():
+    """The benchmark that asks every compiler."""
+    path = Path(__file__).parents[2] / "benchmarks" / "native" / "equality.py"
+    spec = importlib.util.spec_from_file_location("equality", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@pytest.mark.skipif(
-    any(shutil.which(name) is None for name in CROSS), reason="there is no cross compiler for aarch64"
-)
 @pytest.mark.parametrize("name", ["force", "squares"])
-def test_no_tick_differs_on_aarch64(name, request, tmp_path):
-    exported = request.getfixturevalue(name)
-    exported.write(tmp_path / "law", "0", replace=False)
-    own = f"{exported.module.name}.c"
-    build = [CROSS[0], "-std=c99", "-O3", "-ffp-contract=off", "-static", "-I.", own, "test/replay.c", "-lm"]
-    subprocess.run([*build, "-o", "r"], cwd=tmp_path / "law", check=True)
-    run = [CROSS[1], "r", "test/press.bin"]
-    done = subprocess.run(run, cwd=tmp_path / "law", capture_output=True, text=True, check=False)
-    assert done.stdout == "ticks 2000 unequal 0\n"
+@pytest.mark.parametrize("compiler", ["clang", "aarch64-linux-gnu-gcc", "arm-none-eabi-gcc, Cortex-M7"])
+def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, request, tmp_path):
+    bench, law = equality(), request.getfixturevalue(name)
+    given = argparse.Namespace(ticks=2000, emulated=2000, m7=2000)
+    builds = [build for build in bench.builds(given) if build[0] == compiler]
+    if not builds:
+        pytest.skip(f"there is no {compiler}, or no emulator for it")
+    bench.write_sources(law, tmp_path)
+    for _, _, build, run, ticks in builds[-1:]:
+        measured = bench.Bench(tmp_path / "out", tmp_path)
+        assert measured.unequal(build, run, law, ticks, 1) == [2000, 0]
 
 
 @pytest.mark.parametrize(
@@ -284,13 +298,13 @@ def walks_over(x):
 @needs_compiler
 def test_the_operators_of_python_are_those_of_c(tmp_path):
     """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
-    from palpate.native.translation import HELPERS
+    from palpate.native.translation import OPERATORS
 
     values = [0.0, -0.0, 1.0, -1.0, 2.5, -7.5, 1e300, -1e-300, 3.0, float("inf"), float("-inf"), float("nan")]
     compiled = {"modulo": remainder, "floored": quotient, "larger": larger, "smaller": smaller}
     cases = [(name, a, b) for name in compiled for a in values for b in values]
     calls = "".join(f'    printf("%a\\n", {name}({spelled(a)}, {spelled(b)}));\n' for name, a, b in cases)
-    functions = "".join(f"static double {name}{HELPERS[name, 'double']}\n" for name in compiled)
+    functions = "".join(OPERATORS[name, "double"].group() for name in compiled)
     text = f"#include <math.h>\n#include <stdio.h>\n{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
     (tmp_path / "operators.c").write_text(text)
     words = ["cc", "-std=c99", "-ffp-contract=off", "operators.c", "-lm", "-o", "operators"]

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
-from palpate.press.loops import gains_for, loop_of
+from palpate.press.engines import gains_for, loop_of
 from palpate.press.pilots import Cautious
-from palpate.press.plan import Plan
 from palpate.press.pressing import press
 from palpate.press.setting import cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.tool import Plan
 from palpate.robots import SerialArm
 
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")

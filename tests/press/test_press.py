@@ -15,13 +15,12 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.press.cell import Reading, WristSensor, sensed
 from palpate.press.pilots import Cautious
-from palpate.press.plan import Plan
 from palpate.press.prepare import Question, arm_of, prepared, surface_of
 from palpate.press.pressing import press
-from palpate.press.protocol import Command
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
+from palpate.press.tool import Command, Plan
 from palpate.robots.serial.from_toml import names
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")

@@ -10,11 +10,10 @@ from palpate.cli import main
 from palpate.contact_frame import Payload
 from palpate.errors import InputError
 from palpate.press.prepare import Question, prepared, surface_of
-from palpate.press.protocol import Command
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
-from palpate.press.tool import held_tool, with_tool
+from palpate.press.tool import Command, held_tool, with_tool
 from palpate.report.press.page import notes
 from palpate.robots import SerialArm
 
@@ -96,9 +95,15 @@ def test_in_the_air_the_reading_follows_the_acceleration_of_the_tools_centre(phy
     assert np.abs(shown - shown.mean() - expected + expected.mean()).max() < 0.1 * np.ptp(expected)
 
 
-def test_it_presses_with_the_force_asked_for_and_the_tools_mass_is_taken_off():
+@pytest.fixture(scope="module")
+def pressed():
+    """A press with the tool, and its record."""
     press = pressing()
-    record = press.run()
+    return press, press.run()
+
+
+def test_it_presses_with_the_force_asked_for_and_the_tools_mass_is_taken_off(pressed):
+    press, record = pressed
     found = summarise(record, press.asked)
     assert found["end"] == "done"
     assert found["force"]["mean_N"] == pytest.approx(20.0, abs=0.1)
@@ -143,9 +148,8 @@ def test_an_untared_and_a_saturated_sensor_are_refused(share, says):
         pressing(changed(bias=(0.0, 0.0, share * scale))).run()
 
 
-def test_a_sensor_that_meets_the_end_of_its_scale_under_way_is_named():
-    press = pressing(seconds=1.0)
-    record = press.run()
+def test_a_sensor_that_meets_the_end_of_its_scale_under_way_is_named(pressed):
+    press, record = pressed
     scale = press.asked.gains.arm.sensor.full_scale
     shown = np.where(record["force_sampled"] > 19.0, scale - record.meta["tare_N"], record["force_sampled"])
     summary = summarise(replace(record, columns={**record.columns, "force_sampled": shown}), press.asked)

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
 from palpate.report import style
-from palpate.report.figure_panels.labels import plain, unit
-from palpate.report.figure_panels.lines import MOST
-from palpate.report.figure_panels.panels import panel_scripts, panels_of
-from palpate.report.look.columns import GAP, NO_PLACE
+from palpate.report.figure_panels.artists import plain, unit
+from palpate.report.figure_panels.panels import MOST, panel_scripts, panels_of
+from palpate.report.look.assets import GAP, NO_PLACE
 
 T = np.linspace(0.0, 4.0, 40_001)
 

@@ -13,11 +13,10 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
-from palpate.identification.warning_codes import Code
+from palpate.identification.causes import Code
 from palpate.report import style
 from palpate.report.identification.page import page
-from palpate.report.identification.source import Source, as_json
-from palpate.report.identification.words import ADVICE, interval, sentence
+from palpate.report.identification.words import ADVICE, Source, as_json, interval, sentence
 from palpate.report.page import advice
 from report.outcomes import OUTCOMES
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from palpate.identification.warning_codes import Code, Warn
+from palpate.identification.causes import Code, Warn
 from palpate.report.identification.table import show
 from palpate.report.identification.words import formatted, number, sentence
 from palpate.report.numbers import between

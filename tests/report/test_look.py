@@ -14,9 +14,22 @@ from hypothesis.extra.numpy import arrays
 
 from palpate.errors import InputError
 from palpate.report import style
-from palpate.report.look.assets import CHARTS, data, policy, scripts, styles, text_of
-from palpate.report.look.columns import GAP, NO_PLACE, packed, thinned
-from palpate.report.look.tokens import DATA, PAIRS, SERIES, style_sheet
+from palpate.report.look.assets import (
+    CHARTS,
+    DATA,
+    GAP,
+    NO_PLACE,
+    PAIRS,
+    SERIES,
+    data,
+    packed,
+    policy,
+    scripts,
+    style_sheet,
+    styles,
+    text_of,
+    thinned,
+)
 from palpate.report.page import render
 
 GROUNDS = ("paper", "card")

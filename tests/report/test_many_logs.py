@@ -11,12 +11,10 @@ from rich.console import Console
 from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
-from palpate.report.identification.source import Source
+from palpate.report.identification.words import Source
 from palpate.report.many.forest import draw, write_figure
 from palpate.report.many.page import page
-from palpate.report.many.rows import LogRow, json_of
-from palpate.report.many.table import show
-from palpate.report.many.words import failures, sentence
+from palpate.report.many.table import LogRow, failures, json_of, sentence, show
 from report.test_identification_page import Reader
 
 NONE = np.empty(0)

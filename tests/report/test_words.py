@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from palpate.identification.causes import cause_of
+from palpate.identification.causes import Code, Warn, cause_of
 from palpate.identification.result import (
     DynamicStiffness,
     Identification,
@@ -14,7 +14,6 @@ from palpate.identification.result import (
     Verdict,
     WorkingPoint,
 )
-from palpate.identification.warning_codes import Code, Warn
 from palpate.report.identification.words import limited_by, model_line, sentence
 from palpate.report.numbers import quantity, quantity_between
 

@@ -7,8 +7,7 @@ import pytest
 from palpate.errors import InputError
 from palpate.studies.effects import effect_sentence, effects, effects_table
 from palpate.studies.plan import plan
-from palpate.studies.preview import check_cases
-from palpate.studies.ranking import rankings
+from palpate.studies.preview import check_cases, rankings
 from palpate.studies.study import parse
 from palpate.studies.summary import headline, tables
 

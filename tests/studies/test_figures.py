@@ -8,12 +8,12 @@ import pytest
 from palpate.bench import load
 from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
-from palpate.report.study.axes import Scale
+from palpate.report.study.lines import Scale
 from palpate.studies import figures
 from palpate.studies.figures import bounds, cells, equivalent, lines, points, references
 from palpate.studies.pairing import StudyRows
 from palpate.studies.plan import MAIN
-from palpate.studies.ranking import MetricMean, rankings
+from palpate.studies.preview import MetricMean, rankings
 from palpate.studies.run_one import Row, table
 from palpate.studies.study import Map
 from palpate.studies.summary import interval, present, tables

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from palpate.studies.ranking import mean, rankings
+from palpate.studies.preview import mean, rankings
 from palpate.studies.run_one import Row, table
 from studies.small import planned, text
 

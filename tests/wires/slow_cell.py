@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from palpate.force import load_arm
-from palpate.press.loops import gains_for
-from palpate.wires.recording import UNITS
+from palpate.press.engines import gains_for
+from palpate.wires.outcome import UNITS
 
 ARM = """
 title = "a slow arm"

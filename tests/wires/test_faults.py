@@ -17,7 +17,7 @@ import pytest
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from palpate.logs.own_runs import read_run
+from palpate.logs.read import read_run
 from wires.slow_cell import ALONE, DOMAIN, WORDS, child, slower_cell, while_it_presses
 
 OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"

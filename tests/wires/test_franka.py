@@ -18,10 +18,10 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate.wires import LostError, link, open_wire
+from palpate.wires import LostError, open_wire, realtime
+from palpate.wires.at_rest import from_matrix_by_columns
 from palpate.wires.franka_driver import Driver, nearer
 from palpate.wires.protocol import Command
-from palpate.wires.turns import from_matrix_by_columns
 from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
@@ -248,7 +248,8 @@ class RestingRobot:
 
 
 @pytest.mark.parametrize(
-    ("request_", "answer"), [(link.text(link.TARE), link.TARED), (link.begin(0.1), link.BEGUN)]
+    ("request_", "answer"),
+    [(realtime.text(realtime.TARE), realtime.TARED), (realtime.begin(0.1), realtime.BEGUN)],
 )
 def test_an_answer_is_kept_while_nobody_reads(request_, answer):
     """A loop that is busy for a third of a second leaves its socket full of states: what it asks then is answered."""
@@ -258,14 +259,14 @@ def test_an_answer_is_kept_while_nobody_reads(request_, answer):
     theirs.setblocking(False)
     with contextlib.suppress(BlockingIOError):
         while True:
-            theirs.send(bytes([link.STATE]))
+            theirs.send(bytes([realtime.STATE]))
     driver = Driver(library, RestingRobot(), theirs, 1.0)
     ours.send(request_)
     thread = threading.Thread(target=driver.run)
     thread.start()
     time.sleep(0.05)  # the request is heard while there is no room for the answer
     ours.settimeout(PATIENCE)
-    kinds = [ours.recv(link.LARGEST)[0] for _ in range(2000)]  # more than the socket holds
+    kinds = [ours.recv(realtime.LARGEST)[0] for _ in range(2000)]  # more than the socket holds
     ours.close()
     thread.join(PATIENCE)
     theirs.close()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.wires import Command, Limits, LostError, guard
-from palpate.wires.guard import Guard, unsafe
+from palpate.wires import Command, Limits, LostError
+from palpate.wires.press import Guard, unsafe
 from palpate.wires.protocol import EndedError, SilentError
 
 LIMITS = Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0)
@@ -53,7 +54,7 @@ class Wire:
 @pytest.fixture
 def clock(monkeypatch):
     made = Clock()
-    monkeypatch.setattr(guard, "_now", made)
+    monkeypatch.setattr(sys.modules[Guard.__module__], "_now", made)
     return made
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from palpate.errors import InputError
-from palpate.wires import Command, LostError, Sense, link
+from palpate.wires import Command, LostError, Sense, realtime
 from palpate.wires.host import Host
 from palpate.wires.protocol import SilentError
 from wires.slow_cell import PATIENCE, WORDS, cell
@@ -78,28 +78,28 @@ def hosted():
 
 
 def begun(ours, silence=0.05):
-    ours.send(link.begin(silence))
-    assert ours.recv(link.LARGEST)[0] == link.BEGUN
+    ours.send(realtime.begin(silence))
+    assert ours.recv(realtime.LARGEST)[0] == realtime.BEGUN
 
 
 def test_messages_carry_what_was_said():
-    assert link.read_state(link.state(SENSE)) == SENSE
-    assert link.read_move(link.move(DOWN)) == DOWN
-    assert link.read_begin(link.begin(0.25)) == 0.25
+    assert realtime.read_state(realtime.state(SENSE)) == SENSE
+    assert realtime.read_move(realtime.move(DOWN)) == DOWN
+    assert realtime.read_begin(realtime.begin(0.25)) == 0.25
 
 
 def test_an_arm_without_commands_rests_and_the_loop_is_told():
     with hosted() as (arm, ours):
         begun(ours)
-        ours.send(link.move(DOWN))
+        ours.send(realtime.move(DOWN))
         sent = time.monotonic()
         assert arm.stopped.wait(5.0)
         assert time.monotonic() - sent > 0.09
         assert arm.did == ["begin", DOWN, "stop"]
-        message = ours.recv(link.LARGEST)
-        assert message[0] == link.FAILED
-        assert link.read_text(message) == "no command came for 100 ms, and the arm was brought to rest"
-        ours.send(link.move(DOWN))  # a loop that wakes up again moves nothing
+        message = ours.recv(realtime.LARGEST)
+        assert message[0] == realtime.FAILED
+        assert realtime.read_text(message) == "no command came for 100 ms, and the arm was brought to rest"
+        ours.send(realtime.move(DOWN))  # a loop that wakes up again moves nothing
         time.sleep(0.05)
         assert arm.did == ["begin", DOWN, "stop"]
 
@@ -107,44 +107,44 @@ def test_an_arm_without_commands_rests_and_the_loop_is_told():
 def test_an_arm_whose_loop_has_died_rests():
     with hosted() as (arm, ours):
         begun(ours, 0.9)
-        ours.send(link.move(DOWN))
+        ours.send(realtime.move(DOWN))
         ours.close()
         assert arm.stopped.wait(0.5)
 
 
 def test_nothing_moves_before_it_began_and_each_wish_is_answered():
     with hosted() as (arm, ours):
-        ours.send(link.move(DOWN))
-        ours.send(link.text(link.TARE))
-        assert ours.recv(link.LARGEST)[0] == link.TARED
+        ours.send(realtime.move(DOWN))
+        ours.send(realtime.text(realtime.TARE))
+        assert ours.recv(realtime.LARGEST)[0] == realtime.TARED
         begun(ours, 0.9)
-        ours.send(link.text(link.REST))
-        assert ours.recv(link.LARGEST)[0] == link.RESTED
+        ours.send(realtime.text(realtime.REST))
+        assert ours.recv(realtime.LARGEST)[0] == realtime.RESTED
         assert arm.did == ["tare", "begin", "stop"]
 
 
 @pytest.mark.parametrize(
     ("message", "kind", "says"),
     [
-        (link.begin(2.0), link.REFUSED, "it has another master"),
-        (link.move(DOWN._replace(velocity=(1.0, 0.0, 0.0))), link.FAILED, "a library's error"),
+        (realtime.begin(2.0), realtime.REFUSED, "it has another master"),
+        (realtime.move(DOWN._replace(velocity=(1.0, 0.0, 0.0))), realtime.FAILED, "a library's error"),
     ],
 )
 def test_a_librarys_error_is_one_line(message, kind, says):
     with hosted() as (_, ours):
-        if message[0] == link.MOVE:
+        if message[0] == realtime.MOVE:
             begun(ours, 0.9)
         ours.send(message)
-        answer = ours.recv(link.LARGEST)
-        assert (answer[0], link.read_text(answer)) == (kind, says)
+        answer = ours.recv(realtime.LARGEST)
+        assert (answer[0], realtime.read_text(answer)) == (kind, says)
 
 
 def test_a_wire_that_is_lost_is_told():
     with hosted() as (arm, ours):
         arm.lost = LostError("the controller has closed the connection")
-        message = ours.recv(link.LARGEST)
-        assert (message[0], link.read_text(message)) == (
-            link.FAILED,
+        message = ours.recv(realtime.LARGEST)
+        assert (message[0], realtime.read_text(message)) == (
+            realtime.FAILED,
             "the controller has closed the connection",
         )
 

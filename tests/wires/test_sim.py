@@ -20,7 +20,7 @@ from cli.json_keys import documented
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from palpate.wires import LostError, open_wire, sim_arm, sim_protocol
+from palpate.wires import LostError, open_wire, sim, sim_arm
 from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
 
 
@@ -208,8 +208,8 @@ def test_nobody_but_its_master_moves_an_arm_even_with_the_number_of_its_session(
         )
         arm.bind(("127.0.0.1", 0))
         arm.settimeout(5.0)
-        greeting = sim_protocol.packed(sim_protocol.HELLO, 7)
-        down = sim_protocol.packed(sim_protocol.MOVE, 7, sim_protocol.move(1, (0.0, 0.0, -0.01)))
+        greeting = sim.packed(sim.HELLO, 7)
+        down = sim.packed(sim.MOVE, 7, sim.move(1, (0.0, 0.0, -0.01)))
 
         def hear(sender, datagram, heard):
             sender.sendto(datagram, arm.getsockname())

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from palpate.force import ForceLoop, load_arm
-from palpate.press.loops import gains_for
+from palpate.press.engines import gains_for
 from palpate.wires import AtRest, Limits, Sense, Task, checked
-from palpate.wires.stop_conditions import Moment, reason_to_stop, spoiled
+from palpate.wires.press import Moment, reason_to_stop, spoiled
 
 GAINS = gains_for(load_arm("ur5e"), 10.0)
 THETA = GAINS.theta

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.contact_frame import Payload
 from palpate.wires import AtRest, Sense
-from palpate.wires.tool import notes_on
+from palpate.wires.at_rest import notes_on
 
 WEIGHT = (0.0, 0.0, 9.80665)
 

@@ -17,7 +17,7 @@ import pytest
 from palpate.cli import main
 from palpate.logs import read_record
 from palpate.wires import Command, open_wire
-from palpate.wires.turns import from_rotation_vector, turned
+from palpate.wires.at_rest import from_rotation_vector, turned
 from wires.slow_cell import WORDS, cell, child, wait_for_rows, while_it_presses
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from cli.json_keys import documented
 from palpate.bench import Experiment, build, changed, load
-from palpate.bench.sequence import CONTACT
+from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.studies.cluster import Cluster

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from palpate.bench import changed
+from palpate.bench.force_input import COLUMNS, CONTACT, LOST
 from palpate.bench.metrics.following import LIMIT
 from palpate.bench.metrics.window import SETTLE
-from palpate.bench.sequence import COLUMNS, CONTACT, LOST
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall, rougher, stops_holding
 from palpate_thesis.explanations import e2_integrator, e3_divergence

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Complex
-from palpate.bench.sequence import COLUMNS
-from palpate.bench.tick import Loop, LoopState, compiled_march
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import Loop, LoopState, compiled_march
 from palpate.controllers.any_controller import AnyController
 
 

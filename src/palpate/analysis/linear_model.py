@@ -12,9 +12,9 @@ from palpate.analysis.linear_loop import LinearLoop, LoopMotion, change
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.sequence import COLUMNS, CONTACT, SequenceState
+from palpate.bench.force_input import COLUMNS, CONTACT, SequenceState
+from palpate.bench.plant import Loop, LoopState, start_at
 from palpate.bench.tables import Experiment
-from palpate.bench.tick import Loop, LoopState, start_at
 from palpate.errors import InputError
 
 FINE_BITS = 50

@@ -12,8 +12,8 @@ from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.given_motion import GivenMotion, given_motion
 from palpate.bench.metrics.window import summarise
+from palpate.bench.plant import Loop, march, start_at
 from palpate.bench.tables import Experiment, ForceSensor, changed, load, names, source
-from palpate.bench.tick import Loop, march, start_at
 
 __all__ = [
     "Bench",

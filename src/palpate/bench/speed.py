@@ -10,9 +10,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from palpate.bench.build import build
-from palpate.bench.sequence import COLUMNS
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import compiled_march, start_at
 from palpate.bench.tables import changed, load
-from palpate.bench.tick import compiled_march, start_at
 
 EXPERIMENT = "foam-neural"
 PRESSING = {

@@ -9,8 +9,8 @@ import numpy as np
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
 from palpate.bench import build, changed, load
-from palpate.bench.any_experiment import check_parts
 from palpate.bench.bench import Bench
+from palpate.bench.build import check_parts
 from palpate.checks.check import Check, require
 from palpate.controllers.controller import controller as registered
 from palpate.errors import InputError

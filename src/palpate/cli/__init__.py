@@ -17,18 +17,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         Codes of the edge: 70 for a defect in palpate itself, 141 when the reader of the output has gone.
     """
     if argv is None:
-        from palpate.cli import _interrupts, _streams
+        from palpate.cli import _streams
 
-        _interrupts.keep()
+        _streams.keep()
         _streams.prepare()
         os.environ.setdefault(
             "OPENBLAS_NUM_THREADS", "1"
         )  # the matrices are many and small: more threads only spin
     import sys
 
-    from palpate.cli._edge import guarded
     from palpate.cli._help import short_help
     from palpate.cli._program import COMMANDS, EXPANDED, TYPED, program
+    from palpate.cli._streams import guarded
     from palpate.cli._terminal import print_lines
     from palpate.cli.options.kept import expanded
     from palpate.files.limits import check_address_space

@@ -43,7 +43,7 @@ def _of_group(group: Any) -> dict[str, Any]:
 
 
 def _files(options: Mapping[str, Any]) -> list[dict[str, str]]:
-    from palpate.report.identification.source import sha256_of
+    from palpate.report.identification.words import sha256_of
 
     named = [path for name, value in options.items() if name not in _WRITTEN for path in _paths(value)]
     return [{"file": str(path), "sha256": sha256_of(path)} for path in dict.fromkeys(named) if path.is_file()]

@@ -48,9 +48,11 @@ class LawOptions:
 
 def export_law(gains: Path | None, options: LawOptions, output: Any) -> int:
     """Writes a law as C, or checks it, or both; exit code 1 if a tick differs in a bit."""
+    from contextlib import nullcontext
     from dataclasses import asdict
 
     from palpate import __version__
+    from palpate.files import fresh_folder
     from palpate.native.exporting import LawRequest, exported_law
     from palpate.native.replay import compiler
 
@@ -59,9 +61,13 @@ def export_law(gains: Path | None, options: LawOptions, output: Any) -> int:
     request = LawRequest(gains=gains, **asdict(options))
     using = compiler()[0] if output.check else None
     with console(stderr=True).status("exporting") as status:
-        law = exported_law(request, status.update)
-        if output.out is not None:
-            law.write(output.out, __version__, replace=output.replace)
+        place_of = (
+            fresh_folder(output.out, replace=output.replace) if output.out is not None else nullcontext()
+        )
+        with place_of as draft:
+            law = exported_law(request, status.update)
+            if draft is not None:
+                law.fill(draft, __version__)
         status.update(f"checking {law.module.name} by {using}")
         ticks, unequal = law.check() if output.check else (0, 0)
     if output.json:

@@ -102,7 +102,7 @@ class PhraseFormatter(DefaultFormatter):
     """Panels of options whose texts are broken between phrases."""
 
     def __call__(self, console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
-        """Render one panel."""
+        """Render one panel of the help."""
         from attrs import evolve
 
         entries = [evolve(entry, **_describe(entry)) for entry in panel.entries]

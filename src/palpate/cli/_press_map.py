@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from palpate.cli._answer import print_answer
-from palpate.cli._interrupts import noticed
 from palpate.cli._program import command
-from palpate.cli._progress import bar
-from palpate.cli._terminal import console, show_answer
+from palpate.cli._streams import noticed
+from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.map import MapOptions
 from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions

@@ -9,7 +9,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli import _interrupts, _streams
+from palpate.cli import _streams
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
 from palpate.cli._terminal import print_lines, say
@@ -40,8 +40,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
     from palpate.wires import checked, look, open_wire
-    from palpate.wires.at_rest import with_noise_of
-    from palpate.wires.tool import notes_on
+    from palpate.wires.at_rest import notes_on, with_noise_of
 
     assert asked.gains is not None
     order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
@@ -56,7 +55,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
             _, note = with_noise_of(air, order)
             notes = [*([] if note is None else [note]), *([] if tool is None else notes_on(tool, air))]
             if options.dry_run:
-                return _looked(air, [*plan, *notes], notes, json)
+                return _look(air, [*plan, *notes], notes, json)
             if not json:
                 print_lines(*notes)
         _ask(options.yes)
@@ -79,7 +78,7 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
 
 def _press(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
     """Press, keep the record and print the outcome, whatever signal comes; returns the exit code."""
-    with _interrupts.noticed() as came:
+    with _streams.noticed() as came:
         outcome, words, where = _write_record(arm, order, options, about, came)
         try:
             code = _print(outcome, words, where, json)
@@ -91,7 +90,7 @@ def _press(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any],
 
 
 def _write_record(
-    arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], came: _interrupts.Noticed
+    arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], came: _streams.Noticed
 ) -> tuple[Outcome, str, Path | None]:
     """The outcome, the priority that was given, and where the record is; its rows are kept whatever happens."""
     from palpate.wires import Rows, press
@@ -123,7 +122,7 @@ def _live() -> SimpleQueue[str]:
 
 
 def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
-    from palpate.press.loops import mass_note
+    from palpate.press.engines import mass_note
 
     task, limits, gains = order.task, order.limits, order.loop.gains
     x, y, z = task.direction
@@ -176,7 +175,7 @@ def _ask(yes: bool) -> None:
         raise InputError("not confirmed; nothing was moved")
 
 
-def _looked(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
+def _look(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
     drift = f"drift {air.drift:.2g} ± {air.drift_std:.2g} N/s"
     found = f"in free motion: bias {bias} N, noise {air.noise:.2g} N, {drift}, {air.rate:.4g} Hz"

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import codecs
+import errno
 import faulthandler
 import logging
 import os
+import re
+import signal
 import sys
 import threading
 import traceback
 import warnings
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from io import TextIOWrapper
-from typing import TextIO
+from types import FrameType
+from typing import Any, TextIO
+
+from cyclopts import CycloptsError
+
+from palpate.errors import LONGEST, PalpateError
+from palpate.text import printable, shorten
 
 _PLAIN = {"±": "+-", "–": "-", "—": "-", "…": "...", "µ": "u", "×": "x", "²": "^2", "°": " deg", "√": "sqrt"}
 _ERRORS = "palpate"
@@ -92,3 +102,223 @@ def _plainly(error: UnicodeError) -> tuple[str | bytes, int]:
         raise error
     letters = error.object[error.start : error.end]
     return "".join(_PLAIN.get(a) or ascii(a)[1:-1] for a in letters), error.end
+
+
+_AGAIN = 0.05
+"""Delay until it is raised again [s]."""
+_CAUGHT = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT}
+_OF_TERMINALS = (signal.SIGTTIN, signal.SIGTTOU)
+"""Would halt a process in the background that reads or writes; ignored, the call itself fails or succeeds."""
+_LEFT = {
+    *(signal.SIGKILL, signal.SIGSTOP),  # no program can catch them
+    *(
+        signal.SIGSEGV,
+        signal.SIGBUS,
+        signal.SIGFPE,
+        signal.SIGILL,
+        signal.SIGTRAP,
+        signal.SIGSYS,
+        signal.SIGABRT,
+    ),
+    *(signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH),  # they end nothing
+    *(signal.SIGPIPE, signal.SIGXFSZ, *_OF_TERMINALS),  # of a write, which fails by itself
+}
+
+
+def keep() -> None:
+    """Let no Ctrl-C of this process be swallowed.
+
+    An interrupted import turns it into another error, and an interrupted finaliser ignores it with a note: in both
+    cases it is raised later.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _raise_or_put_off)
+
+    def hook(unraisable: Any) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            _put_off()
+        elif sys.warnoptions:  # else a finaliser's trouble is a library's, and concerns no reader
+            sys.__unraisablehook__(unraisable)
+
+    sys.unraisablehook = hook
+
+
+class Noticed:
+    """Signal that came within a `noticed` block; called, it returns whether one came."""
+
+    number = 0
+
+    def __call__(self) -> bool:
+        return self.number != 0
+
+    @property
+    def reason(self) -> str | None:
+        """Its sentence; None if no signal came."""
+        if not self.number:
+            return None
+        names = {int(known): known.name for known in signal.Signals} | {int(signal.SIGINT): "Ctrl-C"}
+        return f"stopped by the user ({names.get(self.number, f'signal {self.number}')})"
+
+    @property
+    def code(self) -> int:
+        """Exit code of a command that a signal ended, as a shell reports it: 130 for Ctrl-C, and where none came."""
+        return 128 + (self.number or signal.SIGINT)
+
+    def notice(self, number: int, _: FrameType | None) -> None:
+        """Handle a signal: the first one counts."""
+        self.number = self.number or number
+
+
+@contextmanager
+def noticed() -> Iterator[Noticed]:
+    """Within the block no signal ends or halts this process; the yielded value returns whether one came, and which.
+
+    For work whose results must not be lost, and which checks it regularly. Those of `_CAUGHT` are always noticed, but
+    for a SIGHUP that is ignored (nohup). Of the others those are, whose default would end or halt the process. What no
+    program can catch (SIGKILL, SIGSTOP), and faults of the process itself (SIGSEGV), are left.
+    """
+    came = Noticed()
+    if threading.current_thread() is not threading.main_thread():  # no signal gets here
+        yield came
+        return
+    before = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    caught = [number for number, handler in before.items() if _ends(number, handler)]
+    try:
+        for number in caught:
+            signal.signal(number, came.notice)
+        for number in _OF_TERMINALS:
+            signal.signal(number, signal.SIG_IGN)
+        yield came
+    finally:
+        for number in (*caught, *_OF_TERMINALS):
+            handler = before[number]
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def _ends(number: int, handler: Any) -> bool:
+    """Whether a signal would end or halt this process, and can be caught."""
+    if number in _CAUGHT:
+        return number != signal.SIGHUP or handler != signal.SIG_IGN
+    return handler == signal.SIG_DFL and number not in _LEFT
+
+
+def _raise_or_put_off(number: int, frame: FrameType | None) -> None:
+    if _importing(frame):
+        _put_off()
+    else:
+        signal.default_int_handler(number, frame)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _put_off() -> None:
+    main = threading.main_thread().ident
+    assert main is not None
+    timer = threading.Timer(_AGAIN, signal.pthread_kill, (main, signal.SIGINT))
+    timer.daemon = True
+    timer.start()
+
+
+DONE = 0
+WRONG_INPUT = 2
+DEFECT = 70  # EX_SOFTWARE of sysexits.h; not 1, which means "ran, and the answer is no"
+INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
+READER_GONE = 141  # 128 + SIGPIPE
+
+_DANGEROUS = {"--replace", "--yes"}
+"""Flags that remove results, or start an arm or a long run without a question."""
+_REMEDIES = {
+    errno.ENOSPC: "free some space, or choose another place",
+    errno.EDQUOT: "free some space, or choose another place",
+    errno.EACCES: "check its permissions, or choose another place",
+    errno.EPERM: "check its permissions, or choose another place",
+    errno.EROFS: "choose another place",
+    errno.ENOENT: "check the path",
+    errno.ENOTDIR: "check the path: one of its folders is a file",
+    errno.EISDIR: "name a file, not a folder",
+    errno.EEXIST: "choose another name",
+}
+
+
+def guarded(command: Callable[[], Any]) -> int:
+    """Run a command and return its exit code; exceptions are reported on standard error.
+
+    An error that the user can correct is one line: the fault, the place, and the remedy.
+    A defect of palpate keeps its traceback, for the report.
+    """
+    try:
+        code = command()
+        flush(sys.stdout)
+    except BaseException as error:  # noqa: BLE001 - the last one out: exits and interrupts are codes too
+        return _settle(_code_of(error))
+    return _settle(DONE if code is None else int(code))
+
+
+def _settle(code: int) -> int:
+    """The code, after the streams are flushed, so that Python's own flush at exit cannot fail."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):
+            flush(stream)
+    return code
+
+
+def _code_of(error: BaseException) -> int:
+    match error:
+        case SystemExit(__context__=BrokenPipeError()):  # rich's way of saying it
+            return READER_GONE
+        case SystemExit():
+            return error.code if isinstance(error.code, int) else DONE
+        case KeyboardInterrupt():
+            return _say("interrupted", INTERRUPTED)
+        case BrokenPipeError():
+            drop(sys.stdout)
+            return READER_GONE
+        case CycloptsError():
+            return _say(f"{_without_danger(error)} {_where_help_is(error)}", WRONG_INPUT)
+        case PalpateError():
+            return _say(str(error), WRONG_INPUT)
+        case OSError():
+            return _say(_system_line(error), WRONG_INPUT)
+        case MemoryError():
+            return _say(f"not enough memory for this input: {error or 'give a shorter one'}", WRONG_INPUT)
+        case _:
+            with suppress(OSError):
+                traceback.print_exception(error)
+            return _say("this is a defect of palpate; please report the lines above", DEFECT)
+
+
+def _say(text: str, code: int) -> int:
+    line = printable(shorten(" ".join(text.split()), LONGEST))
+    with suppress(OSError):  # standard error is full or closed: the code still tells
+        print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
+    return code
+
+
+def _without_danger(error: CycloptsError) -> str:
+    """The error, without a suggestion of a flag that removes results or skips a question.
+
+    A typing error must not suggest a destructive flag.
+    """
+    text = str(error)
+    guess = re.search(r" ?Did you mean \"?(--[\w-]+)\"?\??", text)
+    if guess is None or guess[1].replace("--no-", "--") not in _DANGEROUS:
+        return text
+    return text.replace(guess[0], "")
+
+
+def _where_help_is(error: CycloptsError) -> str:
+    words = ["palpate", *(error.command_chain or ()), "--help"]
+    return f"(see: {' '.join(words)})"
+
+
+def _system_line(error: OSError) -> str:
+    where = error.filename if error.filename is not None else "standard output or a file"
+    what = error.strerror or str(error) or type(error).__name__
+    remedy = _REMEDIES.get(error.errno or 0, "check the path and try again")
+    return f"{where}: {what}; {remedy}"

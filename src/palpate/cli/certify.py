@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,7 +32,7 @@ class ProofOptions:
     damping_time
         Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
     jitter
-        Largest change of a reading's age from tick to tick while the law adapts, in ticks.
+        Ticks by which a reading may be older than the sensor's period while the law adapts.
     margin
         Factor by which the gains may grow.
     held_only
@@ -71,7 +71,7 @@ class ProofOptions:
 
     @property
     def longest(self) -> float | None:
-        """B/K [s]."""
+        """Longest damping time B/K [s]."""
         from palpate.excitation.quantities import spread
 
         if self.damping_time is None:
@@ -97,13 +97,16 @@ def certify(
 
     palpate certify gains.toml --check certificate.json
 
-    A check needs no solver: it takes norms of matrices. With gains given, it also refuses a certificate of another
-    arm, rate or law. Exit code 1: a part could not be proved, or the certificate does not hold.
+    palpate certify force_loop/palpate_force.h --check certificate.json
+
+    A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
+    has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
+    part could not be proved, or the certificate does not hold.
 
     Parameters
     ----------
     gains
-        The file of palpate tune.
+        The file of palpate tune; for a check also the header of its law in C.
     check
         A certificate to check.
     """
@@ -151,11 +154,27 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     from palpate.force import Certificate, load_gains
 
     certificate = Certificate.load(path)
-    if gains is not None:
+    if gains is not None and gains.suffix == ".h":
+        from palpate.native.header import check_header
+
+        check_header(certificate, gains)
+    elif gains is not None:
         certificate.check_of(load_gains(gains))
-    verdict = certificate.check()
+    with console(stderr=True).status("checking"):
+        verdict = confirm(path, certificate.check())
     _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
+
+
+def confirm(path: Path, verdict: Verdict) -> Verdict:
+    """The verdict, if the independent check has the same."""
+    from palpate.checks.force_certificate import RefusedError, check
+
+    try:
+        check(path.read_bytes())
+    except RefusedError as error:
+        return replace(verdict, holds=False, why=verdict.why or f"by the independent check, {error}")
+    return verdict
 
 
 def _print(

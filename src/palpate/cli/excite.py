@@ -45,7 +45,7 @@ class SurfaceOptions:
     mass: Annotated[str | None, SIGNED] = None
 
     def range(self) -> SurfaceRange:
-        """All of them."""
+        """Range of stiffness, damping and mass."""
         from palpate.excitation import SurfaceRange
         from palpate.excitation.quantities import spread
 
@@ -88,7 +88,7 @@ class BudgetOptions:
     drive: Annotated[str | None, SIGNED] = None
 
     def budget(self) -> Budget:
-        """The limits."""
+        """Limits of force, frequency and speed."""
         from palpate.excitation import Budget
 
         return Budget(
@@ -160,7 +160,7 @@ class SensorOptions:
     lag_std: Annotated[str, SIGNED] = "0"
 
     def sensors(self) -> Sensors:
-        """The sensors."""
+        """Sensors of force and position."""
         from palpate.excitation import Sensors
         from palpate.excitation.spectra import ForceChain, phase_std
         from palpate.signals.low_pass import LowPass
@@ -206,7 +206,7 @@ class LoopOptions:
     integral: Annotated[float | None, SIGNED] = None
 
     def loop(self) -> ForceLoop:
-        """The loop."""
+        """Force loop that follows the desired force."""
         from palpate.excitation import HybridLoop, KnownBandwidth
 
         given = {
@@ -250,7 +250,7 @@ class OutputOptions(PictureOptions, FileOptions):
 
     def check_all(self) -> None:
         """Check every path before any work is done."""
-        from palpate.report.excitation.files import check_ending
+        from palpate.report.excitation.table import check_ending
 
         if self.out is not None:
             check_ending(self.out)
@@ -307,7 +307,7 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:
-        from palpate.report.excitation.figure import write_figure
+        from palpate.report.excitation.page import write_figure
 
         write_figure(found, picture)
     if output.report is not None:
@@ -321,19 +321,19 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.report.excitation import files
+    from palpate.report.excitation import table
 
     if out is not None:
-        files.write_force(found, out, float(rate))
+        table.write_force(found, out, float(rate))
     if experiment is not None:
-        write_text(experiment, files.experiment(found))
+        write_text(experiment, table.experiment(found))
 
 
 def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from palpate.report.excitation.files import summary
+        from palpate.report.excitation.table import summary
 
         print_answer(summary(found, helps))
         return

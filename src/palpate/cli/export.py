@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._export_law import LawOptions, export_law
-from palpate.cli._identified import read_found
+from palpate.cli._one_log import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import STYLE, console, head, place, show_table
 from palpate.cli.options.flags import FLAG, SIGNED

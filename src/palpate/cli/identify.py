@@ -13,7 +13,7 @@ from palpate.cli._one_log import OneLog, answered
 from palpate.cli._terminal import KINDS, console
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.indenter import IndenterOptions
+from palpate.cli.options.force import IndenterOptions
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.names import QUIET, Model
@@ -24,7 +24,7 @@ from palpate.files import check_place, write_text
 
 if TYPE_CHECKING:
     from palpate.identification import Identification
-    from palpate.report.identification.source import Source
+    from palpate.report.identification.words import Source
 
 
 @Parameter(name="*", group=Group("The model", sort_key=4))
@@ -157,7 +157,7 @@ def identify(
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
-    from palpate.logs.gathered import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
+    from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
     output, cell = output or OutputOptions(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -173,7 +173,7 @@ def identify(
     logs = sheets_as_logs(logs, source.names, source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         return _one(log_of(logs[0]), asked, output)
-    from palpate.cli._many_logs import many
+    from palpate.cli._one_log import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
     return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
@@ -194,7 +194,7 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
         write_text(page, page_of(found, origin))
     if table is not None:
         from palpate.report.many.paper_table import write_table
-        from palpate.report.many.rows import LogRow
+        from palpate.report.many.table import LogRow
 
         write_table([LogRow(origin, found)], None, table)
     _print(found, origin, [path for path in (figure, page, table) if path is not None], output)
@@ -203,7 +203,7 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
 
 def _print(found: Identification, origin: Source, written: list[Path], output: OutputOptions) -> None:
     if output.json:
-        from palpate.report.identification.source import as_json
+        from palpate.report.identification.words import as_json
 
         print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
         return

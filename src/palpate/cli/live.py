@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._progress import COMPILING
-from palpate.cli._terminal import print_lines, say
+from palpate.cli._terminal import COMPILING, print_lines, say
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
@@ -159,7 +158,7 @@ def _pressing(name: str, seed: int) -> RowSource:
 
 def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
     from palpate.live.recorded_run import of_log, of_run
-    from palpate.logs.own_runs import is_run
+    from palpate.logs.read import is_run
 
     found, along, source = asked.identified_along(path)
     if asked.source.plain and is_run(path):

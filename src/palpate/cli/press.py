@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from palpate.cli import _progress
+from palpate.cli import _terminal
 from palpate.cli._answer import print_answer
-from palpate.cli._interrupts import noticed
 from palpate.cli._program import command
+from palpate.cli._streams import noticed
 from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
@@ -93,14 +93,14 @@ def press(
 
 
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
-    from palpate.bench.sequence import DONE, INTERRUPTED
+    from palpate.bench.force_input import DONE, INTERRUPTED
     from palpate.press.prepare import prepared
 
     question, folder = simulated.question(asked), simulated.folder
     with noticed() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
         pressing = prepared(question)
         start = "starting (the first run compiles, which takes some seconds)"
-        with _progress.simulated(console(stderr=json), interrupted, start) as show:
+        with _terminal.simulated(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _write(record, pressing, fresh)
     _show(pressing, summary, folder, json)

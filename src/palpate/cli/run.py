@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._interrupts import noticed
-from palpate.cli._progress import COMPILING, simulated
-from palpate.cli._terminal import console, place, show_answer
+from palpate.cli._streams import noticed
+from palpate.cli._terminal import COMPILING, console, place, show_answer, simulated
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
-from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli.options.names import QUIET, Experiment
 from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
 from palpate.text import printable
@@ -69,7 +68,7 @@ def run(
         Of the noise; the same seed gives the same numbers.
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
-    from palpate.bench.any_experiment import FILES, load_any, parse_any
+    from palpate.bench.build import FILES, load_any, parse_any
 
     if known.list_:
         listed(FILES, lambda one: load_any(one).title)
@@ -78,7 +77,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.sequence import DONE, INTERRUPTED
+    from palpate.bench.force_input import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -159,11 +158,11 @@ def _draw(
     """Figures, page and film of a run."""
     about = record.meta["experiment"]
     if "loop" in record.meta:
-        from palpate.report.run.one_direction import write_one_direction
+        from palpate.report.run.figures import write_one_direction
 
         write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
         return
-    from palpate.report.identification.source import sha256_of
+    from palpate.report.identification.words import sha256_of
     from palpate.report.run.figures import draw
     from palpate.report.run.page import Content, run_page
 
@@ -189,7 +188,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
 
 
 def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
-    from palpate.bench.any_experiment import build_any, check_parts
+    from palpate.bench.build import build_any, check_parts
 
     experiment = asked.experiment
     try:
@@ -205,15 +204,14 @@ def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> 
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run.table import notes, tables
-    from palpate.report.run.words import sentence
+    from palpate.report.run.table import notes, sentence, tables
 
     summary = ran.summary
     if as_json:
         print_answer(summary)
         return
     if "loop" in ran.record.meta:
-        from palpate.report.run.one_direction import one_direction_tables
+        from palpate.report.run.figures import one_direction_tables
 
         shown_tables = one_direction_tables(ran.record, summary)
     else:

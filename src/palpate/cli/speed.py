@@ -7,8 +7,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._progress import COMPILING
-from palpate.cli._terminal import print_lines, say
+from palpate.cli._terminal import COMPILING, print_lines, say
 from palpate.cli.options.written import WRITTEN
 
 

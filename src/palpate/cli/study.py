@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._progress import COMPILING, counted
-from palpate.cli._terminal import confirmed, console, place, say, show_answer
+from palpate.cli._terminal import COMPILING, confirmed, console, counted, place, say, show_answer
 from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
-from palpate.cli.options.known import FolderOptions, KnownOptions, listed, source_of
 from palpate.cli.options.names import QUIET, Study
 from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
 from palpate.errors import InputError
 from palpate.text import printable
 
@@ -113,7 +112,9 @@ def study(
     folder = output.out if output.out is not None else Path("runs") / f"study-{Path(name).stem}"
     try:
         with (own or PluginOptions()).consent():
-            found = _done(_Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn)
+            found = _print_end(
+                _Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
+            )
     except KeyboardInterrupt:
         kept = f"the finished runs are saved in {folder}; the same command resumes"
         say(f"interrupted; {kept}")
@@ -133,7 +134,7 @@ class _Asked:
     replace: bool
 
 
-def _done(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
+def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate.studies.plan import plan
     from palpate.studies.preview import check_cases, check_parts_of

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.cli._answer import print_answer
-from palpate.cli._identified import read_found
+from palpate.cli._one_log import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place
 from palpate.cli.options.force import (

@@ -16,7 +16,7 @@ from palpate.contact_frame.free_motion import contact_rows, rows_between
 from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
 from palpate.contact_frame.vectors import Vector, matrices, read_rows
 from palpate.errors import InputError
-from palpate.identification.saturation import at_limit
+from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
 
 if TYPE_CHECKING:

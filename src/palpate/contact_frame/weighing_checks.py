@@ -20,7 +20,7 @@ from palpate.contact_frame.weighing import (
     poses_of,
     solve_force,
 )
-from palpate.identification.saturation import at_limit
+from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
 
 _REFINED = 4

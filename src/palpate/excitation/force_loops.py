@@ -158,7 +158,7 @@ class HybridLoop:
         slider = sqrt(2 / pi) * self.friction / np.maximum(speed, _STILL)
         tip = self._tip(s) + self.presliding * s * slider / (self.presliding + s * slider)
         correction = self.gain + self.integral / s
-        return (1 + correction) / (1 + correction * self._measured(omega) + tip / impedance)
+        return (1 + correction) / (1 + correction * self._measured_loop(omega) + tip / impedance)
 
     def stable(self, surface: Surface) -> bool:
         """By Nyquist: how far 1 + L turns from slow to fast, L that of the loop without friction, whose tip is stable.
@@ -168,14 +168,14 @@ class HybridLoop:
         """
         omega = 2 * pi * np.geomspace(1e-3, 1e4, 20_000)
         s, Z = 1j * omega, surface.impedance(omega)
-        loop = (self.gain + self.integral / s) * self._measured(omega) * Z / (Z + self._tip(s))
+        loop = (self.gain + self.integral / s) * self._measured_loop(omega) * Z / (Z + self._tip(s))
         angle = np.unwrap(np.angle(1 + loop))
         return bool(angle[-1] - angle[0] > -pi)
 
     def _tip(self, s: Complex) -> Complex:
         return np.polyval([self.tip_mass, self.damping, self.stiffness], s)
 
-    def _measured(self, omega: Array) -> Complex:
+    def _measured_loop(self, omega: Array) -> Complex:
         late: Complex = np.exp(-1j * omega * self.delay)
         return self.low_pass.at(omega) * late
 

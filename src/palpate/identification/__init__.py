@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from palpate.identification.causes import Code, Warn
 from palpate.identification.pipeline import identify
 from palpate.identification.pooling import Pooled, pool
 from palpate.identification.result import Comparison, Identification, Parameter, Verdict
-from palpate.identification.warning_codes import Code, Warn
 
 __all__ = [
     "Code",

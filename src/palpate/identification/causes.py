@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 
@@ -79,3 +81,84 @@ def cause_of(name: str | None, source: str = "") -> Cause:
     if name is None:
         return _CAUSES[_UNKNOWN[source]] if source in _UNKNOWN else NOISE
     return _CAUSES.get(name, Cause(name, NOISE.remedy))
+
+
+class Code(Enum):
+    """The warnings. The value is what a user should know about it; the word is `code.word`."""
+
+    FORCE_LAGS_POSITION = (
+        "The fit gives a negative damping, which no passive surface has: the force reading lags the position reading."
+        " Damping is refused. Calibrate the lag and give it with --lag."
+    )
+    LAG_DAMPING_CONFOUNDED = (
+        "A lag of the force lowers the damping by K times the lag, and this log does not separate the two."
+        " Calibrate the lag and give it with --lag, or excite the contact over a wider band."
+    )
+    SERIES_COMPLIANCE = (
+        "The contact is not much softer than what lies between the position sensor and the surface,"
+        " so K is mostly about the arm. Measure the position nearer to the surface."
+    )
+    LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
+    MODEL_REJECTED = "No model describes the log: its parts give different parameters, for example."
+    NONLINEAR_STIFFNESS = (
+        "The stiffness changes with the position; K is the slope at the middle of the motion."
+    )
+    HELD_SAMPLES = (
+        "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
+    )
+    MISSING_SAMPLES = "Rows without a reading; short stretches are bridged, long ones are left out."
+    IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
+    SATURATED = (
+        "The force rests at its extreme value while the probe moves on: it is at the end of its range."
+    )
+    UNIT_GUESS = "A unit was taken from a column's name or values."
+    UNIT_STATED = "A unit was taken from the file's own statement."
+    UNIT_DOUBTFUL = (
+        "A unit is probably wrong: by it the press is unusual, or the name of the column has another."
+    )
+    TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
+    COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
+    LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."
+    FORCE_DRIFTS = "The force in the air changes during the log; the change is removed."
+    FORCE_SIGN_REVERSED = "The force falls as the probe goes in; its sign was reversed."
+    POSITION_SIGN_REVERSED = "The position falls as the probe goes in; its sign was reversed."
+    LOW_RATE = "Rows are so rare that fast motion may be missed, and with it damping and mass."
+    NO_CONTACT = "The force never leaves its resting level for long enough: there is nothing to identify."
+    CONTACT_AT_START = (
+        "The log begins in contact: the force without contact is not known, and is estimated as an offset."
+    )
+    LOG_CUT_SHORT = "The bag is damaged or was never closed; its intact part was read."
+    CLOCKS_DISAGREE = (
+        "The clocks that stamped two topics differ. Aligning them leaves a lag that is not calibrated."
+    )
+    FRAME_GUESS = "The frame of the wrench was taken from the messages; --wrench-frame sets it."
+    NORMAL_UNCERTAIN = (
+        "The contact's normal was estimated from the force, and its uncertainty matters for the parameters."
+    )
+    TOOL_INERTIA = (
+        "In the air the force follows the acceleration, as a mass beyond the sensor makes it. A negative mass is an"
+        " inertia compensated with the wrong sign, or twice. In contact a damping and a lag hide that."
+    )
+    PAYLOAD_DOUBTFUL = "The sensor's readings in the air differ from the payload file's prediction."
+    NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
+
+    @property
+    def word(self) -> str:
+        """The stable word that scripts may rely on, such as `force-lags-position`."""
+        return self.name.lower().replace("_", "-")
+
+    def __str__(self) -> str:
+        return self.word
+
+
+@dataclass(frozen=True)
+class Warn:
+    """One warning about one log: its code, and what was seen here."""
+
+    code: Code
+    text: str
+
+
+def from_word(word: str) -> Code:
+    """The code of a stable word."""
+    return Code[word.upper().replace("-", "_")]

@@ -8,16 +8,14 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
+from palpate.identification.causes import Code, Warn
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.free_motion import FLAT, Drift, FreeMotion, free_motion_of
-from palpate.identification.options import NOTHING_SAID, Options
-from palpate.identification.payload import Payload, payload_of
-from palpate.identification.prior import lag_prior
+from palpate.identification.free_motion import FLAT, Drift, FreeMotion, Payload, free_motion_of, payload_of
+from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.strokes import Stroke, strokes_of
 from palpate.identification.tangents import SteadyPress, steady_press
-from palpate.identification.warning_codes import Code, Warn
 from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05
@@ -97,7 +95,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         drift = Drift(air.stays * channels.dt, air.levels)
         channels = _without_drift(channels, air)
     contacts = replace(find_contacts(channels, chain, air, options, strokes), drift=drift)
-    contacts = _pressed(channels, contacts, strokes, options)
+    contacts = _with_press(channels, contacts, strokes, options)
     if strokes and contacts.press is None:
         strokes, contacts = (), replace(find_contacts(channels, chain, air, options), drift=drift)
     if not contacts.spans:
@@ -132,7 +130,7 @@ def _rise(x: Array, f: Array) -> float:
     return float(u @ f) / max(float(u @ u), 1e-300)
 
 
-def _pressed(
+def _with_press(
     channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
 ) -> Contacts:
     """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
@@ -204,7 +202,7 @@ def find_contacts(
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
     way = air.way if air else 0.0
-    found = replace(_oriented(force, position, spans, (sign, way, level, threshold), options), clear=clear)
+    found = replace(_orient(force, position, spans, (sign, way, level, threshold), options), clear=clear)
     return found if payload is None else _with_payload(found, payload)
 
 
@@ -252,14 +250,14 @@ def _never_left(
     way = -1.0 if rises < 0 else 1.0
     found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, (), clear=False)
     if options.bonded:
-        return found if not strokes else replace(found, warnings=_turned(sign, way, options))
+        return found if not strokes else replace(found, warnings=_sign_warnings(sign, way, options))
     along = _correlation(sign * force, way * position, channels.dt)
     text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
-    warnings = (Warn(Code.CONTACT_AT_START, text), *_turned(sign, way, options))
+    warnings = (Warn(Code.CONTACT_AT_START, text), *_sign_warnings(sign, way, options))
     return replace(found, warnings=warnings, signed=bool(strokes) or along > _SIGNED)
 
 
-def _turned(sign: float, way: float, options: Options) -> tuple[Warn, ...]:
+def _sign_warnings(sign: float, way: float, options: Options) -> tuple[Warn, ...]:
     """The channels of a press whose signs were reversed, though nobody told."""
     warnings = []
     if sign < 0 and options.force_sign is None:
@@ -295,7 +293,7 @@ def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
     return out
 
 
-def _oriented(
+def _orient(
     force: Array,
     position: Array,
     spans: list[tuple[int, int]],

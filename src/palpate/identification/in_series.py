@@ -40,7 +40,7 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
     """
     place = _places(found.names)
     check(found.theta[place["K"]], series)
-    new, jacobian = _linearised(found.theta, place, series)
+    new, jacobian = _linearise(found.theta, place, series)
     moved = _seen_through(found.theta, place, series + series_std) - new
     budget = {
         cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
@@ -54,7 +54,7 @@ def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
     """The same of what holds if the model does, the deviation of the series stiffness in its covariance."""
     place = _places(found.names)
     check(found.theta[place["K"]], series)
-    new, jacobian = _linearised(found.theta, place, series)
+    new, jacobian = _linearise(found.theta, place, series)
     moved = _seen_through(found.theta, place, series + series_std) - new
     cov, fixed = (
         jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
@@ -110,7 +110,7 @@ def _places(names: tuple[str, ...]) -> dict[str, int]:
     return {name: names.index(name) for name in ("K", "B", "M") if name in names}
 
 
-def _linearised(theta: Array, place: dict[str, int], series: float) -> tuple[Array, Array]:
+def _linearise(theta: Array, place: dict[str, int], series: float) -> tuple[Array, Array]:
     """The surface's parameters and their derivatives by those of both, shapes (p,) and (p, p)."""
     new = _seen_through(theta, place, series)
     jacobian = np.eye(len(theta))

@@ -152,7 +152,7 @@ def check_poisson(poisson: tuple[float, float] | None) -> None:
 def _modulus(
     press: Press | None, indenter: Indenter, poisson: tuple[float, float] | None, tolerance: float
 ) -> Parameter:
-    refused = _refused(press)
+    refused = _refuse(press)
     if refused is not None or press is None:
         return _none(refused or "")
     p, c = indenter.power, indenter.factor
@@ -173,10 +173,10 @@ def _modulus(
         parts["small strain"] = abs(_beyond_hertz(depth / indenter.size) - 1) * reduced
     share, parts["Poisson's ratio"] = _free_of_poisson(reduced, poisson)
     parts = {cause: share * part for cause, part in parts.items()}
-    return _judged(share * reduced, parts, indenter, poisson, depth, tolerance)
+    return _judge(share * reduced, parts, indenter, poisson, depth, tolerance)
 
 
-def _refused(press: Press | None) -> str | None:
+def _refuse(press: Press | None) -> str | None:
     """Why no slope of the press may be used; None if it may."""
     if press is None or not press.tangent:
         return "the log has no loading whose slope could be estimated"
@@ -225,7 +225,7 @@ def _beyond_hertz(strain: float) -> float:
     return ((1 + u**2) * atanh(u) - u) / (4 / 3 * strain**1.5)
 
 
-def _judged(
+def _judge(
     value: float,
     parts: dict[str, float],
     indenter: Indenter,

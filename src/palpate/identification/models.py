@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.identification.filters.position_noise import NOISELESS, PositionNoise
-from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
 from palpate.identification.filters.state_variable import Chain, low_pass_once
 
 

@@ -6,12 +6,12 @@ from dataclasses import fields
 
 import numpy as np
 
+from palpate.identification.causes import Code, Warn
 from palpate.identification.contacts import Contacts
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.options import Options
-from palpate.identification.prior import LAG
+from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import (
     DynamicStiffness,
@@ -26,7 +26,6 @@ from palpate.identification.result import (
 from palpate.identification.sampling import Channels
 from palpate.identification.selection import Choice
 from palpate.identification.verdicts import Terms
-from palpate.identification.warning_codes import Code, Warn
 from palpate.signals import Estimate
 from palpate.units import impedance_units
 
@@ -51,7 +50,7 @@ def outcome(
     options: Options,
     terms: Terms,
 ) -> Identification:
-    """Put everything together."""
+    """Identification from the fit, its verdicts and its evidence."""
     problem, found = choice.problem, choice.answer
     spectrum, press, point = evidence
     mass = parameters.get("M")
@@ -104,7 +103,7 @@ def nothing(
         0,
         warnings,
         cutoff=chain.cutoff,
-        traces=_untouched(channels, chain, terms),
+        traces=_outcome_untouched(channels, chain, terms),
         options=_plain_options(options),
     )
 
@@ -180,7 +179,7 @@ def _clock(
     return max(float(begin), channels.start), float(end)
 
 
-def _untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
+def _outcome_untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
     """The force of a log in which nothing is touched: seen, it says why."""
     step = max(len(channels.force) // _SHOWN, 1)
     none = np.empty(0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from palpate.identification import in_series
+from palpate.identification.causes import Code, Warn
 from palpate.identification.contacts import contacts_of
 from palpate.identification.estimators.fit import fit
 from palpate.identification.evidence import evidence_of
@@ -15,7 +16,6 @@ from palpate.identification.result import Identification
 from palpate.identification.sampling import channels_of, thinned
 from palpate.identification.selection import choose
 from palpate.identification.verdicts import Terms, verdicts
-from palpate.identification.warning_codes import Code, Warn
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 

@@ -128,7 +128,7 @@ class PooledParameter:
     logs: tuple[int, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         own = self.parameter.to_json()
         return own | {
             "prediction95": list(self.prediction95) if self.prediction95 else None,
@@ -152,7 +152,7 @@ class PooledPoint:
     frequency_Hz: Interval
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         ranges = {name: list(getattr(self, name)) for name in ("force_N", "depth_m", "frequency_Hz")}
         return {"stiffness": self.stiffness.to_json()} | ranges
 
@@ -175,7 +175,7 @@ class Pooled(Result, shown_by="palpate.report.many.in_python"):
 
     @property
     def count(self) -> int:
-        """Of the logs."""
+        """Number of the pooled logs."""
         return len(self.logs)
 
     @property
@@ -208,7 +208,7 @@ def pool(logs: Sequence[Identification | None], tolerance: float = 0.25, names: 
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
     own = {
-        name: _pooled([_one(found, name) for found in logs], tolerance)
+        name: _pool([_one(found, name) for found in logs], tolerance)
         for name in POOLED
         if any(found is not None and name in found.parameters for found in logs)
     }
@@ -220,7 +220,7 @@ def _point(logs: Sequence[Identification | None], tolerance: float) -> PooledPoi
     there = [point for point in points if point is not None]
     if not there:
         return None
-    stiffness = _pooled([(point.stiffness, "") if point else None for point in points], tolerance)
+    stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance)
     used = [p for i in stiffness.logs if (p := points[i]) is not None] or there
 
     def range_of(values: list[float]) -> Interval:
@@ -261,7 +261,7 @@ class _Given:
         return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
 
 
-def _pooled(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> PooledParameter:
+def _pool(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> PooledParameter:
     """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
     given = {i: found for i, pair in enumerate(own) if pair is not None and (found := _Given.of(*pair))}
     unit = next((pair[0].unit for pair in own if pair is not None), "1")
@@ -279,11 +279,11 @@ def _pooled(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> Po
         again = float(np.hypot(mean.next_half, alike))
         prediction = mean.value - again, mean.value + again
     return PooledParameter(
-        _judged(mean, alike, len(own), kind, tolerance), prediction, mean.between, tuple(used)
+        _judge(mean, alike, len(own), kind, tolerance), prediction, mean.between, tuple(used)
     )
 
 
-def _judged(mean: Mean, alike: float, count: int, kind: tuple[str, str], tolerance: float) -> Parameter:
+def _judge(mean: Mean, alike: float, count: int, kind: tuple[str, str], tolerance: float) -> Parameter:
     """A verdict on a mean; `alike` is the 95 % half-width of what all logs err by together."""
     half = float(np.hypot(mean.half, alike))
     share = half / abs(mean.value) if mean.value else np.inf

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.warning_codes import Warn
+from palpate.identification.causes import Warn
 from palpate.results import Compared, Readable, Result
 from palpate.signals import Estimate
 
@@ -48,7 +48,7 @@ class Parameter(Readable):
     budget: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         return {
             "value": self.value,
             "std": self.std,
@@ -84,7 +84,7 @@ class DynamicStiffness(Readable):
     budget: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, float]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         return {
             "Hz": self.frequency,
             "storage": self.storage,
@@ -145,7 +145,7 @@ class Press(Compared):
     late: tuple[float, float] | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         relaxed = self.relaxation
         return {
             "tangent": [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent],
@@ -183,7 +183,7 @@ class WorkingPoint(Readable):
     from_surface: bool = True
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values that JSON can hold."""
         again = list(self.prediction95) if self.prediction95 else None
         return {
             "stiffness": self.stiffness.to_json() | {"prediction95": again},
@@ -257,7 +257,7 @@ class LagFound:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result, shown_by="palpate.report.identification.in_python"):
+class Identification(Result, shown_by="palpate.report.identification.answer"):
     """The contact's model, its parameters with verdicts, and warnings.
 
     Args:
@@ -324,7 +324,7 @@ class Identification(Result, shown_by="palpate.report.identification.in_python")
         k, b, m = (p.value or 0.0 for p in own if p)
         return sqrt(k / m) / (2 * pi), b / (2 * sqrt(k * m))
 
-    def _compared(self, own: Comparison) -> dict[str, Any]:
+    def _comparison_json(self, own: Comparison) -> dict[str, Any]:
         """One of the models; the chosen one is called as the parameters' model, whose mass may be left out."""
         chosen = isclose(own.rmse, self.rmse, rel_tol=1e-9)
         name = self.model if chosen else own.model
@@ -343,7 +343,7 @@ class Identification(Result, shown_by="palpate.report.identification.in_python")
             "lag_s": None if self.lag is None else asdict(self.lag),
             "fit": {"r2": _plain(self.r2), "rmse_N": _plain(self.rmse), "n": self.n},
             "warnings": [{"code": warn.code.word, "text": warn.text} for warn in self.warnings],
-            "models": [self._compared(c) for c in self.comparison],
+            "models": [self._comparison_json(c) for c in self.comparison],
             "options": self.options,
         }
 

@@ -7,12 +7,14 @@ interval of its phase (of 1/12 row, for 480 readings a second in a log of 1000 r
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
+from palpate.signals.samples import runs
 
 _BLOCKS = 32
 _ROUNDS = 12
@@ -53,7 +55,7 @@ def sample_clock_of(values: Array) -> SampleClock:
     changed = np.flatnonzero(np.diff(values)) + 1
     if len(changed) < _FEWEST or len(changed) > _EVERY_ROW * len(values):
         return _in_every_row(len(values))
-    counted = [_numbered(changed, *beat) for beat in _beats(changed)]
+    counted = [_number(changed, *beat) for beat in _beats(changed)]
     even = [grid for grid in (_even(number, changed, period) for number, period in counted) if grid]
     as_fast = np.bincount(np.diff(changed)).argmax() == 1
     if not even and as_fast:  # and often the same twice
@@ -126,7 +128,7 @@ def _near(far: NDArray[np.intp]) -> int:
     return max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
 
 
-def _numbered(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
+def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
     """Which sample of an even grid each change is, and the grid's period in rows.
 
     Counted from the middle of the log to both sides, the period made better on the way.
@@ -193,3 +195,45 @@ def _farthest(
         phase, room = float(found.x[0]), float(found.x[2])
         period += float(found.x[1])
     return (phase, period), room
+
+
+Rows = Mask
+
+_FEWEST_AT_LIMIT = 8
+_RUN = 3
+"""Equal readings in a row that count as standing still."""
+_STEPS = 4.0
+"""Steps of the reading's own resolution that the force should have changed by meanwhile, were it not at its limit."""
+
+
+def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | None = None) -> Rows:
+    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
+
+    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
+
+    Args:
+        force: of one axis [N], shape (n,).
+        place: of the probe [m], shape (n,) or (n, 3); NaN where there is no reading.
+        levels: the forces that may be an end of the range [N].
+        among: rows that count, shape (n,); all if not given.
+    """
+    stuck = np.zeros(len(force), bool)
+    rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
+    step = np.abs(np.diff(force[rows]))
+    if not step.any():
+        return stuck
+    resolution = float(np.percentile(step[step > 0], 5))
+    far = _STEPS * resolution * _travel(place) / max(float(np.ptp(force[rows])), 1e-300)
+    for level in levels:
+        for begin, end in runs(force[rows] == level):
+            own = rows[begin:end]
+            if len(own) >= _RUN and _travel(place[own[0] : own[-1] + 1]) > far:
+                stuck[own] = True
+    return stuck if stuck.sum() >= _FEWEST_AT_LIMIT else np.zeros(len(force), bool)
+
+
+def _travel(place: Array) -> float:
+    """How far the probe gets [m]."""
+    place = place.reshape(len(place), -1)
+    there = place[np.isfinite(place).all(axis=1)]
+    return float(np.linalg.norm(np.ptp(there, axis=0))) if len(there) else 0.0

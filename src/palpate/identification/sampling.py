@@ -8,9 +8,9 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
+from palpate.identification.causes import Code, Warn, from_word
 from palpate.identification.filters.state_variable import block_means
-from palpate.identification.saturation import at_limit
-from palpate.identification.warning_codes import Code, Warn, from_word
+from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
 from palpate.signals.samples import fresh_rows
 
@@ -124,7 +124,7 @@ def channels_of(record: Record) -> Channels:
     grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])
-    raw = Raw(float(time[0]), dt, own_x, _held(grid + dt / 4, time, force), near_x & valid)
+    raw = Raw(float(time[0]), dt, own_x, _hold_lengths(grid + dt / 4, time, force), near_x & valid)
     rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
     return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings), rounding)
 
@@ -185,7 +185,7 @@ def _common(
     return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
 
 
-def _held(at: Array, time: Array, force: Array) -> Array:
+def _hold_lengths(at: Array, time: Array, force: Array) -> Array:
     """The force as it stood in the log, held from row to row."""
     there = np.isfinite(force)
     rows = np.searchsorted(time[there], at, side="right") - 1

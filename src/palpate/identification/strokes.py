@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.filters.position_noise import noise_within
+from palpate.identification.filters.sensor_path import noise_within
 from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.sampling import Channels
 

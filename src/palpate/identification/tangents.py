@@ -17,8 +17,8 @@ from numpy.polynomial import chebyshev
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import noise_of
+from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects, student
-from palpate.identification.prior import Lag
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import Stroke
 
@@ -132,10 +132,10 @@ def steady_press(
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
     known = tuple(own for own in others if own.half < abs(own.stiffness))
     pairs = [[own for own in curves if own.loads is loads] for loads in (True, False)]
-    return SteadyPress(headline, known, *(_drawn(own) for own in pairs))
+    return SteadyPress(headline, known, *(_draw(own) for own in pairs))
 
 
-def _drawn(curves: Sequence[Curve]) -> Array:
+def _draw(curves: Sequence[Curve]) -> Array:
     if not curves:
         return np.empty((2, 0))
     curve = max(curves, key=lambda own: own.reach[1] - own.reach[0])

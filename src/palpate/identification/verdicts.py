@@ -6,16 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.identification.causes import NOISE, cause_of
-from palpate.identification.estimators.answer import Answer
+from palpate.identification.causes import NOISE, Code, Warn, cause_of
+from palpate.identification.estimators.answer import Answer, Prediction, unrecovered
 from palpate.identification.estimators.fit import Fit
-from palpate.identification.estimators.prediction import Prediction
-from palpate.identification.estimators.recovery import unrecovered
 from palpate.identification.evidence import stiffness_of
-from palpate.identification.prior import LAG, Lag
+from palpate.identification.options import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
 from palpate.identification.selection import Choice
-from palpate.identification.warning_codes import Code, Warn
 from palpate.units import impedance_units
 
 _FAR = 2.0
@@ -76,11 +73,11 @@ def verdicts(
     weighed = choice.problem.contacts.payload is not None
     parameters = _passive(_of_lag(parameters, found, lag, terms), weighed)
     if not choice.problem.contacts.signed:
-        parameters = {name: _refused(p, _UNSIGNED) for name, p in parameters.items()}
+        parameters = {name: _refuse(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
-        parameters = {name: _refused(p, _UNTOUCHED) for name, p in parameters.items()}
+        parameters = {name: _refuse(p, _UNTOUCHED) for name, p in parameters.items()}
     if reason := unrecovered(found):
-        parameters = {name: _refused(p, reason) for name, p in parameters.items()}
+        parameters = {name: _refuse(p, reason) for name, p in parameters.items()}
     if point is not None and choice.problem.contacts.press is not None and not found.fit.model.nonlinear:
         parameters = _of_press(parameters, point)
     return parameters, _warnings(parameters, found, lag, terms)
@@ -109,11 +106,11 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
 
     positive = name in found.fit.model.positive
     if positive and interval[1] < 0:
-        reason = f"the fit gives {_digits(value)} {_shown(unit)}, {_BELOW}"
+        reason = f"the fit gives {_digits(value)} {_show(unit)}, {_BELOW}"
         return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
     if half > _NOTHING * max(abs(value), 1e-300):
         return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
-    bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_shown(unit)}".rstrip()
+    bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_show(unit)}".rstrip()
     clear = interval[0] > 0 or interval[1] < 0
     if not choice.explains:
         reason = f"the model leaves {choice.left:.0%} of the force's amplitude unexplained"
@@ -146,7 +143,7 @@ def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoi
     shown = (own.ci95[1] - own.ci95[0]) / 2
     if abs(foretold - own.value) <= np.hypot(half, shown):
         return parameters
-    return _contradicted(parameters, foretold, own.value, point)
+    return _contradict(parameters, foretold, own.value, point)
 
 
 def _showing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
@@ -157,10 +154,10 @@ def _showing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoin
     foretold, shown = (stiffness_of(problem, force, point) for force in (found.fit.force, problem.force))
     if foretold is None or shown is None or abs(foretold - shown) <= (own.ci95[1] - own.ci95[0]) / 2:
         return parameters
-    return _contradicted(parameters, foretold, shown, point)
+    return _contradict(parameters, foretold, shown, point)
 
 
-def _contradicted(
+def _contradict(
     parameters: dict[str, Parameter], foretold: float, shown: float, point: WorkingPoint
 ) -> dict[str, Parameter]:
     unit = point.stiffness.unit
@@ -168,7 +165,7 @@ def _contradicted(
         f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {unit}, the log's dynamic"
         f" stiffness there {_digits(shown)}"
     )
-    return {name: _rejected(p, reason) for name, p in parameters.items()}
+    return {name: _reject(p, reason) for name, p in parameters.items()}
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
@@ -216,7 +213,7 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:
         return parameters
-    return parameters | {name: _rejected(p, reason) for name, p in parameters.items() if name in touched}
+    return parameters | {name: _reject(p, reason) for name, p in parameters.items() if name in touched}
 
 
 _UNSIGNED = "the log does not show the signs of force and position: begin it in the air, or give --force-sign"
@@ -231,12 +228,12 @@ def _without_number(p: Parameter, reason: str) -> Parameter:
     return Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
 
 
-def _rejected(p: Parameter, reason: str) -> Parameter:
+def _reject(p: Parameter, reason: str) -> Parameter:
     """The same, if it was identified."""
     return _without_number(p, reason) if p.verdict is Verdict.IDENTIFIED else p
 
 
-def _refused(p: Parameter, reason: str) -> Parameter:
+def _refuse(p: Parameter, reason: str) -> Parameter:
     """Not identified, whatever its interval."""
     if p.verdict is not Verdict.IDENTIFIED:
         return p
@@ -265,7 +262,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
             reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
             text = (
                 f"a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
-                f" {_digits(reach, 2)} {_shown(damping.unit)}; give --lag"
+                f" {_digits(reach, 2)} {_show(damping.unit)}; give --lag"
             )
             warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
     stiffness = parameters.get("K")
@@ -317,5 +314,5 @@ def _digits(value: float, count: int = 3) -> str:
     return f"{float(f'{value:.{count}g}'):.7g}"
 
 
-def _shown(unit: str) -> str:
+def _show(unit: str) -> str:
     return "" if unit == "1" else unit

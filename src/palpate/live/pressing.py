@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from palpate.arrays import Array
-from palpate.bench.sequence import CONTACT, DIVERGED, LOST
+from palpate.bench.force_input import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
@@ -29,7 +29,7 @@ from palpate.live.view import (
     ViewScene,
     check_ahead,
 )
-from palpate.press.loops import series_of
+from palpate.press.engines import series_of
 from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, prepared
 from palpate.press.pressing import JOINT_LIMIT

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.sequence import COLUMNS as ROW
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.force_input import COLUMNS as ROW
+from palpate.bench.force_input import CONTACT, LOST
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter
 from palpate.live.view import LEAD, Happened, Replay, ReplayedSignals, View

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.any_experiment import check_parts
-from palpate.bench.build import build
+from palpate.bench.build import build, check_parts
+from palpate.bench.force_input import COLUMNS as ROW
+from palpate.bench.force_input import CONTACT, LOST, StopCondition
 from palpate.bench.given_motion import rest_for
-from palpate.bench.sequence import COLUMNS as ROW
-from palpate.bench.sequence import CONTACT, LOST, StopCondition
 from palpate.bench.tables import Experiment, changed
 from palpate.environments import SurfaceState
 from palpate.live.stability import OfBench

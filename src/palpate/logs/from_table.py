@@ -11,8 +11,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.columns import find_sentinel
-from palpate.logs.plausibility import epoch_unit
-from palpate.logs.roles import Loaded, check_apart, check_quantity, family, quantity, si_unit
+from palpate.logs.roles import Loaded, check_apart, check_quantity, epoch_unit, family, quantity, si_unit
 from palpate.logs.tables import Sheet, Stated
 from palpate.units import split_spec, unit, unit_in_name
 

@@ -12,12 +12,12 @@ from palpate.errors import InputError
 from palpate.files.limits import Limits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag
-from palpate.logs.bags.fields import leaves
+from palpate.logs.bags.reading import leaves
 from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
-from palpate.logs.own_runs import is_run
-from palpate.logs.plausibility import epoch_unit
 from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
+from palpate.logs.read import is_run
+from palpate.logs.roles import epoch_unit
 from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
 from palpate.text import shorten
 from palpate.units import unit, unit_in_name

@@ -13,8 +13,8 @@ import numpy as np
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
 from palpate.logs.columns import NAMES, ColumnStatistics
-from palpate.logs.plausibility import epoch_unit, usual_unit
 from palpate.logs.presets import preset, presets
+from palpate.logs.roles import epoch_unit, usual_unit
 from palpate.logs.tables import Sheet
 from palpate.units import known_unit, unit, unit_in_name
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.units import unit
@@ -118,3 +120,131 @@ def check_apart(places: Mapping[str, Any], names: Mapping[str, str], path: Path)
         if other != role:
             both = " and ".join(sorted((other, role)))
             raise InputError(f"{both} cannot be the same column of {path}, {names[role]!r}; name two")
+
+
+LARGEST, SMALLEST = 1e30, 1e-30
+"""In SI units. Their fourth powers fit in a float with room for sums, and those are the highest that are formed."""
+_FASTEST, _SLOWEST = 200e3, 0.5
+"""Rows a second: no sensor of force is read faster, and no contact is identified from fewer."""
+_TIMES = {"min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_CENTURY = (946_684_800.0, 4_102_444_800.0)
+"""1 January of 2000 and of 2100 [s since 1970]."""
+_USUAL = 1e3
+"""Rows a second that a contact is usually recorded with."""
+
+
+def epoch_unit(first: float, step: float) -> str | None:
+    """The unit in which a time is a date between 2000 and 2100, and its rows come at a rate that there is.
+
+    Args:
+        first: of the time, as the file counts it.
+        step: from row to row, likewise.
+    """
+    for symbol in ("s", "ms", "us", "ns"):
+        begin, end = (seconds / _TIMES[symbol] for seconds in _CENTURY)
+        if begin <= first < end and step > 0 and _SLOWEST / 10 <= 1 / (step * _TIMES[symbol]) <= _FASTEST:
+            return symbol
+    return None
+
+
+def usual_unit(step: float) -> str:
+    """The unit of time in which rows so far apart come at about the usual rate; seconds if none is plausible.
+
+    Args:
+        step: from row to row, as the file counts it.
+    """
+    if step > 0 and _SLOWEST <= 1 / step <= _FASTEST:
+        return "s"
+    near = min(_TIMES, key=lambda symbol: abs(np.log(max(step, 1e-300) * _TIMES[symbol] * _USUAL)))
+    return near if step > 0 and 10 <= 1 / (step * _TIMES[near]) <= _FASTEST else "s"
+
+
+def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Path) -> None:
+    """Refuse values that no measurement has and that calculations overflow by.
+
+    Args:
+        columns: in SI units, by role.
+        names: their names in the file.
+        path: of the log.
+
+    Raises:
+        InputError: a column and a value of it are named.
+    """
+    for role, values in columns.items():
+        there = values[np.isfinite(values)]
+        if not len(there):
+            continue
+        largest = float(there[np.argmax(np.abs(there))])
+        span = float(np.ptp(there))
+        where = f"{path}: {names.get(role, role)!r} ({role})"
+        if abs(largest) > LARGEST:
+            raise InputError(
+                f"{where} holds {largest:g} in SI units, which is no measurement; mend it, or its unit"
+            )
+        if 0 < span < SMALLEST:
+            raise InputError(
+                f"{where} changes by {span:g} in SI units in all, which is no measurement; mend it, or its unit"
+            )
+
+
+def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> list[dict[str, Any]]:
+    """Doubts about the time of a log, as in a record's meta.
+
+    Args:
+        columns: by role, in SI units.
+        start: the first row's own time [s].
+        spec: the user's name of the time, NAME or NAME:UNIT.
+
+    Raises:
+        InputError: the time runs backwards repeatedly.
+    """
+    time = columns["time"]
+    step = np.diff(time)
+    if len(step) < 3 or not np.isfinite(step).all():
+        return []
+    back = int((step < 0).sum())
+    if back:
+        return _going_back(columns, step, back, spec)
+    name, told = spec.rpartition(":")[0] or spec, ":" in spec
+    dt = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
+    if not told and np.all(step == 1.0) and start in {0.0, 1.0}:
+        text = f"{name!r} is {start:g}, {start + 1:g}, {start + 2:g}, ...: it counts rows rather than seconds"
+        return [_note("time-doubtful", f"{text}; give --rate with the rows a second instead of --time")]
+    if dt and not _SLOWEST <= 1 / dt <= _FASTEST:
+        text = f"by {spec!r} there are {1 / dt:.3g} rows a second"
+        return [_note("time-doubtful", f"{text}{_likely(name, dt, told, spec)}")]
+    return []
+
+
+def _likely(name: str, dt: float, told: bool, spec: str) -> str:
+    """The unit by which the rate would be a usual one."""
+    own = spec.rpartition(":")[2] if told else "s"
+    count = dt / _TIMES.get(own, 1.0)
+    symbol = usual_unit(count)
+    if symbol == own:
+        return "; is its unit right?"
+    return f"; is its unit {symbol}, with {1 / (count * _TIMES[symbol]):.4g} rows a second? Then say {name}:{symbol}"
+
+
+def _going_back(columns: Mapping[str, Array], step: Array, back: int, spec: str) -> list[dict[str, Any]]:
+    even = [role for role, values in columns.items() if role != "time" and _goes_on(values)]
+    row = int(np.flatnonzero(step < 0)[0]) + 2
+    text = f"the time {spec!r} goes back in {back} of {len(step)} rows (the first is row {row})"
+    if even:
+        raise InputError(f"{text}, while the {even[0]} goes on in even steps: are the two columns swapped?")
+    if back > 0.1 * len(step):
+        raise InputError(f"{text}: it is no time; name another column, or give --rate instead of --time")
+    return []
+
+
+def _goes_on(values: Array) -> bool:
+    """Whether a column rises or falls in even steps, as a time does."""
+    step = np.diff(values[np.isfinite(values)])
+    if len(step) < 10:
+        return False
+    middle = float(np.median(step))
+    return bool((step * np.sign(middle) > 0).all() and np.abs(step - middle).max() < 0.5 * abs(middle))
+
+
+def _note(code: str, text: str) -> dict[str, Any]:
+    return {"code": code, "text": text}

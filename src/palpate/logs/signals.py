@@ -14,13 +14,13 @@ from palpate.logs import read
 from palpate.logs.arm_logs import read_wrench_and_pose
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.listing import list_log, propose
-from palpate.logs.own_runs import is_run, read_run
 from palpate.logs.presets import preset
 from palpate.logs.proposal import Proposal
+from palpate.logs.read import is_run, read_run
 from palpate.logs.roles import POSE, WRENCH
 from palpate.logs.tables import open_table
-from palpate.logs.tables.frame import read_frame
 from palpate.logs.tables.parquet import stored_about
+from palpate.logs.tables.sheet import read_frame
 from palpate.records import Record
 from palpate.units import split_spec
 

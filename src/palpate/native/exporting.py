@@ -77,9 +77,13 @@ class ExportedLaw:
         Raises:
             InputError: it is there, and not to be replaced or not ours; or it cannot be written.
         """
-        texts = files_of(self.module, self.sources, self.recording, version, self.desired)
         with fresh_folder(out, replace=replace) as draft:
-            write_folder(draft, texts, self.recording)
+            self.fill(draft, version)
+
+    def fill(self, folder: Path, version: str) -> None:
+        """Writes the files into an empty folder."""
+        texts = files_of(self.module, self.sources, self.recording, version, self.desired)
+        write_folder(folder, texts, self.recording)
 
     def check(self, ticks: int = TICKS, seed: int = 1) -> tuple[int, int]:
         """Compiles it here and repeats Python's ticks: how many, and how many differ in a bit.

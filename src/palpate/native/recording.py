@@ -20,10 +20,12 @@ RARE = 1e-3
 """Share of the ticks at which each kind of fault begins."""
 
 
-BLIND, LATE, LATER, SATURATED, STUCK, LIMITED, STEPPED, LOST, RECEDES = range(1, 10)
+BLIND, LATE, LATER, SATURATED, STUCK, LIMITED, STEPPED, LOST, RECEDES, UNASKED = range(1, 11)
 """Faults of a force loop: readings that are no number; missed ticks, and an unknown count of them; the end of the
 sensor's scale; a reading that stands still; one above the limit; steps of the desired force; positions that are none; a
-surface that recedes."""
+surface that recedes; a desired force that is no number."""
+_QUIET, _UNTARED, _BLOCKED = 0.1, 0.2, 0.3
+"""Up to which share of the presses the sensor has no noise; else is not tared; else the tip is blocked half-way."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +72,19 @@ def of_force_loop(loop: ForceLoop) -> Recording:
 def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array:
     gains, state = loop.gains, loop._state
     sensor, tick = gains.arm.sensor, gains.arm.tick
-    K = gains.cap * 10.0 ** rng.uniform(-3.0, 0.3)
+    K = gains.cap * 10.0 ** rng.uniform(-3.0, 0.5)
     B, wall = K * 10.0 ** rng.uniform(-4.0, -1.5), gains.approach * tick * ticks * rng.uniform(0.05, 0.3)
     noise = (sensor.noise * rng.uniform(0.2, 1.5) * rng.standard_normal(ticks)).tolist()
-    kinds, whens = rng.integers(BLIND, RECEDES + 1, ticks).tolist(), (rng.random(ticks) < RARE).tolist()
+    kinds, whens = rng.integers(BLIND, UNASKED + 1, ticks).tolist(), (rng.random(ticks) < RARE).tolist()
     lengths, bias = rng.integers(1, 200, ticks).tolist(), float(rng.normal(0.0, 0.02 * gains.force))
+    quality = rng.random()
+    if quality < _QUIET:
+        noise, bias = [0.0] * ticks, 0.0
+    elif quality < _UNTARED:
+        bias *= 20.0
     step, drift = (
         max(1, round(1.0 / (sensor.sampling * tick))),
-        float(rng.normal(0.0, 1e-4 * gains.force * tick)),
+        float(rng.normal(0.0, 1e-4 * gains.force * tick)) if quality >= _QUIET else 0.0,
     )
     reading, x, before, fault, left = 0.0, 0.0, 0.0, 0, 0
     out = np.zeros((ticks, 7))
@@ -88,7 +95,8 @@ def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array
         if k % step == 0 and fault != STUCK:
             reading = min(max(force + bias + drift * k + noise[k], -sensor.full_scale), sensor.full_scale)
         wall += 2e-6 if fault == RECEDES else 0.0
-        loop.desired = gains.force * (1.0 + 0.05 * (left % 3) if fault == STEPPED else 1.0)
+        desired = gains.force * (1.0 + 0.25 * (left % 3) if fault == STEPPED else 1.0)
+        loop._desired = float("nan") if fault == UNASKED else min(desired, 0.9 * gains.force_limit)
         given = _reading(gains, fault, left, reading)
         place = x if fault != LOST else float("nan") if left % 2 else 1e4
         missed = float(left % 7 * left) if fault == LATE else float("nan") if fault == LATER else 0.0
@@ -96,7 +104,10 @@ def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array
         out[k, 1:6] = loop.desired, given, place, missed, speed
         out[k, 6] = digest_of(state) if k % 100 == 99 else 0.0
         before, x = x, x + tick * speed
+        if _UNTARED < quality < _BLOCKED and k > ticks // 2:
+            wall, x = wall + 0.5 * max(x - wall, 0.0) * (k == ticks // 2 + 1), before
     out[0, 0] = 1.0
+    loop.desired = gains.force
     return out
 
 

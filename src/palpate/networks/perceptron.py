@@ -1,4 +1,7 @@
-"""The perceptron for your own loop: forward and on-line back-propagation, compiled."""
+"""The perceptron for your own loop: forward and on-line back-propagation, compiled.
+
+A row is a neuron, its threshold first.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +96,7 @@ class Perceptron:
         Raises:
             InputError: inputs of another shape, or not finite.
         """
-        x = self._checked(inputs, int(self._sizes[0]), "inputs")
+        x = self._check(inputs, int(self._sizes[0]), "inputs")
         y = np.empty(len(self._amplitude))
         self._forward(self._sizes, self._weights, self._amplitude, self._signals, x, y)
         self._heard = True
@@ -105,7 +108,7 @@ class Perceptron:
         Raises:
             InputError: errors of another shape, or not finite; no `forward` before.
         """
-        e = self._checked(error, len(self._amplitude), "error")
+        e = self._check(error, len(self._amplitude), "error")
         if not self._heard:
             raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
         self._descend(e, self.learning_rate)
@@ -114,7 +117,7 @@ class Perceptron:
         self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, error, rate)
 
     @staticmethod
-    def _checked(values: ArrayLike, n: int, name: str) -> Array:
+    def _check(values: ArrayLike, n: int, name: str) -> Array:
         array = np.ascontiguousarray(values, dtype=np.float64)
         if array.shape != (n,):
             raise InputError(f"{name} must have shape ({n},), got {array.shape}")
@@ -129,8 +132,6 @@ THESIS_AMPLITUDE = (20.0, 10.0, 1.0)
 
 def thesis_layers() -> list[Array]:
     """The weights that the thesis' controller starts from (App. E): shapes (12, 10) and (3, 13)."""
-    from palpate.networks.thesis_weights import HIDDEN, OUTPUT
-
     return [np.array(HIDDEN) / 1000.0, np.array(OUTPUT) / 1000.0]
 
 
@@ -151,3 +152,25 @@ def _learn(sizes, weights, amplitude, signals, deltas, error, learning_rate):
         deltas[first + k] = error[k]
     backward(sizes, weights, amplitude, signals, deltas)
     descend(sizes, weights, signals, deltas, learning_rate, 1.0)
+
+
+HIDDEN = (  # (12, 10)
+    (-1, 1.439, 1.275, 2.55, -3.5, 1.3, 1.915, -4.17, 1.75, 4.1),
+    (-1.1, 6.7, 7.5, 1.2, -2.878, 1.732, 1.238, -1.937, 8.1, 2.58),
+    (-1.2, -1.3, 1.532, 1.4, 5.12, 1.097, 2.005, 5.8, 1.178, -1.8),
+    (-1.3, 3.927, 4.19, -8.45, -8.475, 3.938, -1.838, -1.622, -2.75, 0.172),
+    (-1.4, 1.476, 0.9, 0.667, 4.619, 0.889, 1, 4.6, 1.525, 0.105),
+    (-1.5, 1.333, 1.698, 1.25, 1.333, 1.067, 1.524, 1.75, 3.8, 0.106),
+    (-1.7, 1.381, 0.921, -6.55, -4.286, 1.09, 0.778, 1.85, 1.12, 0.107),
+    (-1.7, 1.5, 1.548, 1.403, 1.387, 1.5, 1.806, 1.7, 1.225, 0.108),
+    (-1.8, 1.502, 1.542, 1.402, 1.382, 1.502, 1.802, 1.702, 1.222, 0.102),
+    (-1.9, 1.503, 1.543, 1.403, 1.383, 1.503, 1.803, 1.703, 1.223, 0.103),
+    (-1.133, 1.504, 1.544, 1.404, 1.384, 1.504, 1.804, 1.704, 1.224, 0.104),
+    (-1.234, 1.505, 1.545, 1.405, 1.385, 1.505, 1.805, 1.705, 1.225, 0.105),
+)
+
+OUTPUT = (  # (3, 13)
+    (-1.05, -3.415, -1.57, 3.138, -6.8, -2.212, 1.976, -9.512, 8.026, -4.162, 3.532, -1.203, -1.65),
+    (-1.15, 1.075, -6.95, 7.5, -4.2, -8.75, -1.039, 5.65, -2.756, -5.352, -8.803, -6.244, -5.537),
+    (-1.658, 1.242, -2.742, -1.03, 2.921, -6.42, -4.429, 2.921, 8.418, 8.935, 9.695, -5.594, 8.905),
+)

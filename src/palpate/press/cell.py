@@ -133,7 +133,7 @@ class Touch(NamedTuple):
 
 
 def body_at(q: Array, motor: Array) -> Body:
-    """At rest."""
+    """State of the body at rest."""
     n = len(q)
     one = [np.zeros(n) for _ in range(7)]
     return Body(q.copy(), one[0], motor.copy(), one[1], room_for(n), np.zeros((n, n)), *one[2:])

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
+import msgspec
 import numpy as np
 
-from palpate._jit import Bound
-from palpate._vector import Mat3, Vec3
+from palpate._jit import Bound, kernel, law
+from palpate._vector import Mat3, Vec3, Vec6
 from palpate.arrays import Array
+from palpate.controllers.controller import controller
+from palpate.errors import InputError
+from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
+from palpate.force.gains import Gains, approach_speed, free_motion_level
+from palpate.force.lag import lag_of
 from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
+from palpate.signals.types import Sense
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9
@@ -28,13 +36,13 @@ class Engine(Protocol):
 
 
 class Own:
-    """Palpate's laws."""
+    """Physics by palpate's own laws."""
 
     def __init__(self) -> None:
         self._tick = Bound(compiled_tick)
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
-        """See `Engine`."""
+        """One tick, as `Engine` describes it."""
         after: Touch = self._tick(cell, body, touch, setpoint, k, noise)
         return after
 
@@ -71,7 +79,7 @@ class ByMuJoCo:
         self._M, self._J, self._Jdot = np.zeros((model.nv, model.nv)), *np.zeros((2, 6, model.nv))
 
     def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
-        """See `Engine`."""
+        """One tick, as `Engine` describes it."""
         from palpate.robots.serial.loading import refusals
 
         touch = touch._replace(mean=0.0)
@@ -79,7 +87,7 @@ class ByMuJoCo:
         with refusals("the simulation"):
             for j in range(cell.steps):
                 self._engine.mj_step1(self._model, data)
-                tip = self._filled(body)
+                tip = self._fill(body)
                 time = (k * cell.steps + j + 1) * cell.step
                 touch = self._step(cell, body, touch, tip, setpoint, time, noise)
                 data.qfrc_applied[dofs] = body.drive - body.normal * max(touch.force, 0.0)
@@ -87,7 +95,7 @@ class ByMuJoCo:
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
         return touch
 
-    def _filled(self, body: Body) -> Tip:
+    def _fill(self, body: Body) -> Tip:
         """Puts M, h, J of this moment into the body's room; the tip."""
         engine, model, data, dofs = self._engine, self._model, self._data, self._dofs
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
@@ -108,3 +116,144 @@ class ByMuJoCo:
 
 def _three(values: Any) -> Vec3:
     return Vec3(*map(float, values))
+
+
+MODES = ("torque", "position")
+_TYPICAL = {"torque": "fr3", "position": "ur5e"}
+"""Whose inner loop and sensor stand for those of an arm of which nobody has said any."""
+_DAMPED = 0.7
+"""Damping ratio of the tip on its spring in the air."""
+
+
+def usual_mode(name: str) -> str:
+    """How an arm is driven: torques, unless its own file says positions."""
+    return load_arm(name).kind if name in names() else "torque"
+
+
+def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
+    """The arm for `palpate.force`.
+
+    Args:
+        name: of the arm; another than those that come with palpate gets the typical loop.
+        title: of the arm.
+        mode: torque or position.
+        mass: of the tip along the normal, 1/(n^T J M^-1 J^T n) at the pose of the press [kg].
+    """
+    known = load_arm(name) if name in names() else None
+    typical = load_arm(_TYPICAL[mode])
+    arm = known if known is not None and known.kind == mode else typical
+    inner = arm.inner
+    if isinstance(inner, TorqueLoop):
+        damping = 2.0 * _DAMPED * float(np.sqrt(inner.stiffness * mass))
+        inner = msgspec.structs.replace(inner, mass=mass, damping=damping)
+    else:
+        inner = msgspec.structs.replace(inner, mass=mass)
+    sensor = known.sensor if known is not None else arm.sensor
+    return msgspec.structs.replace(arm, title=f"{title}, {mode}s", inner=inner, sensor=sensor)
+
+
+def gains_for(arm: Arm, force: float) -> Gains:
+    """Gains of the cautious law for a force, on any surface up to the arm's limit; no proof is made here.
+
+    Raises:
+        InputError: a force that the sensor's noise hides, or that it cannot read.
+    """
+    theta = lag_of(arm)
+    cap = arm.limits.stiffness
+    return Gains(
+        arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
+        approach=approach_speed(arm, force, theta, cap), level=free_motion_level(arm, force),
+    )  # fmt: skip
+
+
+def check_mode(gains: Gains, mode: str | None) -> str:
+    """The mode that gains are for.
+
+    Raises:
+        InputError: another was asked for.
+    """
+    if mode is not None and gains.arm.kind != mode:
+        raise InputError(
+            f"these gains are for a {gains.arm.kind} arm, and --mode says {mode}; "
+            "leave --mode out, or tune for the other"
+        )
+    return gains.arm.kind
+
+
+def mass_note(gains: Gains, mass: float | None = None) -> str | None:
+    """Remedy where gains assume a position arm's tip without mass; None where nothing is missing.
+
+    Args:
+        gains: of the loop.
+        mass: of the tip, where it is known [kg].
+    """
+    inner = gains.arm.inner
+    if not isinstance(inner, PositionLoop) or inner.mass is not None:
+        return None
+    known = "the tip's along the normal, 1/(n^T J M^-1 J^T n)" if mass is None else f"{mass:.2g} kg here"
+    return (
+        f"the gains leave out the mass of the arm's tip: a heavy tip swings on the arm's {inner.stiffness:g} N/m,"
+        f" and after a touch the force may go over; add mass = M, {known}, under [inner] of the arm's file, and tune"
+        " again"
+    )
+
+
+def series_of(arm: Arm) -> float | None:
+    """Stiffness between the encoders and the surface [N/m]; None where the encoders sit on the links."""
+    return arm.inner.stiffness if isinstance(arm.inner, PositionLoop) else None
+
+
+@controller
+class Spring(NamedTuple):
+    """F = K (x_d - x) - D xdot + h: a position with a spring in series, which the cautious law moves.
+
+    Args:
+        stiffness: K [N/m, N m/rad].
+        damping: D [N s/m, N m s/rad].
+    """
+
+    stiffness: Vec6
+    damping: Vec6
+
+    def start(self):
+        return 0.0
+
+    def step(self, state, sense, task, model):
+        return self.stiffness * (task.x - sense.x) - self.damping * sense.xd + model.h, state
+
+
+@law
+def half_turn(R):
+    """Sine of the rotation's angle times its axis: the rotation vector for the small turns of a held tip [rad]."""
+    return 0.5 * Vec3(R.r3.y - R.r2.z, R.r1.z - R.r3.x, R.r2.x - R.r1.y)
+
+
+@law
+def tip_torque(axes, held, control, state, force, task, damping, q, qd, found, own, torque):
+    """Fills the joints' torques from encoders and force reading: the controller's state.
+
+    Args:
+        axes: of the task, in rows; the first is the surface's normal.
+        held: axes of the tip when it stands as it should, in columns.
+        control: in six directions.
+        state: its own.
+        force: reading along the normal [N].
+        task: what is asked for, in the task's axes.
+        damping: of joints to spare [1/s].
+        q: measured [rad, m], shape (n,).
+        qd: measured, shape (n,).
+        found: what `described` says of these.
+        own: room for the laws.
+        torque: where it goes, shape (n,).
+    """
+    room, tip = found.room, tip_of(found, qd)
+    model = task_model(axes, room, tip, own)
+    x = into(axes, tip.p, half_turn(tip.R @ held.T))
+    wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
+    sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
+    F, state = control.step(state, sense, task, model)
+    joint_torque(axes, room, model, own, F, damping, qd, torque)
+    return state
+
+
+compiled_tip_torque = kernel(tip_torque)

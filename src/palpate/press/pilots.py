@@ -8,16 +8,15 @@ import numpy as np
 
 from palpate._vector import ZERO3, Vec3, Vec6
 from palpate.arrays import Array
-from palpate.bench.sequence import APPROACH, CONTACT, LOST
+from palpate.bench.force_input import APPROACH, CONTACT, LOST
 from palpate.controllers import Hybrid, Impedance, ProportionalIntegral, ResolvedAcceleration
 from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
-from palpate.press.protocol import Command, Sense, Wire
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.troubles import Troubles
+from palpate.press.tool import Command, Sense, Troubles, Wire
 from palpate.signals.types import Task
 
 CAUTIOUS = "cautious"
@@ -63,7 +62,7 @@ class Cautious:
         self._troubles = Troubles(gains.theta, lambda _: None)
 
     def step(self, sense: Sense, desired: float) -> Acted:
-        """See `Pilot`."""
+        """One tick, as `Pilot` describes it."""
         self.loop.desired = desired
         force, place = float(sense.force[:3] @ self._normal), float(self._normal @ sense.pose[:3, 3])
         speed = self.loop.update(force, place)
@@ -96,9 +95,9 @@ class ByTorque:
         at = place.axes @ place.pose[:3, 3]
         self._at, self._gone, self._phase = Vec3(*map(float, at)), 0.0, APPROACH
         self._approach = ResolvedAcceleration(_six(_POSITION), _six(_RATE))
-        self._controller = self._made(controller, place.place, force)
+        self._controller = self._make(controller, place.place, force)
 
-    def _made(self, name: str, surface: float, force: float) -> Any:
+    def _make(self, name: str, surface: float, force: float) -> Any:
         tick = self._arm.loop.tick
         held, rate, none = _six(_POSITION), _six(_RATE), _six(0.0)
         if name == "hybrid":
@@ -113,7 +112,7 @@ class ByTorque:
         raise unknown("controller", name, CONTROLLERS)
 
     def step(self, sense: Sense, desired: float) -> Acted:
-        """See `Pilot`."""
+        """One tick, as `Pilot` describes it."""
         force = float(sense.force[:3] @ self._normal)
         if self._phase == CONTACT and force <= 0.0:
             self._phase = LOST

@@ -13,16 +13,14 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
-from palpate.press.engines import ENGINES
-from palpate.press.loops import MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
+from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
 from palpate.press.pilots import CAUTIOUS, CONTROLLERS, pilot_of
-from palpate.press.plan import Plan, plan_for
 from palpate.press.pressing import Progress, press
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked
 from palpate.press.tare import SURE, check_drift, check_range, fitting, noise_and_drift
-from palpate.press.tool import held_tool, with_tool
+from palpate.press.tool import Plan, held_tool, plan_for, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
@@ -122,7 +120,7 @@ def prepared(question: Question) -> Pressing:
     """
     _check_words(question)
     Plan(question.force, question.seconds, question.probe)
-    arm = _loaded(question, arm_of(question.arm, question.site))
+    arm = _load(question, arm_of(question.arm, question.site))
     place = place_of(arm, _array(question.at), _array(question.normal))
     gains = _gains(question, arm, place)
     _check_surface(question, gains)
@@ -136,7 +134,7 @@ def prepared(question: Question) -> Pressing:
     return Pressing(asked, plan_for(question.force, question.seconds, question.probe, GAP, gains.approach))
 
 
-def _loaded(question: Question, arm: SerialArm) -> SerialArm:
+def _load(question: Question, arm: SerialArm) -> SerialArm:
     """The arm with its tool, if there is one."""
     if question.payload is None:
         return arm

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.sequence import (
+from palpate.bench.force_input import (
     APPROACH,
     CONTACT,
     DIVERGED,
@@ -21,9 +21,9 @@ from palpate.bench.sequence import (
     Ending,
 )
 from palpate.press.pilots import Acted, Pilot
-from palpate.press.plan import Plan
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.tool import Plan
 from palpate.records import Record
 
 Progress = Callable[[float, str], None]
@@ -102,7 +102,7 @@ def press(
         if touched is None and acted.phase == CONTACT:
             touched, origin = k, float(place.normal @ sense.pose[:3, 3])
         row = _row(arm, place, sense, acted, desired if acted.phase == CONTACT else 0.0, origin, k)
-        ending = _judged(arm, plan, row, acted, touched, k)
+        ending = _judge(arm, plan, row, acted, touched, k)
         if np.isfinite(row).all():
             rows.rows.append(row)
         k += 1
@@ -125,7 +125,7 @@ def _row(
     return np.concatenate([np.asarray(part, dtype=float) for part in numbers])
 
 
-def _judged(
+def _judge(
     arm: SimulatedArm, plan: Plan, row: Array, acted: Acted, touched: int | None, k: int
 ) -> Ending | None:
     tick = arm.loop.tick

@@ -164,7 +164,7 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return WristSensor(
-        E=Mat3(*(_three(row) for row in wide)), e=_padded(e), c=_padded(c), d=0.0 if len(b) else 1.0,
+        E=Mat3(*(_three(row) for row in wide)), e=_pad(e), c=_pad(c), d=0.0 if len(b) else 1.0,
         step=float(step), sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
         full_scale=float(loop.sensor.full_scale),
     )  # fmt: skip
@@ -198,7 +198,7 @@ def _unit(direction: Array) -> Array:
     return v / length
 
 
-def _padded(values: Array) -> Vec3:
+def _pad(values: Array) -> Vec3:
     return _three(np.concatenate([values, np.zeros(3 - len(values))]))
 
 

@@ -16,11 +16,10 @@ from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Cell, Reading, Touch, body_at
-from palpate.press.engines import ByMuJoCo, Engine, Own
-from palpate.press.protocol import Command, Sense
+from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
 from palpate.press.setting import Place
 from palpate.press.tare import TARE
-from palpate.press.tip_control import Spring, compiled_tip_torque
+from palpate.press.tool import Command, Sense
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
@@ -126,7 +125,7 @@ class SimulatedArm:
         """
         self._aim(command)
         if self._tip is None:
-            self._advance(self._followed() + self._sag)
+            self._advance(self._follow() + self._sag)
         else:
             self._act(self._tip.spring, self._tip.towards(self._goal))
 
@@ -175,7 +174,7 @@ class SimulatedArm:
         self._goal[:3, 3] += moved[:3]
         self._goal[:3, :3] = _turn(moved[3:]) @ self._goal[:3, :3]
 
-    def _followed(self) -> Array:
+    def _follow(self) -> Array:
         """Set-points of the motors whose pose follows the goal, by resolved rates of least size."""
         q, tick = self._setpoint, self.loop.tick
         J = self.arm.jacobian(q)

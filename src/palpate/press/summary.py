@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.bench.force_input import CONTACT
 from palpate.bench.metrics.window import WINDOW, force_figures, losses
-from palpate.bench.sequence import CONTACT
 from palpate.contact_frame import Payload, identify_contact
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
 from palpate.identification.sample_clock import sample_clock_of
-from palpate.press.loops import series_of
+from palpate.press.engines import series_of
 from palpate.press.setting import Place
 from palpate.press.tool import held_tool
 from palpate.records import Record

@@ -10,9 +10,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.look.columns import with_peaks
+from palpate.report.look.assets import with_peaks
+from palpate.report.numbers import as_html, as_text
 from palpate.report.page import Table, embedded, render
-from palpate.report.result_text import as_html, as_text
 from palpate.text import printable
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
-from palpate.report.look import tokens
-from palpate.report.look.tokens import DATA, PAIRS
+from palpate.report.look import assets
+from palpate.report.look.assets import DATA, PAIRS
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ INK, QUIET, GRID, LINE, CARD = (PAIRS[name][0] for name in ("ink", "quiet", "gri
 K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
 """One colour a quantity, the same by light and by dark: stiffness, damping, mass; true force and contact."""
 MEASURED, FAIL, DOUBT, OK = (DATA[name] for name in ("measured", "fail", "warn", "ok"))
-SERIES = tuple(tokens.SERIES.values())
+SERIES = tuple(assets.SERIES.values())
 """Colours of compared series that are no quantity."""
 KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4))}
 """The line of what is asked for, or known to be true."""

@@ -8,7 +8,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from palpate.files import SIGNATURE
-from palpate.report.look.tokens import PAIRS
+from palpate.report.look.assets import PAIRS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.result_text import as_html
+from palpate.report.numbers import as_html, plain, quantity, quantity_between
 from palpate.text import in_python, printable
 
 Facts = list[tuple[str, str]]

@@ -110,7 +110,7 @@ class Cluster:
         security = _security(certificates)
         try:
             _check_greeting(host, port, security)
-            self._client = _untyped(distributed).Client(
+            self._client = _without_types(distributed).Client(
                 address, timeout=CONNECT, set_as_default=False, security=security
             )
         except Exception as error:
@@ -132,7 +132,7 @@ class Cluster:
 
         futures = self._client.map(work, list(items), pure=False)
         try:
-            for _, found in _untyped(distributed).as_completed(
+            for _, found in _without_types(distributed).as_completed(
                 futures, loop=self._client.loop, with_results=True
             ):
                 yield found
@@ -207,7 +207,7 @@ def _security(certificates: Certificates | None) -> Any:
         return None
     import distributed
 
-    return _untyped(distributed).Security(
+    return _without_types(distributed).Security(
         tls_ca_file=str(certificates.authority),
         tls_client_cert=str(certificates.certificate),
         tls_client_key=str(certificates.key),
@@ -310,7 +310,7 @@ class Hand:
             return []
         try:
             with self.client.as_current():
-                found = _untyped(distributed).wait(
+                found = _without_types(distributed).wait(
                     list(self._pending), timeout=POLL, return_when="FIRST_COMPLETED"
                 )
             return list(found.done)
@@ -371,7 +371,7 @@ class Hand:
         )
 
 
-def _untyped(module: Any) -> Any:
+def _without_types(module: Any) -> Any:
     """The library's functions carry no types."""
     return module
 

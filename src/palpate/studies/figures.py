@@ -19,14 +19,21 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Mask
 from palpate.bench import Experiment, changed
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import Metric, metric_of
-from palpate.bench.sequence import DONE
 from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report import style
-from palpate.report.study.axes import Scale, decades
-from palpate.report.study.clouds import Cloud, Points, clouds_figure
-from palpate.report.study.lines import Curve, Line, curves_figure
+from palpate.report.study.lines import (
+    Cloud,
+    Curve,
+    Line,
+    Points,
+    Scale,
+    clouds_figure,
+    curves_figure,
+    decades,
+)
 from palpate.report.study.maps import Bound, Heat, heat_figure
 from palpate.studies.pairing import FEW, Drawn, StudyRows, logarithmic, restricted_to, sentence, short
 from palpate.studies.parameters import Axis

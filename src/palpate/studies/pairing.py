@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import Metric, metric_of
-from palpate.bench.sequence import DONE
 from palpate.errors import unknown
-from palpate.report.study.axes import Scale
+from palpate.report.study.lines import Scale
 from palpate.studies.parameters import Axis, Label, label
 from palpate.studies.plan import MAIN, Part, Plan
 from palpate.studies.study import Curves, Map, flat

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from palpate.bench import changed
-from palpate.bench.any_experiment import AnyExperiment
+from palpate.bench.build import AnyExperiment
 from palpate.errors import InputError
 from palpate.studies.study import Parameter, flat
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import msgspec
 
 from palpate._jit.registry import PACKAGE
-from palpate.bench.any_experiment import AnyExperiment, build_any
+from palpate.bench.build import AnyExperiment, build_any
 from palpate.bench.metrics import Look, metric_of
 from palpate.bench.speed import cores
 from palpate.errors import InputError

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.bench.force_input import DONE
 from palpate.bench.metrics import metric_of
-from palpate.bench.sequence import DONE
 from palpate.files import signed, write_json, write_text
 from palpate.report.page import Table
-from palpate.report.study.page import StudyPage, study_page
+from palpate.report.study.plain import StudyPage, study_page
 from palpate.studies import effects
 from palpate.studies.effects import charts
 from palpate.studies.figures import draw, figures
 from palpate.studies.pairing import PairedComparison, comparisons, short, with_unit
 from palpate.studies.plan import MAIN, Plan
-from palpate.studies.ranking import MetricMean, Ranked, Ranking, rankings
+from palpate.studies.preview import MetricMean, Ranked, Ranking, rankings
 
 if TYPE_CHECKING:
     from polars import DataFrame

@@ -3,10 +3,9 @@
 from palpate.wires.at_rest import AtRest, look
 from palpate.wires.opening import KINDS, open_wire
 from palpate.wires.order import Limits, Order, Task, checked
-from palpate.wires.outcome import Outcome
+from palpate.wires.outcome import Outcome, Rows, recover
 from palpate.wires.press import press
 from palpate.wires.protocol import Command, LostError, Sense, Wire
-from palpate.wires.recording import Rows, recover
 
 __all__ = [
     "KINDS",

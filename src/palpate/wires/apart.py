@@ -14,7 +14,7 @@ import sys
 import time
 
 from palpate.errors import InputError
-from palpate.wires import link
+from palpate.wires import realtime
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
 from palpate.wires.realtime import schedule
 
@@ -52,8 +52,8 @@ class ApartWire:
         theirs.close()
         self._link.setblocking(False)
         try:
-            self._answered(link.STARTED, _START)
-            about = self._answered(link.READY, self.answer)
+            self._answer(realtime.STARTED, _START)
+            about = self._answer(realtime.READY, self.answer)
         except BaseException as error:
             self._driver.kill()  # nothing moves yet
             self.close()
@@ -63,7 +63,7 @@ class ApartWire:
         self.title, self.watchdog, self._source = about.split("\n")
 
     def read(self, timeout: float) -> Sense:
-        """The newest reading."""
+        """The newest reading of the arm."""
         end, found = time.monotonic() + timeout, None
         while True:
             message = self._next(0.0 if found is not None else end - time.monotonic())
@@ -71,12 +71,12 @@ class ApartWire:
                 if found is not None:
                     return found
                 raise SilentError(self._source, timeout)
-            if message[0] == link.STATE:
-                found = link.read_state(message)
+            if message[0] == realtime.STATE:
+                found = realtime.read_state(message)
 
     def tare(self) -> None:
         """As the arm's driver does it."""
-        self._ask(link.text(link.TARE), link.TARED)
+        self._ask(realtime.text(realtime.TARE), realtime.TARED)
 
     def begin(self, silence: float = SILENCE) -> None:
         """Take the arm over; all threads of the library's process get this thread's priority."""
@@ -84,11 +84,11 @@ class ApartWire:
         if policy != os.SCHED_OTHER:
             schedule(self._driver.pid, policy, os.sched_getparam(0).sched_priority)
         self._begun = True
-        self._ask(link.begin(silence), link.BEGUN)
+        self._ask(realtime.begin(silence), realtime.BEGUN)
 
     def write(self, command: Command) -> None:
         """Hand on a command."""
-        self._send(link.move(command))
+        self._send(realtime.move(command))
 
     def stop(self) -> None:
         """Bring the arm to rest; where that is not answered, end the process, and the arm's own watchdog stops it."""
@@ -96,8 +96,8 @@ class ApartWire:
             return
         self._begun = False
         try:
-            self._send(link.text(link.REST))
-            self._answered(link.RESTED, _PATIENCE)
+            self._send(realtime.text(realtime.REST))
+            self._answer(realtime.RESTED, _PATIENCE)
         except (LostError, InputError):
             self._driver.kill()
 
@@ -114,7 +114,7 @@ class ApartWire:
     def _ask(self, message: bytes, answer: int) -> None:
         try:
             self._send(message)
-            self._answered(answer, self.answer)
+            self._answer(answer, self.answer)
         except LostError as error:
             raise InputError(f"{self.title} does not answer: {error}") from None
 
@@ -124,7 +124,7 @@ class ApartWire:
         except OSError as error:
             raise LostError(f"a command could not be sent: {error.strerror or error}") from None
 
-    def _answered(self, kind: int, timeout: float) -> str:
+    def _answer(self, kind: int, timeout: float) -> str:
         """The words of the next message of a kind."""
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0.0:
@@ -132,7 +132,7 @@ class ApartWire:
             if message is None:
                 break
             if message[0] == kind:
-                return link.read_text(message)
+                return realtime.read_text(message)
         raise LostError(f"nothing came within {timeout:g} s")
 
     def _next(self, timeout: float) -> bytes | None:
@@ -140,13 +140,13 @@ class ApartWire:
         if not select.select([self._link], [], [], max(timeout, 0.0))[0]:
             return None
         try:
-            message = self._link.recv(link.LARGEST)
+            message = self._link.recv(realtime.LARGEST)
         except OSError:
             message = b""
         if not message:
             raise LostError("the process that held the connection to the controller has ended")
-        if message[0] == link.FAILED:
-            raise LostError(link.read_text(message))
-        if message[0] == link.REFUSED:
-            raise InputError(link.read_text(message))
+        if message[0] == realtime.FAILED:
+            raise LostError(realtime.read_text(message))
+        if message[0] == realtime.REFUSED:
+            raise InputError(realtime.read_text(message))
         return message

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.contact_frame import Payload
+from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
 from palpate.wires.order import Order
-from palpate.wires.protocol import Sense, Wire, unreadable
+from palpate.wires.protocol import Quaternion, Sense, Wire, unreadable
 
 _FEWEST = 20
 """Readings, at least: they tell the noise's deviation to 1/sqrt(2 n), 16 %, and `_check` wants eight of them."""
@@ -148,3 +152,90 @@ def _check(found: AtRest, moved: float, order: Order) -> None:
             f"the force's noise is {found.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
         )
     check_drift(found.drift, found.drift_std, task.force, limits.seconds, gains.arm.sensor)
+
+
+def from_rotation_vector(vector: Sequence[float]) -> Quaternion:
+    """The quaternion x, y, z, w of a rotation vector [rad]; no numbers of one that is not finite."""
+    x, y, z = vector
+    angle = math.hypot(x, y, z)
+    if not angle < math.inf:
+        return (math.nan,) * 4
+    share = 0.5 if angle < 1e-12 else math.sin(angle / 2.0) / angle
+    return share * x, share * y, share * z, math.cos(angle / 2.0)
+
+
+def from_matrix_by_columns(m: Sequence[float]) -> Quaternion:
+    """The quaternion x, y, z, w of a homogeneous matrix of 4 x 4 that is written by columns.
+
+    From the largest of its four squares, so that nothing small divides (Shepperd, J. Guidance and Control 1 (1978)
+    223). It has the length 1 if the matrix is a rotation, and another one if it is none.
+    """
+    a, b, c = float(m[0]), float(m[5]), float(m[10])
+    squares = (1.0 + a - b - c, 1.0 - a + b - c, 1.0 - a - b + c, 1.0 + a + b + c)
+    most = max(range(4), key=squares.__getitem__)
+    xy, xz, yz = m[4] + m[1], m[8] + m[2], m[9] + m[6]
+    xw, yw, zw = m[6] - m[9], m[8] - m[2], m[1] - m[4]
+    row = (
+        (squares[0], xy, xz, xw),
+        (xy, squares[1], yz, yw),
+        (xz, yz, squares[2], zw),
+        (xw, yw, zw, squares[3]),
+    )[most]
+    double = 2.0 * math.sqrt(squares[most])
+    x, y, z, w = (float(part) / double for part in row)
+    return x, y, z, w
+
+
+def turned(q: Quaternion, v: Sequence[float]) -> tuple[float, float, float]:
+    """A vector in the tool's axes turned into the base's."""
+    x, y, z, w = q
+    a, b, c = v
+    # v + 2 w (u x v) + 2 u x (u x v) with the quaternion's vector part u
+    d, e, f = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a + 2.0 * (w * d + y * f - z * e),
+        b + 2.0 * (w * e + z * d - x * f),
+        c + 2.0 * (w * f + x * e - y * d),
+    )
+
+
+_SURE = 3.0
+"""Standard deviations of what was weighed, beyond which a difference is none of it."""
+
+
+def notes_on(tool: Payload, rest: AtRest) -> list[str]:
+    """Notes for the user before the arm moves.
+
+    Args:
+        tool: from `palpate payload`.
+        rest: what the arm shows at rest.
+    """
+    shown = unlike(tool, rest) or "the sensor shows the tool as it was weighed"
+    if tool.inertia_followed is None or not wrong_sign(tool.inertia_followed):
+        return [shown]
+    return [shown, f"when it was weighed: {wrong_sign_of(tool.inertia_followed)}"]
+
+
+def unlike(tool: Payload, rest: AtRest) -> str | None:
+    """How the sensor's reading at rest differs from what the tool's weighing makes expect; None if it does not.
+
+    The force of a wire is what the tool exerts, that of a payload is as its log had it: either sign is tried.
+
+    Args:
+        tool: from `palpate payload`.
+        rest: what the arm shows at rest.
+    """
+    expected = np.array(tool.weight) + np.array(turned(rest.last.quaternion, tool.bias))
+    sure = _SURE * math.hypot(tool.weight_std, tool.bias_std, tool.noise)
+    apart = min(float(np.abs(rest.bias - sign * expected).max()) for sign in (1.0, -1.0))
+    if apart <= sure:
+        return None
+    return (
+        f"the sensor shows {_show(rest.bias)} N in the air, and the tool as it was weighed makes {_show(expected)} N,"
+        f" {apart:.2g} N apart in one axis: the sensor was zeroed since or drifts, the tool is another, or wrench and"
+        " pose are of other frames. The tare takes it off as long as the tool does not turn"
+    )
+
+
+def _show(force: np.ndarray) -> str:
+    return ", ".join(f"{value:.3g}" for value in force)

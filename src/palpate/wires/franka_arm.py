@@ -70,7 +70,7 @@ def server_of(robot: Any, address: str) -> Any:
     from franky_sim import FrankaRobotServer
 
     class Server(FrankaRobotServer):  # type: ignore[misc, unused-ignore]
-        """The server."""
+        """Server that refuses all but Cartesian velocities."""
 
         def start_motion(self, controller_mode: Any, motion_generator_mode: Any, motion_id: int) -> None:
             if motion_generator_mode.name != "kCartesianVelocity":

@@ -17,10 +17,10 @@ import time
 from collections import deque
 from typing import Any
 
-from palpate.wires import link
+from palpate.wires import realtime
+from palpate.wires.at_rest import from_matrix_by_columns
 from palpate.wires.host import line, prepare
 from palpate.wires.protocol import Sense, Triple
-from palpate.wires.turns import from_matrix_by_columns
 
 _TICK = 1e-3
 _ANSWER = 5e-4
@@ -60,7 +60,7 @@ class Driver:
         """Until the wire has gone; what libfranka throws ends it."""
         while not self._left or self._control is not None:
             state = self._robot.read_once() if self._control is None else self._control.readOnce()[0]
-            self._send(link.state(self._sense(state)))
+            self._send(realtime.state(self._sense(state)))
             self._listen()
             if self._control is not None:
                 self._write()
@@ -73,7 +73,7 @@ class Driver:
 
     def _answer(self, kind: int, words: str = "") -> None:
         """Answer a request. The wire waits for that answer: it is kept until there is room for it."""
-        self._answers.append(link.text(kind, words))
+        self._answers.append(realtime.text(kind, words))
         self._send()
 
     def _send(self, *readings: bytes) -> None:
@@ -87,9 +87,9 @@ class Driver:
         except BlockingIOError:  # nobody has read for a while
             return
         except OSError:
-            self._gone()
+            self._lose()
 
-    def _gone(self) -> None:
+    def _lose(self) -> None:
         self._left = self._ending = True
 
     def _listen(self) -> None:
@@ -101,35 +101,35 @@ class Driver:
             if not select.select([self._wire], [], [], max(left, 0.0))[0]:
                 return
             try:
-                message = self._wire.recv(link.LARGEST)
+                message = self._wire.recv(realtime.LARGEST)
             except OSError:
                 message = b""
             if message:
                 self._obey(message)
             else:
-                self._gone()
+                self._lose()
 
     def _obey(self, message: bytes) -> None:
-        if message[0] == link.MOVE:
-            self._wanted, self._silent = link.read_move(message).velocity, 0
-        elif message[0] == link.REST:
+        if message[0] == realtime.MOVE:
+            self._wanted, self._silent = realtime.read_move(message).velocity, 0
+        elif message[0] == realtime.REST:
             self._ending = True
             if self._control is None:
-                self._answer(link.RESTED)
-        elif message[0] == link.BEGIN:
+                self._answer(realtime.RESTED)
+        elif message[0] == realtime.BEGIN:
             self._begin()
-        elif message[0] == link.TARE:  # the estimate has no zero that could be set
-            self._answer(link.TARED)
+        elif message[0] == realtime.TARE:  # the estimate has no zero that could be set
+            self._answer(realtime.TARED)
 
     def _begin(self) -> None:
         mode = self._library.ControllerMode.JointImpedance
         try:
             self._control = self._robot.start_cartesian_velocity_control(mode)
         except Exception as error:  # noqa: BLE001 - libfranka throws kinds of no common base
-            self._answer(link.REFUSED, f"the Franka may not be moved: {line(error)}")
+            self._answer(realtime.REFUSED, f"the Franka may not be moved: {line(error)}")
             return
         self._wanted, self._speed, self._silent, self._ending = _ZERO, _ZERO, 0, False
-        self._answer(link.BEGUN)
+        self._answer(realtime.BEGUN)
 
     def _write(self) -> None:
         if self._ending or self._silent > _REST:
@@ -142,7 +142,7 @@ class Driver:
         self._control.writeOnce(command)
         if last:
             self._control = None
-            self._answer(link.RESTED)
+            self._answer(realtime.RESTED)
 
 
 def nearer(old: Triple, new: Triple, step: float) -> Triple:
@@ -163,16 +163,16 @@ def main() -> None:
     address, sign, number = sys.argv[1:4]
     wire = socket.socket(fileno=int(number))
     wire.setblocking(False)
-    wire.send(link.text(link.STARTED))
+    wire.send(realtime.text(realtime.STARTED))
     try:
         robot = pylibfranka.Robot(address, pylibfranka.RealtimeConfig.kIgnore)
         title = f"a Franka at {address}, over its control interface"
-        wire.send(link.text(link.READY, f"{title}\n{_WATCHDOG}\n"))
+        wire.send(realtime.text(realtime.READY, f"{title}\n{_WATCHDOG}\n"))
         Driver(pylibfranka, robot, wire, float(sign)).run()
     except Exception as error:  # noqa: BLE001 - likewise
         wire.settimeout(_FAREWELL)
         try:
-            wire.send(link.text(link.FAILED, f"the controller: {line(error)}"))
+            wire.send(realtime.text(realtime.FAILED, f"the controller: {line(error)}"))
         except OSError:
             os._exit(1)
     os._exit(0)  # libfranka's destructors may wait for a controller that has gone

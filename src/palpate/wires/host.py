@@ -15,7 +15,7 @@ import threading
 from contextlib import suppress
 
 from palpate.errors import InputError
-from palpate.wires import link
+from palpate.wires import realtime
 from palpate.wires.protocol import SILENCE, Hosted, LostError, SilentError
 
 _WAIT = 0.1
@@ -49,7 +49,7 @@ class Host:
         while True:
             try:
                 sense = self._wire.read(_WAIT)
-                self._link.send(link.state(sense), socket.MSG_DONTWAIT)
+                self._link.send(realtime.state(sense), socket.MSG_DONTWAIT)
             except (
                 SilentError,
                 BlockingIOError,
@@ -58,7 +58,7 @@ class Host:
             except OSError:
                 return
             except Exception as error:  # noqa: BLE001 - whatever a maker's library throws is the wire's fault
-                self._say(link.FAILED, line(error))
+                self._say(realtime.FAILED, line(error))
                 return
 
     def _next(self) -> bytes | None:
@@ -74,39 +74,39 @@ class Host:
                     lack = (
                         f"no command came for {2e3 * self._silence:.3g} ms, and the arm was brought to rest"
                     )
-                    self._say(link.FAILED, lack)
+                    self._say(realtime.FAILED, lack)
                 continue
             try:
-                message = self._link.recv(link.LARGEST)
+                message = self._link.recv(realtime.LARGEST)
             except OSError:
                 return None
             if not message:
                 return None
-            if message[0] != link.MOVE:
+            if message[0] != realtime.MOVE:
                 return message
 
     def _obey(self, message: bytes) -> None:
         try:
             match message[0]:
-                case link.TARE:
+                case realtime.TARE:
                     self._wire.tare()
-                    self._say(link.TARED)
-                case link.BEGIN:
-                    self._begin(link.read_begin(message))
-                case link.MOVE if self._moving:
-                    self._wire.write(link.read_move(message))
-                case link.REST:
+                    self._say(realtime.TARED)
+                case realtime.BEGIN:
+                    self._begin(realtime.read_begin(message))
+                case realtime.MOVE if self._moving:
+                    self._wire.write(realtime.read_move(message))
+                case realtime.REST:
                     self._rest()
-                    self._say(link.RESTED)
+                    self._say(realtime.RESTED)
         except InputError as error:
-            self._say(link.REFUSED, line(error))
+            self._say(realtime.REFUSED, line(error))
         except Exception as error:  # noqa: BLE001 - likewise
-            self._say(link.FAILED, line(error))
+            self._say(realtime.FAILED, line(error))
 
     def _begin(self, silence: float) -> None:
         self._wire.begin(silence)
         self._silence, self._moving = silence, True
-        self._say(link.BEGUN)
+        self._say(realtime.BEGUN)
 
     def _rest(self) -> None:
         self._moving = False
@@ -114,7 +114,7 @@ class Host:
 
     def _say(self, kind: int, words: str = "") -> None:
         try:
-            self._link.send(link.text(kind, words))
+            self._link.send(realtime.text(kind, words))
         except OSError:  # the loop's process has gone: the next message says so
             return
 
@@ -151,16 +151,16 @@ def main() -> None:
     prepare()
     kind, where, number = sys.argv[1:4]
     theirs = socket.socket(fileno=int(number))
-    theirs.send(link.text(link.STARTED))
+    theirs.send(realtime.text(realtime.STARTED))
     try:
         wire = opened(kind, where)
-        theirs.send(link.text(link.READY, f"{wire.title}\n{wire.watchdog}\n{wire.source}"))
+        theirs.send(realtime.text(realtime.READY, f"{wire.title}\n{wire.watchdog}\n{wire.source}"))
         Host(wire, theirs).run()
         wire.close()
     except InputError as error:
-        theirs.send(link.text(link.REFUSED, line(error)))
+        theirs.send(realtime.text(realtime.REFUSED, line(error)))
     except LostError as error:
-        theirs.send(link.text(link.FAILED, line(error)))
+        theirs.send(realtime.text(realtime.FAILED, line(error)))
     finally:
         os._exit(0)  # a maker's destructors may wait for a controller that has gone
 

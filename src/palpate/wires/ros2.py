@@ -13,9 +13,9 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.wires.apart import ApartWire
+from palpate.wires.at_rest import turned
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError, Triple
 from palpate.wires.ros2_tool import JointTool, PoseTool, Tool, seconds
-from palpate.wires.turns import turned
 
 FORM = "ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=reaction"
 _KEPT = 32
@@ -130,7 +130,7 @@ class DdsWire:
         self._messages: Any = ros2_messages
         self._topics, self._domain = topics, domain
         self._tool: Tool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
-        self._ends = _opened(domain, topics, ros2_messages)
+        self._ends = _open(domain, topics, ros2_messages)
         self._last, self._silence = -1.0, _PATIENCE
         self._command: Any = None
         try:
@@ -140,7 +140,7 @@ class DdsWire:
 
     @property
     def title(self) -> str:
-        """Its far end."""
+        """Name of the far end."""
         t = self._topics
         return f"an arm in ROS domain {self._domain}, {t.wrench} and {t.place} in, {t.kind} to {t.command}"
 
@@ -155,7 +155,7 @@ class DdsWire:
 
     @property
     def source(self) -> str:
-        """The wrench's topic."""
+        """Topic of the wrench."""
         return f" at {self._topics.wrench}"
 
     def read(self, timeout: float) -> Sense:
@@ -244,12 +244,12 @@ class DdsWire:
         self._command = None
 
     def close(self) -> None:
-        """Leave the domain."""
+        """Leave the domain of DDS."""
         self.stop()
         self._ends = None  # type: ignore[assignment]
 
 
-def _opened(domain: int, topics: Topics, messages: Any) -> _Ends:
+def _open(domain: int, topics: Topics, messages: Any) -> _Ends:
     from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
     from cyclonedds.core import InstanceState, Policy, Qos, ReadCondition, SampleState, ViewState, WaitSet
     from cyclonedds.domain import DomainParticipant

@@ -56,7 +56,7 @@ def header(nanoseconds: int, frame: str) -> Any:
 
 
 def vector(values: Any) -> Any:
-    """Three numbers."""
+    """Message of three numbers."""
     return message("geometry_msgs/msg/Vector3")(*map(float, values))
 
 

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.errors import InputError
+from palpate.wires.at_rest import from_matrix_by_columns
 from palpate.wires.protocol import LostError, Quaternion, Triple
-from palpate.wires.turns import from_matrix_by_columns
 
 _NEARLY = 0.02
 """Smallest singular value of the Jacobian at which joints are still moved [m]: there 20 mm/s take a joint 1 rad/s."""
@@ -34,7 +34,7 @@ class Tool(Protocol):
 
 
 class PoseTool:
-    """By PoseStamped."""
+    """Tool's pose by messages of PoseStamped."""
 
     def __init__(self) -> None:
         self.stamp: float | None = None
@@ -46,7 +46,7 @@ class PoseTool:
         self.stamp, self.frame, self._pose = seconds(sample.header.stamp), sample.header.frame_id, sample.pose
 
     def place(self) -> tuple[Triple, Quaternion]:
-        """As it came."""
+        """Position and orientation as they came."""
         p, o = self._pose.position, self._pose.orientation
         return (p.x, p.y, p.z), (o.x, o.y, o.z, o.w)
 
@@ -86,7 +86,7 @@ class JointTool:
         self.stamp, self.frame = seconds(sample.header.stamp), sample.header.frame_id
 
     def place(self) -> tuple[Triple, Quaternion]:
-        """By forward kinematics."""
+        """Position and orientation by forward kinematics."""
         pose = self._arm.forward_kinematics(self._q)
         x, y, z = (float(v) for v in pose[:3, 3])
         return (x, y, z), from_matrix_by_columns(pose.T.ravel().tolist())

@@ -164,7 +164,7 @@ class Controller:
         self.arm.tick(self.speed)
 
     def value(self, name: str) -> Any:
-        """Of a variable."""
+        """Value of a variable, by its name."""
         x, y, z = self.arm.reading()[6:9]
         # The controller shows what the surface exerts on the tool.
         up = -(self.arm.reading()[2] - self.zero)
@@ -237,7 +237,7 @@ class Server:
         except OSError:
             data = b""
         if not data:
-            self._gone(one)
+            self._lose(one)
         elif port == RTDE:
             self._rtde(self.clients[one], data)
         elif port == DASHBOARD:
@@ -245,7 +245,7 @@ class Server:
         else:
             self.controller.uploaded()
 
-    def _gone(self, one: socket.socket) -> None:
+    def _lose(self, one: socket.socket) -> None:
         self.selector.unregister(one)
         client = self.clients.pop(one, None)
         if client is not None and client is self.controller.master:

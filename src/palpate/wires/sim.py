@@ -5,11 +5,80 @@ from __future__ import annotations
 import math
 import secrets
 import socket
+import struct
 import time
+from typing import NamedTuple
 
 from palpate.errors import InputError
-from palpate.wires import sim_protocol as protocol
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
+
+MAGIC = b"palpate1"
+HELLO, WELCOME, BUSY, STATE, MOVE, STOP = range(6)
+
+_HEAD = struct.Struct("<8sBI")
+_STATE = struct.Struct("<Id13d")
+_MOVE = struct.Struct("<I3d")
+_WELCOME = struct.Struct("<d")
+
+
+class State(NamedTuple):
+    """A reading: its number, the arm's time [s], force [N], torque [N m], position [m], quaternion."""
+
+    number: int
+    time: float
+    values: tuple[float, ...]
+
+
+def packed(kind: int, session: int, body: bytes = b"") -> bytes:
+    """Bytes of a datagram."""
+    return _HEAD.pack(MAGIC, kind, session) + body
+
+
+def unpacked(data: bytes) -> tuple[int, int, bytes] | None:
+    """Kind, session and body of a datagram; None of one that is none."""
+    if len(data) < _HEAD.size:
+        return None
+    magic, kind, session = _HEAD.unpack_from(data)
+    if magic != MAGIC or kind > STOP:
+        return None
+    return kind, session, data[_HEAD.size :]
+
+
+def state(number: int, time: float, values: tuple[float, ...]) -> bytes:
+    """The body of a reading."""
+    return _STATE.pack(number, time, *values)
+
+
+def read_state(body: bytes) -> State | None:
+    """A reading; None of a body that is none."""
+    if len(body) != _STATE.size:
+        return None
+    number, time, *values = _STATE.unpack(body)
+    return State(number, time, tuple(values))
+
+
+def move(number: int, velocity: tuple[float, float, float]) -> bytes:
+    """The body of a command: its number and the tool's speed [m/s]."""
+    return _MOVE.pack(number, *velocity)
+
+
+def read_move(body: bytes) -> tuple[int, tuple[float, float, float]] | None:
+    """A command's number and speed; None of a body that is none."""
+    if len(body) != _MOVE.size:
+        return None
+    number, x, y, z = _MOVE.unpack(body)
+    return number, (x, y, z)
+
+
+def welcome(rate: float) -> bytes:
+    """The body of a welcome: readings a second."""
+    return _WELCOME.pack(rate)
+
+
+def read_welcome(body: bytes) -> float | None:
+    """Readings a second, by the arm's welcome."""
+    return float(_WELCOME.unpack(body)[0]) if len(body) == _WELCOME.size else None
+
 
 _ANSWER = 1.0
 """Within which an arm answers a greeting [s]."""
@@ -33,7 +102,7 @@ class SimWire:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.connect((host, port))
-            self.rate = self._greeted()
+            self.rate = self._greet()
         except OSError as error:
             self._socket.close()
             raise InputError(
@@ -46,7 +115,7 @@ class SimWire:
 
     @property
     def title(self) -> str:
-        """Its far end."""
+        """Name of the far end."""
         return f"a simulated arm at {self._where}, {self.rate:g} readings a second"
 
     @property
@@ -54,23 +123,23 @@ class SimWire:
         """Its stop if this process dies."""
         return "the simulated arm rests after 10 ticks without a command"
 
-    def _greeted(self) -> float:
+    def _greet(self) -> float:
         end = time.monotonic() + _ANSWER
         while (left := end - time.monotonic()) > 0:
-            self._socket.send(protocol.packed(protocol.HELLO, self._session))
+            self._socket.send(packed(HELLO, self._session))
             self._socket.settimeout(min(left, 0.2))
             try:
                 data = self._socket.recv(512)
             except TimeoutError:
                 continue
-            found = protocol.unpacked(data)
+            found = unpacked(data)
             if found is None:
                 raise InputError(f"{self._where} speaks another protocol; is it the port of a simulated arm?")
             kind, session, body = found
-            if kind == protocol.BUSY:
+            if kind == BUSY:
                 raise InputError(f"the arm at {self._where} has another master; end that one first")
-            rate = protocol.read_welcome(body)
-            if kind == protocol.WELCOME and session == self._session and rate:
+            rate = read_welcome(body)
+            if kind == WELCOME and session == self._session and rate:
                 return rate
         raise TimeoutError(0, f"no answer within {_ANSWER:g} s")
 
@@ -103,10 +172,10 @@ class SimWire:
 
     def _sense(self, data: bytes) -> Sense | None:
         received = time.monotonic()
-        found = protocol.unpacked(data)
-        if found is None or found[0] != protocol.STATE or found[1] != self._session:
+        found = unpacked(data)
+        if found is None or found[0] != STATE or found[1] != self._session:
             return None
-        state = protocol.read_state(found[2])
+        state = read_state(found[2])
         if state is None or state.number <= self._last or not math.isfinite(state.time):
             return None
         self._last = state.number
@@ -120,12 +189,10 @@ class SimWire:
         """The greeting has taken it over; the arm rests after ten ticks without a command."""
 
     def write(self, command: Command) -> None:
-        """Send the speed."""
+        """Send the desired speed."""
         self._sent += 1
         try:
-            self._socket.send(
-                protocol.packed(protocol.MOVE, self._session, protocol.move(self._sent, command.velocity))
-            )
+            self._socket.send(packed(MOVE, self._session, move(self._sent, command.velocity)))
         except OSError as error:
             raise LostError(f"a command could not be sent: {error.strerror or error}") from None
 
@@ -133,10 +200,10 @@ class SimWire:
         """Rest; said three times, as a datagram may be lost."""
         for _ in range(3):
             try:
-                self._socket.send(protocol.packed(protocol.STOP, self._session))
+                self._socket.send(packed(STOP, self._session))
             except OSError:
                 return
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the wire's socket."""
         self._socket.close()

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from palpate.wires import sim_protocol as protocol
+from palpate.wires import sim as protocol
 from palpate.wires.rehearsal import OneDirection, arm_of, paced, ready, words_of
 
 _REST = 10
@@ -83,10 +83,10 @@ def _heard(listening: socket.socket, master: Master | None, rate: float) -> Mast
             _send(listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(rate)), address)
         elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
-            _obeyed(master, kind, body)
+            _obey(master, kind, body)
 
 
-def _obeyed(master: Master, kind: int, body: bytes) -> None:
+def _obey(master: Master, kind: int, body: bytes) -> None:
     if kind == protocol.STOP:
         master.speed, master.heard = 0.0, master.heard - _LEFT
     found = protocol.read_move(body) if kind == protocol.MOVE else None

@@ -13,8 +13,8 @@ from typing import Any
 
 from palpate.errors import InputError
 from palpate.wires.apart import ApartWire
+from palpate.wires.at_rest import from_rotation_vector
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
-from palpate.wires.turns import from_rotation_vector
 
 _READ = ["timestamp", "actual_TCP_pose", "actual_TCP_force", "robot_status_bits", "safety_status_bits"]
 _POLL = 2e-4
@@ -78,7 +78,7 @@ class RtdeWire:
 
     @property
     def title(self) -> str:
-        """Its far end."""
+        """Name of the far end."""
         return f"a UR at {self._address}, over RTDE, moved by {'servoL' if self._servo else 'speedL'}"
 
     @property
@@ -120,14 +120,14 @@ class RtdeWire:
 
     def tare(self) -> None:
         """zero_ftsensor of the controller."""
-        self._taken().zeroFtSensor()
+        self._take().zeroFtSensor()
         time.sleep(0.05)
 
     def begin(self, silence: float = SILENCE) -> None:
         """Upload the control script, and let the controller watch over the commands: RTDE's watchdog stops the arm."""
-        self._taken().setWatchdog(1.0 / min(silence, SILENCE))
+        self._take().setWatchdog(1.0 / min(silence, SILENCE))
 
-    def _taken(self) -> Any:
+    def _take(self) -> Any:
         if self._control is None:
             from rtde_control import RTDEControlInterface
 
@@ -166,7 +166,7 @@ class RtdeWire:
         control.disconnect()
 
     def close(self) -> None:
-        """Disconnect."""
+        """Disconnect from the controller."""
         self.stop()
         self._receive.disconnect()
 

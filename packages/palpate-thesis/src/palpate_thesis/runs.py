@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
-from palpate.bench.sequence import INTERRUPTED
+from palpate.bench.force_input import INTERRUPTED
 from palpate.bench.speed import cores
 from palpate.records import Record
 from palpate_thesis.laboratory.laboratory import CHOSEN, Laboratory

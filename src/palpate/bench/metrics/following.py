@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from palpate.bench.force_input import LOST
 from palpate.bench.metrics.window import (
     BAND,
     FRONT_ENDS,
@@ -19,7 +20,6 @@ from palpate.bench.metrics.window import (
     losses,
     rms,
 )
-from palpate.bench.sequence import LOST
 
 JOINTS = (1, 2, 3)
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.sequence import CONTACT, DIVERGED, LOST, LOST_CONTACT
+from palpate.bench.force_input import CONTACT, DIVERGED, LOST, LOST_CONTACT
 from palpate.records import Record
 
 BAND = 0.05

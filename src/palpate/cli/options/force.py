@@ -10,12 +10,14 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli.options.names import QUIET, LoopArm
+from palpate.cli.options.values import with_std
 from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.force import Arm
     from palpate.force.inner_loop import InnerLoop
+    from palpate.identification.indenter import Indenter
 
 
 @Parameter(name="*", group=Group("The arm", sort_key=1))
@@ -81,7 +83,7 @@ class SurfaceOptions:
 
     @property
     def cap(self) -> float | None:
-        """The stiffest [N/m]."""
+        """Stiffness of the stiffest surface [N/m]."""
         return in_si_if_given("--stiffness-cap", self.stiffness_cap, "stiffness")
 
 
@@ -103,7 +105,7 @@ class PressOptions:
 
     @property
     def desired(self) -> float:
-        """F_d [N]."""
+        """Desired force F_d [N]."""
         return in_si("--force", self.force, "force")
 
     @property
@@ -198,3 +200,41 @@ def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
     given = {role: name for role, name in names.items() if name is not None}
     record = read_log(log, rate=columns.rate, **given)
     return identify_inner_loop(record["time"], record["command"], record["position"], where=str(log))
+
+
+@Parameter(name="*", group=Group("Young's modulus", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class IndenterOptions:
+    """Shape of the indenter, if it is known.
+
+    Parameters
+    ----------
+    indenter
+        sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or cone:70:deg.
+        It adds Young's modulus E.
+    poisson
+        Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given.
+    """
+
+    indenter: str | None = None
+    poisson: Annotated[str | None, SIGNED] = None
+
+    def check(self) -> None:
+        """Check the options before any work is done."""
+        from palpate.identification.indenter import check_poisson
+
+        if self.poisson is not None and self.indenter is None:
+            raise InputError("--poisson needs a known shape of the indenter; add --indenter")
+        check_poisson(self.ratio)
+        self.shape()
+
+    def shape(self) -> Indenter | None:
+        """The shape; None if not given."""
+        from palpate.identification.indenter import Indenter
+
+        return None if self.indenter is None else Indenter.parse(self.indenter)
+
+    @property
+    def ratio(self) -> tuple[float, float] | None:
+        """Poisson's ratio, with its standard deviation."""
+        return with_std("poisson", self.poisson, "0.45:0.05")

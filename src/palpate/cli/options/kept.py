@@ -111,7 +111,7 @@ def expanded(argv: Sequence[str], app: App) -> list[str]:
     typed = {word.partition("=")[0] for word in words if word.startswith("--")}
     own = set(flags) - _TYPED.get(words[0], set())
     kept = {key: value for key, value in kept.items() if key in own and not typed & set(flags[key])}
-    return [*words, *(word for key, value in kept.items() for word in _written(key, value))]
+    return [*words, *(word for key, value in kept.items() for word in _write(key, value))]
 
 
 def _commands(app: App) -> list[str]:
@@ -173,7 +173,7 @@ def _check(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, A
     return kept
 
 
-def _written(key: str, value: Any) -> list[str]:
+def _write(key: str, value: Any) -> list[str]:
     if isinstance(value, bool):
         return [f"--{key}"] if value else []
     if isinstance(value, list):

@@ -19,15 +19,15 @@ MODELS = (
 """Those of `palpate.identification.models`, which the help does not import."""
 
 
-def _known(*names: str) -> Any:
+def _known_names(*names: str) -> Any:
     """One of these names, or another."""
     return Literal[names] | str
 
 
-def _shipped(*folders: str) -> Any:
+def _shipped_names(*folders: str) -> Any:
     """The same of the files that come with palpate in some of its folders."""
     files = [path for folder in folders for path in (Path(__file__).parents[2] / folder).glob("*.toml")]
-    return _known(*sorted(path.stem for path in files))
+    return _known_names(*sorted(path.stem for path in files))
 
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
     SerialArm = str
     Study = str
 else:
-    Controller = _known("cautious", "hybrid", "proportional-integral", "impedance")
-    Experiment = _shipped("bench/experiments", "bench/presses")
-    LoopArm = _shipped("force/arms")
-    Model = _known(*MODELS)
-    Mode = _known("torque", "position")
-    Physics = _known("own", "mujoco")
-    Preset = _shipped("logs/presets")
-    SerialArm = _shipped("robots/serial/arms")
-    Study = _shipped("studies/shipped")
+    Controller = _known_names("cautious", "hybrid", "proportional-integral", "impedance")
+    Experiment = _shipped_names("bench/experiments", "bench/presses")
+    LoopArm = _shipped_names("force/arms")
+    Model = _known_names(*MODELS)
+    Mode = _known_names("torque", "position")
+    Physics = _known_names("own", "mujoco")
+    Preset = _shipped_names("logs/presets")
+    SerialArm = _shipped_names("robots/serial/arms")
+    Study = _shipped_names("studies/shipped")

@@ -66,7 +66,7 @@ class AskOptions:
 
     @property
     def desired(self) -> float:
-        """F_d [N]."""
+        """Desired force F_d [N]."""
         if self.force is None:
             raise InputError("the desired force is missing; add --force, as 20:N")
         force = in_si("--force", self.force, "force")

@@ -3,14 +3,77 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget
-from palpate.identification.estimators.prediction import Prediction
+from palpate.identification.models import Model, Motion
 from palpate.identification.problem import Problem
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The force that a model predicts for a log.
+
+    Args:
+        model: which.
+        theta: its parameters by name.
+        lag: of the force behind the position [s].
+        force, residuals: predicted, and what it leaves of the measured one, shape (n,).
+        r2, rmse: share of the variance that it explains, and rms of what it leaves.
+    """
+
+    model: Model
+    theta: dict[str, float]
+    lag: float
+    force: Array
+    residuals: Array
+    r2: float
+    rmse: float
+
+    @classmethod
+    def of(
+        cls, model: Model, motion: Motion, force: Array, theta: dict[str, float], lag: float
+    ) -> Prediction:
+        """By a model; an offset that is not among the parameters is that of the mean.
+
+        Args:
+            model: which.
+            motion: the position.
+            force: measured, shape (n,).
+            theta: its parameters.
+            lag: of the force [s].
+        """
+        columns = model.columns(motion, theta, lag)
+        predicted = sum(
+            (theta.get(n, 0.0) * c for n, c in zip(model.linear, columns, strict=True)), np.zeros(len(force))
+        )
+        if "offset" in model.linear and "offset" not in theta:
+            offset = float(np.mean(force - predicted))
+            theta, predicted = {**theta, "offset": offset}, predicted + offset
+        residuals = force - predicted
+        rmse = float(np.sqrt(np.mean(residuals**2)))
+        spread = float(np.mean((force - force.mean()) ** 2))
+        return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
+
+    def in_time(self, motion: Motion, force: Array) -> Prediction:
+        """The same model, its linear parameters by least squares in time, which see a motion that no octave has.
+
+        Args:
+            motion: the position.
+            force: measured, shape (n,).
+        """
+        columns = np.column_stack(self.model.columns(motion, self.theta, self.lag))
+        size = np.abs(columns).max(axis=0)
+        scaled, *_ = np.linalg.lstsq(columns / np.where(size > 0, size, 1.0), force, rcond=1e-9)
+        theta = dict(zip(self.model.linear, (scaled / np.where(size > 0, size, 1.0)).tolist(), strict=True))
+        return Prediction.of(self.model, motion, force, self.theta | theta, self.lag)
+
+    def __getitem__(self, name: str) -> float:
+        return self.theta[name]
 
 
 @dataclass(frozen=True)
@@ -62,3 +125,24 @@ class Answer:
             cause: whole * float(np.sqrt(part.variance[i] / total)) for cause, part in self.budget.items()
         }
         return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def unrecovered(found: Answer) -> str:
+    """Why what a branch still had of the contact before speaks against the answer; empty if it does not.
+
+    A model's branch follows the probe into the air. The surface does not: left alone it comes back with tau (1 + K1/K),
+    the creep time of a standard linear solid. What is then left of the branch at the next touch has to be less than K1
+    is known to.
+    """
+    spans = found.problem.contacts.spans
+    if "K1" not in found.names or len(spans) < 2:
+        return ""
+    stiffness, branch = found["K"], found["K1"]
+    if stiffness <= 0 or branch <= 0:
+        return ""
+    gaps = [after[0] - before[1] for before, after in pairwise(spans)]
+    creep = found["tau"] * (1 + branch / stiffness)
+    left = float(np.exp(-min(gaps) * found.problem.motion.chain.dt / creep))
+    if left <= found.half_of("K1") / branch:
+        return ""
+    return f"the surface is touched again before it has recovered: {left:.0%} of its branch is left"

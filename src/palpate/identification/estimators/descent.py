@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, Motion, NonlinearParameter
-from palpate.identification.prior import LAG, NOTHING, Lag, Prior
+from palpate.identification.options import LAG, NOTHING, Lag, Prior
 
 _ROUNDS = 30
 _CONVERGED = 1e-6
@@ -96,8 +96,8 @@ class Descent:
         for _ in range(_ROUNDS):
             slopes = self._slopes(point, outer)
             jacobian, residuals = self._with_known(np.column_stack([point.columns, slopes]), point, outer)
-            step = _damped(jacobian, residuals, len(point.theta), damping)
-            trial = self.at(*_moved(point, outer, step[len(point.theta) :]))
+            step = _damped_step(jacobian, residuals, len(point.theta), damping)
+            trial = self.at(*_move(point, outer, step[len(point.theta) :]))
             gain = 1 - trial.cost / point.cost if point.cost else 0.0
             if gain > -_ROUNDING:
                 point, damping = (trial if gain > 0 else point), max(damping / 10, _UNDAMPED)
@@ -206,7 +206,7 @@ def _lag_parameter(motion: Motion, lag: Lag) -> NonlinearParameter:
     )
 
 
-def _damped(jacobian: Array, residuals: Array, linear: int, damping: float) -> Array:
+def _damped_step(jacobian: Array, residuals: Array, linear: int, damping: float) -> Array:
     """One step; only the outer parameters are damped, because the linear ones are solved for exactly."""
     scale = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
     scale[scale == 0] = 1.0
@@ -217,7 +217,7 @@ def _damped(jacobian: Array, residuals: Array, linear: int, damping: float) -> A
     return step
 
 
-def _moved(point: Point, outer: Sequence[NonlinearParameter], step: Array) -> tuple[dict[str, float], float]:
+def _move(point: Point, outer: Sequence[NonlinearParameter], step: Array) -> tuple[dict[str, float], float]:
     """The nonlinear parameters and the lag after a step, within their limits."""
     nonlinear, lag = dict(point.nonlinear), point.lag
     for own, change in zip(outer, step, strict=True):

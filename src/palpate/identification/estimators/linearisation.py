@@ -8,24 +8,33 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.averaging import Member, averaged, mean_budget, members, of_octaves
-from palpate.identification.estimators.budget import Budget, Spread
-from palpate.identification.estimators.by_octave import Solution, System, system_of
-from palpate.identification.estimators.descent import linearised, slope_of_lag
-from palpate.identification.estimators.effects import FRICTION, effect_columns
-from palpate.identification.estimators.fit import fit
-from palpate.identification.estimators.noise_lines import (
+from palpate.identification.estimators.answer import Answer, Prediction
+from palpate.identification.estimators.averaging import (
+    Member,
+    averaged,
     derivative_products,
+    mean_budget,
+    members,
+    of_octaves,
     position_lines,
     seen,
     sensor_lines,
 )
-from palpate.identification.estimators.octaves import Octaves, Segment, longest_of, octaves_of
-from palpate.identification.estimators.prediction import Prediction
+from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
+from palpate.identification.estimators.descent import linearised, slope_of_lag
+from palpate.identification.estimators.fit import fit
+from palpate.identification.estimators.octaves import (
+    Octaves,
+    Segment,
+    Solution,
+    System,
+    longest_of,
+    octaves_of,
+    system_of,
+)
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
-from palpate.identification.prior import LAG, mass_std
+from palpate.identification.options import LAG, mass_std
 from palpate.identification.problem import Problem
 
 
@@ -86,7 +95,7 @@ class Linearisation:
         motion = problem.motion
         dt = float(np.median(np.diff(problem.time)))
         lag = theta.get(LAG, problem.lag.value)
-        at, own, target = _linearised(problem, model, lag, theta)
+        at, own, target = _linearise(problem, model, lag, theta)
         free = list(own)
         effects = effect_columns(motion, model, lag, segments)
         drift = problem.contacts.drift
@@ -158,7 +167,9 @@ class Linearisation:
             self.problem, self.segments, self.octaves, self.use, self.system, solution
         )
         both = self._with_position(solution, sensor)
-        explained, left, hidden = self._explained(solution, both)  # of what may be another force's, nothing
+        explained, left, hidden = self._explained_part(
+            solution, both
+        )  # of what may be another force's, nothing
         question = self.system, solution.noise, both, self._forces()
         likely = members(*question)
         solution = averaged(likely)
@@ -240,7 +251,7 @@ class Linearisation:
         by_prior = (slope * [reach.get(name, 0.0) for name in self.names]) ** 2
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
-    def _explained(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
+    def _explained_part(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
         """Share of the force in contact that the model explains, without noise.
 
         Returns:
@@ -263,7 +274,7 @@ class Linearisation:
         return 1 - left / whole, float(np.sqrt(left / count)), float(np.sqrt(beyond / whole))
 
 
-def _linearised(
+def _linearise(
     problem: Problem, model: Model, lag: float, theta: dict[str, float]
 ) -> tuple[dict[str, float], dict[str, Array], Array]:
     """Where a nonlinear model is linearised, the columns of the parameters, and the force that they add up to.

@@ -2,22 +2,167 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
+from palpate.identification import in_series
 from palpate.identification.estimators.budget import NORMAL
-from palpate.identification.estimators.octaves import Segment
-from palpate.identification.evidence.loadings import FEWEST, Loading, loadings_in, of_speed, read_later
-from palpate.identification.evidence.relaxation import relaxation
-from palpate.identification.evidence.slope import apart, line, slope_between
-from palpate.identification.evidence.work import unloading_of
+from palpate.identification.estimators.octaves import Segment, segments_of
+from palpate.identification.evidence.slope import (
+    FEWEST,
+    STILL,
+    Loading,
+    Slope,
+    apart,
+    line,
+    loadings_in,
+    of_speed,
+    read_later,
+    slope_between,
+    slope_of,
+)
+from palpate.identification.evidence.spectrum import dynamic_stiffness, steady_point, working_point
+from palpate.identification.least_squares import noise_of
+from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.result import Press, Tangent
+from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.tangents import SteadyPress
+from palpate.signals.samples import runs
+
+
+def relaxation(
+    problem: Problem, lag: float, segments: list[Segment], slope: Slope | None
+) -> Relaxation | None:
+    """Of the longest hold after a loading, what the position gives back by its slope left aside."""
+    depth = problem.motion.moved(0, lag)
+    speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
+    still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
+    best: tuple[int, int] | None = None
+    for s in segments:
+        for a, b in runs(still[s.first : s.last]):
+            if b - a >= 4 * FEWEST and a > 0 and (best is None or b - a > best[1] - best[0]):
+                best = (s.first + a, s.first + b)
+    if best is None:
+        return None
+    rows = slice(*best)
+    moved = depth[rows] - depth[best[1] - 1]
+    given, doubt = (0.0 * moved, 0.0) if slope is None else (slope.stiffness * moved, slope.half)
+    return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
+
+
+def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
+    """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
+
+    Args:
+        force: less what the position gives back meanwhile, shape (n,) [N].
+        doubt: what is not known of that [N].
+        time: shape (n,) [s].
+    """
+    from scipy.optimize import isotonic_regression
+
+    falls = np.asarray(isotonic_regression(force, increasing=False).x)
+    noise = noise_of(force - falls, np.arange(len(force)), 2)
+    few = max(len(force) // 20, 2)
+    begin, end = float(np.median(falls[:few])), float(np.median(falls[-few:]))
+    least = np.hypot(2 * np.sqrt(2 * noise.variance * len(force) / noise.effective / few), doubt)
+    if begin <= 0 or begin - end <= least:
+        return None
+    half = int(np.argmax(falls <= (begin + end) / 2))
+    return Relaxation((begin - end) / begin, float(time[half] - time[0]), float(time[-1] - time[0]))
+
+
+_FEWEST = 6
+
+
+@dataclass(frozen=True)
+class Unloading:
+    """Results of the unloadings.
+
+    Args:
+        curve: depth [m] and force [N] on that of the deepest contact, shape (2, n); empty if there is none.
+        loss: share of the work put into it that does not come back; None without a unloading.
+        late: by how much the force is read after the position, if it gives back more work than it took, and the
+            half-width of that [s]; None if it does not, or if the contacts do not agree on it.
+    """
+
+    curve: Array
+    loss: float | None
+    late: tuple[float, float] | None
+
+
+def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloading:
+    """The unloadings of a log.
+
+    Args:
+        problem: of the log.
+        lag: of the force behind the position, taken out [s].
+        segments: of its rows, one at least.
+    """
+    motion = problem.motion
+    depth, speed, force, time = motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time
+    s = max(segments, key=lambda s: float(np.ptp(depth[s.first : s.last])))
+    own = slice(s.first, s.last)
+    turn = _turn(depth[own])
+    if turn is None:
+        return Unloading(np.empty((2, 0)), None, None)
+    rows = [slice(s.first, s.last) for s in segments if _turn(depth[s.first : s.last]) is not None]
+    late = _late([(depth[r], speed[r], force[r], time[r]) for r in rows])
+    x, f = depth[own], force[own]
+    into, back = _works(x, f)
+    return Unloading(np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late)
+
+
+def _turn(x: Array) -> int | None:
+    """The deepest row of a contact that is left by at least half of the loading; None of another."""
+    top = int(np.argmax(x))
+    left = len(x) - top >= _FEWEST and x[top] - x[-1] >= 0.5 * (x[top] - x[0])
+    return top if top >= _FEWEST and left else None
+
+
+def _ends(x: Array) -> tuple[int, int]:
+    """The rows between which a contact goes in and out over the same depths."""
+    top = int(np.argmax(x))
+    start = max(float(x[0]), float(x[top:].min()))
+    beyond = x[top:] <= start
+    return int(np.argmax(x[: top + 1] >= start)), top + (
+        int(np.argmax(beyond)) if beyond.any() else len(x) - 1 - top
+    )
+
+
+def _works(x: Array, f: Array) -> tuple[float, float]:
+    """Work put in, and what of it comes back over the same depths [J]; a shaken contact takes and gives many times."""
+    first, last = _ends(x)
+    way = np.diff(x[first : last + 1])
+    work = (f[first:last] + f[first + 1 : last + 1]) / 2 * way
+    return float(work[way > 0].sum()), -float(work[way < 0].sum())
+
+
+def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, float] | None:
+    """Lateness of the force by the work that it gives back beyond what it took.
+
+    A force that is read T late does less work in loading and unloading, by T times the integral of F' x'; no passive
+    surface gives back more than it takes.
+
+    Args:
+        contacts: depth, speed, force and time of each, shape (n,).
+    """
+    late = []
+    for x, v, f, t in contacts:
+        first, last = _ends(x)
+        rows = slice(first, last + 1)
+        rate = float(np.trapezoid(np.gradient(f, t)[rows] * v[rows], t[rows]))
+        if rate > 0:
+            into, back = _works(x, f)
+            late.append((back - into) / rate)
+    if len(late) < 2:
+        return None
+    mean = random_effects(np.array(late), np.full(len(late), 1e-12))
+    return (mean.value, mean.half) if mean.value > mean.half else None
+
 
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 
@@ -113,3 +258,55 @@ def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.in
 def _thin(x: Array, f: Array) -> Array:
     step = max(len(x) // _SHOWN, 1)
     return np.stack([x[::step], f[::step]])
+
+
+Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
+
+
+def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
+    """Dynamic stiffness, press and working point of the surface.
+
+    Args:
+        problem: of the log.
+        options: with the tolerance, and the stiffness in series with the surface.
+        unit: of a stiffness.
+        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
+    """
+    segments = segments_of(problem.motion.rows, problem.spans)
+    if not segments:
+        return (), None, None
+    lag = problem.lag
+    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
+    whole = problem.with_touches or problem  # a press may be over before a filter has settled
+    press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
+    steady = problem.contacts.press
+    if steady is not None:
+        press = at_constant_speed(steady, press, problem.origin)
+    if options.series_stiffness is not None:
+        series = options.series_stiffness, options.series_std
+        spectrum = in_series.spectrum_without_series(spectrum, *series)
+        press = None if press is None else in_series.press_without_series(press, *series)
+    if options.series_mass is not None:
+        spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
+    if steady is not None:
+        return spectrum, press, steady_point(steady.headline, problem, options, unit)
+    point = working_point(whole, spectrum, options, unit, hidden)
+    return spectrum, press, point
+
+
+def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
+    """Stiffness at a working point by another force at the same rows [N/m]; None if it shows none.
+
+    Args:
+        problem: of the log.
+        force: as a model foretells it, shape (m,).
+        point: an octave, or the press.
+    """
+    problem = replace(problem, force=force)
+    segments = segments_of(problem.motion.rows, problem.spans)
+    if point.source == "press":
+        slope = slope_of(loadings_in(problem, problem.lag.value, segments))
+        return None if slope is None else slope.stiffness
+    spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
+    near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]
+    return near[0].storage if near else None

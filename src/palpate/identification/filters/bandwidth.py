@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.filters.position_noise import position_noise
-from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters.sensor_path import SensorPath, position_noise
 from palpate.identification.models import Motion
 from palpate.signals.samples import periodogram
 

@@ -3,6 +3,10 @@
 The force went through a low-pass and was sampled before it came into the log. So the position goes through the same
 low-pass and is read at the same instants: f = M a + B v + K x holds among what comes out, whatever the frequency, and
 the noise of the readings stays as white as the sensor made it.
+
+Two kinds of noise count: white noise of the position itself, and jumps of it, white noise of its increments, as a slow
+motion through a coarse encoder makes them. Power of the increments per sample at f of the sampling rate:
+jump^2 + white^2 4 sin^2(pi f); no motion of a robot reaches the upper frequencies, so there it is the noise's alone.
 """
 
 from __future__ import annotations
@@ -14,8 +18,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.identification.filters.position_noise import PositionNoise
 from palpate.signals.low_pass import LowPass, Taps, read, taps
+
+_FROM = 0.2
+"""Share of the sampling rate above which there is no motion."""
+_SEGMENT = 256
+_IN_BAND = 0.5
+_FEWEST = 10
+"""Single counts that show what one is worth."""
+
+
+@dataclass(frozen=True)
+class PositionNoise:
+    """Deviations in the position's unit.
+
+    Args:
+        white: of a sample.
+        jump: of what is added from sample to sample.
+        count: what the position moves by when its encoder counts on; 0 where single counts are not seen.
+    """
+
+    white: float
+    jump: float
+    count: float = 0.0
+
+    def power(self, frequency: Array, dt: float) -> Array:
+        """Of a line of an orthonormal transform of the position, at frequencies [Hz].
+
+        An encoder's error never leaves its count: below the rate jump^2/count^2 of its steps it is flat, with a whole
+        variance of count^2/12.
+        """
+        step = 4 * np.sin(np.pi * np.minimum(frequency * dt, 0.5)) ** 2
+        jumps = _IN_BAND * self.jump**2 / np.maximum(step, 1e-12)
+        if self.count and self.jump:
+            jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
+        found: Array = self.white**2 + jumps
+        return found
+
+    def spread(self, weights: Array) -> Array:
+        """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k).
+
+        Jumps have no power of their own in the position itself, but a position that wanders has its acceleration
+        against it: E[e e''] = -E[e'^2]. Of their power half is counted: an encoder's error never leaves its count, so
+        its jumps undo each other, and toward the low frequencies of a motion their power falls below what it is above.
+
+        Args:
+            weights: of the filter's samples, shape (k, n), k of 3 or more.
+        """
+        steps = np.cumsum(weights, axis=1)
+        steps[0] = 0.0
+        of_jumps = steps @ steps.T
+        of_jumps[0, 2] = of_jumps[2, 0] = -of_jumps[1, 1]
+        found: Array = self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps
+        return found
+
+
+NOISELESS = PositionNoise(0.0, 0.0)
+
+
+def position_noise(stretches: list[Array]) -> PositionNoise:
+    """Measure it on stretches of a position, each of shape (n_i,); those shorter than 16 samples say nothing."""
+    from scipy.optimize import nnls
+
+    power, weight = np.zeros(_SEGMENT // 2 + 1), 0.0
+    frequency = np.fft.rfftfreq(_SEGMENT)
+    for stretch in stretches:
+        if len(stretch) >= 16:
+            own, count = _power(np.diff(stretch))
+            power += count * np.interp(frequency, np.linspace(0, 0.5, len(own)), own)
+            weight += count
+    if weight == 0:
+        return NOISELESS
+    above = frequency >= _FROM
+    shape = np.column_stack([4 * np.sin(np.pi * frequency[above]) ** 2, np.ones(int(above.sum()))])
+    scale = float(np.mean(power[above])) or 1.0
+    found, _ = nnls(shape, power[above] / scale)
+    white, jump = np.sqrt(found * scale / weight)
+    return PositionNoise(float(white), float(jump), _count(stretches))
+
+
+def noise_within(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp]) -> PositionNoise:
+    """That of a position in contact.
+
+    Args:
+        position: shape (n,).
+        rows: in contact, shape (m,).
+        spans: number of the contact that each is in, one after the other, shape (m,).
+    """
+    inside = np.split(rows, np.flatnonzero(np.diff(spans)) + 1)
+    return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
+
+
+def _count(stretches: list[Array]) -> float:
+    """From changes with none before and none after them. Of several encoders the coarsest counts most."""
+    alone = []
+    for stretch in stretches:
+        steps = np.abs(np.diff(stretch))
+        if len(steps) > 2:
+            still = steps == 0
+            alone.append(steps[1:-1][still[:-2] & still[2:] & ~still[1:-1]])
+    found = np.concatenate(alone) if alone else np.zeros(0)
+    return float(np.sum(found**3) / np.sum(found**2)) if len(found) >= _FEWEST else 0.0
+
+
+def _power(increments: Array) -> tuple[Array, float]:
+    """Mean periodogram of overlapping windowed segments, shape (size // 2 + 1,), and the samples it stands for."""
+    size = min(_SEGMENT, len(increments))
+    segments = np.lib.stride_tricks.sliding_window_view(increments, size)[:: max(size // 2, 1)]
+    window = np.hanning(size + 2)[1:-1]
+    spectra = np.abs(np.fft.rfft(segments * window, axis=1)) ** 2
+    return spectra.mean(axis=0) / float(window @ window), float(len(increments))
+
 
 DERIVATIVES = 5
 _NEAR = 0.25

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.identification.filters.position_noise import PositionNoise
+from palpate.identification.filters.sensor_path import PositionNoise
+from palpate.signals.low_pass import LowPass
 from palpate.signals.samples import convolve
 
 ORDER = 5
@@ -132,7 +133,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
     first = int(np.floor(lag / chain.dt)) - 1
     count = int(np.ceil(_LENGTH / (chain.rate * chain.dt))) + 3
     time = (first + np.arange(count)) * chain.dt - lag
-    curve = _integrated(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
+    curve = _integrate(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
     taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / chain.dt
     if derivative == 0:
         taps /= taps.sum()  # the cut-off tail would otherwise cost 1e-9 of the level
@@ -140,7 +141,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
     return taps, first
 
 
-def _integrated(w: float, derivative: int, time: Array) -> Array:
+def _integrate(w: float, derivative: int, time: Array) -> Array:
     """The impulse response integrated twice and then differentiated `derivative` times."""
     tau = w * np.maximum(time, 0.0)
     if derivative == 0:
@@ -206,3 +207,58 @@ def block_means(signal: Array, size: int) -> Array:
     count = len(signal) // size
     means: Array = signal[: count * size].reshape(count, size).mean(axis=1)
     return means
+
+
+class FilterBank:
+    """D(0)/D(s) and its derivatives up to D's order, exact for straight lines between the readings.
+
+    Args:
+        D: ascending, shape (order + 1,).
+        dt: sampling period [s].
+    """
+
+    def __init__(self, D: Array, dt: float):
+        from scipy.signal import cont2discrete, ss2tf
+
+        order = len(D) - 1
+        self.dt = dt
+        per_sample = D / dt ** np.arange(order + 1)
+        drift = np.eye(order, k=1)
+        drift[-1] = -per_sample[:-1] / per_sample[-1]
+        gain = np.zeros((order, 1))
+        gain[-1] = per_sample[0] / per_sample[-1]
+        through = np.zeros((order + 1, 1))
+        through[-1] = gain[-1]
+        states = np.vstack([np.eye(order), drift[-1]])
+        *discrete, _ = cont2discrete((drift, gain, states, through), 1.0, method="foh")
+        self.numerators, self.denominator = ss2tf(*discrete)
+
+    def memory(self, count: int) -> Array:
+        """Response of the outputs to the time before the first sample: columns of shape (count, order).
+
+        They span it from the sample `order` on.
+        """
+        from scipy.signal import lfilter
+
+        order = len(self.denominator) - 1
+        kick = np.zeros(count + order)
+        kick[order - 1] = 1.0
+        ringing = lfilter([1.0], self.denominator, kick)
+        return np.column_stack([ringing[order - 1 - k : count + order - 1 - k] for k in range(order)])
+
+    def __call__(self, signal: Array, derivative: int) -> Array:
+        """The filtered signal or a derivative of it, shape (n,); it rests at its first value before."""
+        from scipy.signal import lfilter
+
+        out: Array = lfilter(self.numerators[derivative], self.denominator, signal - signal[0])
+        return out / self.dt**derivative + (signal[0] if derivative == 0 else 0.0)
+
+
+def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
+    """A signal, shape (n,), behind Butterworth low-passes, exact for straight lines between the samples."""
+    from scipy.signal import butter
+
+    for order, cutoff in low_pass.sections:
+        _, denominator = butter(order, 2 * np.pi * cutoff, analog=True)
+        signal = FilterBank(np.asarray(denominator[::-1]), dt)(signal, 0)
+    return signal

@@ -1,4 +1,9 @@
-"""The regression problem: position and force behind the same front end, at the rows in contact."""
+"""The regression problem: position and force behind the same front end, at the rows in contact.
+
+In contact, the place of the surface is only an offset, and the first depths are behind the filter's settling. But a
+contact whose stiffness grows from zero shows its exponent there more than anywhere. Models that are one-sided by
+themselves, with the place of the surface as a parameter, hold before the touch as after it, so nothing has to settle.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,135 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
+from palpate.errors import InputError
+from palpate.identification.causes import Code
 from palpate.identification.contacts import Contacts
 from palpate.identification.filters.bandwidth import highest_motion
+from palpate.identification.filters.state_variable import white_noise
 from palpate.identification.models import Motion
-from palpate.identification.prior import Lag
-from palpate.identification.problem.touch import Touch
+from palpate.identification.options import Lag
+from palpate.identification.sampling import Channels
+
+Rows = NDArray[np.intp]
+
+FREE_ROWS = 64
+"""Rows of a stretch out of contact below which it tells nothing of the force's noise."""
+_FEWEST = 30
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Both channels behind a front end.
+
+    Args:
+        motion: the position, counted from the surface into it, at the rows in contact.
+        origin: position of the surface on the log's own scale [m].
+        force: at every row of the front end, shape (n,).
+        spans: number of the contact that each row in contact belongs to, shape (m,).
+        usable: rows that remember valid readings alone, shape (n,).
+        begins: first row behind the touch of each contact.
+        memory: rows that a disturbance is remembered for.
+        free: the force out of contact, in stretches of rows.
+        lag: prior of the force's.
+        read: the force before any filter, at the samples of the position; None if it is another's.
+        filtered: part of the force's lag that the position was sent through beforehand [s].
+        rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
+            are as white as their noise.
+    """
+
+    motion: Motion
+    origin: float
+    force: Array
+    spans: Rows
+    usable: Mask
+    begins: list[int]
+    memory: int
+    free: tuple[Array, ...]
+    lag: Lag
+    read: Array | None = None
+    filtered: float = 0.0
+    rounding: float = 0.0
+
+
+def numbered(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
+    """The rows of all contacts, and the number of each one's contact.
+
+    Args:
+        contacts: rows of each.
+        channels: which say why rows are lost.
+
+    Raises:
+        InputError: too few rows in contact.
+    """
+    rows = np.concatenate(contacts)
+    if len(rows) < _FEWEST:
+        text = (
+            f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed: log longer or faster"
+        )
+        lost = [w.text for w in channels.warnings if w.code in (Code.SATURATED, Code.MISSING_SAMPLES)]
+        raise InputError(f"{text} ({'; '.join(lost)})" if lost else text)
+    return rows, np.repeat(np.arange(len(contacts)), [len(own) for own in contacts])
+
+
+def ends(channels: Channels, contacts: Contacts) -> list[int]:
+    """The sample after the last of each contact by the raw force; at least half of the filtered one.
+
+    A filter shows contact for a while after the probe has gone, but what it shows then is no contact any more.
+    """
+    if contacts.bonded:
+        return [end for _, end in contacts.spans]
+    clear = max(contacts.threshold, contacts.resting + 4 * white_noise(channels.force))
+    found = []
+    for begin, end in contacts.spans:
+        above = np.flatnonzero(contacts.force_sign * channels.force[begin:end] > clear)
+        middle = begin + (end - begin) // 2
+        found.append(max(begin + int(above[-1]) + 1, middle) if len(above) else end)
+    return found
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Rows that hold the touches.
+
+    Args:
+        rows: shape (m,).
+        spans: number of the contact that each belongs to, shape (m,).
+        force: filtered, less what it rests at out of contact, shape (m,).
+    """
+
+    rows: Rows
+    spans: Rows
+    force: Array
+
+
+def touching(seen: Seen, resting: float, reach: int = 0) -> Touch | None:
+    """The rows in contact and those before each touch; None if no touch is in the log.
+
+    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
+
+    Args:
+        seen: the force and the rows in contact, by a front end.
+        resting: what the force rests at out of contact [N].
+        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
+    """
+    rows, spans, memory = seen.motion.rows, seen.spans, seen.memory
+    before, left = [], 0
+    edges = np.flatnonzero(np.diff(spans, prepend=-1))
+    for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
+        begin, wanted = seen.begins[number], max(memory, reach * int(own[-1] - own[0]))
+        first = max(begin - wanted, left + memory, memory)
+        if first < begin:
+            step = int(own[1] - own[0]) if len(own) > 1 else 1
+            fresh = np.arange(own[0] - step, first - 1, -step)
+            before += [(row, number) for row in fresh if seen.usable[row]]
+        left = int(own[-1])
+    if not before:
+        return None
+    fresh, numbers = np.array(before, dtype=np.intp).T
+    every = np.r_[rows, fresh]
+    order = np.argsort(every)
+    return Touch(every[order], np.r_[spans, numbers][order], seen.force[every[order]] - resting)
+
 
 MOST_ROWS = 1 << 16
 """Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""

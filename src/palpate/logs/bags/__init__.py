@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from palpate.logs.bags.bag import Bag, Topic
-from palpate.logs.bags.fields import Stream
+from palpate.logs.bags.reading import Stream
 
 __all__ = ["Bag", "Stream", "Topic"]

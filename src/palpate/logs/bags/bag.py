@@ -14,8 +14,7 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.files.limits import Budget, Limits
-from palpate.logs.bags.fields import Stream, finder, leaves, no_field
-from palpate.logs.bags.reading import first_line, open_files
+from palpate.logs.bags.reading import Stream, finder, first_line, leaves, no_field, open_files
 from palpate.logs.bags.scanning import Channel
 from palpate.logs.kinds import Kind
 

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import sys
-from typing import IO, Any, NamedTuple
+from binascii import crc32
+from collections.abc import Iterator
+from contextlib import closing
+from io import SEEK_CUR, SEEK_END, BytesIO
+from pathlib import Path
+from struct import unpack_from
+from typing import IO, TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from urllib.parse import quote
 
-from palpate.files.limits import Budget
+from palpate.errors import InputError
+from palpate.files.limits import Budget, LimitError
+
+if TYPE_CHECKING:
+    from rosbags.rosbag1.reader import Header
 
 ZSTD = b"\x28\xb5\x2f\xfd"
 """First bytes of whatever zstd packed."""
@@ -110,3 +122,230 @@ def zstd() -> Any:
     else:
         from backports import zstd as library
     return library
+
+
+_BAG1_MAGIC = b"#ROSBAG V2.0"
+
+
+def scan_bag1(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+    """Connections and messages of a ROS 1 bag (format 2.0) as far as they are whole."""
+    from rosbags.rosbag1.reader import Header, RecordType
+    from rosbags.typesys.msg import normalize_msgtype
+
+    index = whole = 0
+    with path.open("rb") as file:
+        begin = file.readline(100)
+        if not begin.startswith(_BAG1_MAGIC):
+            version = begin.partition(b"V")[2].decode(errors="replace").strip()
+            raise InputError(
+                f"{path} cannot be read as a ROS 1 bag (version {version} is not supported); rosbag fix mends it"
+            )
+        for header, data, whole in _bag1_records(file, budget):  # noqa: B007 - where the last whole record ends
+            match header.get_uint8("op"):
+                case RecordType.BAGHEADER:
+                    index = header.get_uint64("index_pos")
+                case RecordType.CONNECTION:
+                    about = Header.read(BytesIO(len(data).to_bytes(4, "little") + data))
+                    kind, definition = about.get_string("type"), about.get_string("message_definition")
+                    number, topic = header.get_uint32("conn"), header.get_string("topic")
+                    yield Channel(number, topic, normalize_msgtype(kind), "ros1msg", definition)
+                case RecordType.MSGDATA:
+                    yield Raw(header.get_uint32("conn"), header.get_time("time"), data)
+        reached = file.tell()
+    size = path.stat().st_size
+    share = None if not index else max(1 - size / index, 0.0) if reached == size else None
+    yield End(finished=0 < index < size == whole, share=share)
+
+
+def _bag1_records(
+    file: BinaryIO, budget: Budget, *, packed: bool = False
+) -> Iterator[tuple[Header, bytes, int]]:
+    """Headers and data of all whole records, those inside of chunks included, and where each ends."""
+    from rosbags.rosbag1.reader import Header, ReaderError, RecordType, read_uint32
+
+    while True:
+        try:
+            header = Header.read(file)
+            size = read_uint32(file)
+            budget.take(0)
+            data = file.read(size)
+            if header.get_uint8("op") == RecordType.CHUNK and not packed:
+                packing = header.get_string("compression")
+                if len(data) < size and packing != "none":
+                    return
+                inside = unpack_chunk(data, packing, header.get_uint32("size"), budget)
+                for own, content, _ in _bag1_records(BytesIO(inside), budget, packed=True):
+                    yield own, content, file.tell()
+            elif len(data) == size:
+                yield header, data, file.tell()
+        except LimitError:
+            raise
+        except (ReaderError, ValueError, KeyError, OSError, EOFError, RuntimeError):
+            return
+        if len(data) < size:
+            return
+
+
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+_MAGIC = 8
+
+
+def scan_mcap(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+    """Channels and messages of an MCAP file as far as they are whole."""
+    schemas: dict[int, tuple[str, str, str]] = {}
+    finished = False
+    with path.open("rb") as file:
+        file.seek(_MAGIC)
+        for operation, data in _records(file, budget):
+            if operation == _SCHEMA:
+                name, encoding, definition = _strings(data, 2, 3)
+                schemas[_number(data)] = (name, encoding, definition)
+            elif operation == _CHANNEL:
+                about = schemas.get(unpack_from("<H", data, 2)[0], ("", "", ""))
+                topic, coding = _strings(data, 4, 2)
+                kind = about[0] if coding == "cdr" else f"{about[0]} as {coding}"
+                yield Channel(_number(data), topic, kind, *about[1:])
+            elif operation == _MESSAGE:
+                channel, _, received = unpack_from("<HIQ", data)
+                yield Raw(channel, received, data[22:])
+            else:
+                finished = True
+    yield End(finished)
+
+
+def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterator[tuple[int, bytes]]:
+    """Operations and data of all whole records that matter, those inside of chunks included.
+
+    The records of a chunk that is not compressed are read where they stand, so that a cut in it costs one message.
+    """
+    begin, last = file.tell(), file.seek(0, SEEK_END)
+    file.seek(begin)
+    while len(head := file.read(9)) == 9:
+        operation, size = head[0], unpack_from("<Q", head, 1)[0]
+        if not operation or (operation == _CHUNK and packed):
+            return
+        if operation == _CHUNK:
+            fixed = file.read(32)
+            if len(fixed) < 32:
+                return
+            whole, crc, letters = unpack_from("<QII", fixed, 16)
+            packing = file.read(min(letters, 64) + 8)[:-8].decode(errors="replace")
+            if not packing:
+                continue
+            size -= 32 + letters + 8
+        if not 0 <= size <= last - file.tell():
+            return
+        if operation not in {_SCHEMA, _CHANNEL, _MESSAGE, _FOOTER, _CHUNK}:
+            file.seek(size, SEEK_CUR)
+            continue
+        budget.take(0)
+        data = file.read(size)
+        if operation != _CHUNK:
+            yield operation, data
+            continue
+        inside = _inside(data, packing, whole, crc, budget)
+        if inside is None:
+            return
+        yield from _records(BytesIO(inside), budget, packed=True)
+
+
+def _inside(data: bytes, packing: str, size: int, crc: int, budget: Budget) -> bytes | None:
+    """Content of a chunk; None if it is damaged."""
+    try:
+        inside = unpack_chunk(data, packing, size, budget)
+    except LimitError:
+        raise
+    except Exception:  # noqa: BLE001 - a damaged chunk fails in as many ways as there are bytes
+        return None
+    return inside if len(inside) == size and (not crc or crc32(inside) == crc) else None
+
+
+def _number(data: bytes) -> int:
+    number: int = unpack_from("<H", data)[0]
+    return number
+
+
+def _strings(data: bytes, place: int, count: int) -> tuple[str, ...]:
+    found = []
+    for _ in range(count):
+        (length,) = unpack_from("<I", data, place)
+        found.append(data[place + 4 : place + 4 + length].decode(errors="replace"))
+        place += 4 + length
+    return tuple(found)
+
+
+_TABLES = "SELECT name FROM sqlite_master WHERE type = 'table' AND sql LIKE 'CREATE TABLE%'"
+_OTHERS = "SELECT name, type FROM sqlite_master WHERE name IN ('topics', 'messages', 'message_definitions')"
+# A column of SQLite holds values of any type: what is no name, no number or no message makes no topic.
+_TOPICS = (
+    "SELECT id, name, type FROM topics"
+    " WHERE typeof(id) = 'integer' AND typeof(name) = 'text' AND typeof(type) = 'text'"
+)
+_TYPES = (
+    "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+    " WHERE typeof(topic_type) = 'text' AND typeof(encoding) = 'text'"
+    " AND typeof(encoded_message_definition) = 'text'"
+)
+_MESSAGES = "SELECT topic_id, timestamp, data FROM messages NOT INDEXED ORDER BY id"
+_SQLITE_MESSAGE = (int, int, bytes)
+_STEPS = 100_000
+"""Instructions of SQLite between two looks at the clock."""
+
+
+def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+    """Topics and messages of a ROS 2 bag in SQLite as far as its pages are there."""
+    with closing(_open_database(path, budget)) as database:
+        types = {kind: (encoding, text) for kind, encoding, text in _rows(database, _TYPES)}
+        for number, topic, kind in _rows(database, _TOPICS):
+            yield Channel(number, topic, kind, *types.get(kind, ("", "")))
+        hurt = False
+        left = path.stat().st_size
+        try:
+            for row in database.execute(_MESSAGES):
+                plain = all(isinstance(value, kind) for value, kind in zip(row, _SQLITE_MESSAGE, strict=True))
+                left -= len(row[2]) if plain else 0
+                if hurt := not plain or left < 0:  # a page that is there in part is read as if zeros followed
+                    break
+                yield Raw(*row)
+        except sqlite3.DatabaseError:
+            if budget.seconds_left <= 0:
+                raise budget.too_long() from None
+            hurt = True
+    share = _missing_pages(path)
+    yield End(finished=not (hurt or share), share=share)
+
+
+def _open_database(path: Path, budget: Budget) -> sqlite3.Connection:
+    """The database, to be read only, and no longer than the log may take."""
+    database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)
+    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size + 1_000_000, 2**31 - 1))
+    database.set_progress_handler(lambda: budget.seconds_left <= 0, _STEPS)
+    # SQLite refuses a file that is shorter than its first page says, unless a repair seems to be under way.
+    database.execute("PRAGMA writable_schema = ON")
+    database.execute("PRAGMA trusted_schema = OFF")
+    tables = {name for (name,) in _rows(database, _TABLES)}
+    for name, kind in _rows(database, _OTHERS):
+        if name not in tables:
+            database.close()
+            raise InputError(
+                f"{path} is no ROS 2 bag: its {name} is not a plain table but a {kind}; record it again"
+            )
+    return database
+
+
+def _rows(database: sqlite3.Connection, question: str) -> list[tuple[Any, ...]]:
+    """The rows; none if there is no such table."""
+    try:
+        return database.execute(question).fetchall()
+    except sqlite3.DatabaseError:
+        return []
+
+
+def _missing_pages(path: Path) -> float | None:
+    """The share of the file's pages that are not there; None if all are."""
+    with path.open("rb") as file:
+        head = file.read(32)
+    page = int.from_bytes(head[16:18], "big")
+    meant = (65536 if page == 1 else page) * int.from_bytes(head[28:32], "big")
+    size = path.stat().st_size
+    return 1 - size / meant if size < meant else None

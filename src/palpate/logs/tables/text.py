@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.files.limits import Budget
-from palpate.logs.tables.layout import Layout, find_layout
+from palpate.logs.tables.layout import Layout, find_layout, read_preamble
 from palpate.logs.tables.lines import (
     COMMENTS,
     NO_READING,
@@ -26,7 +26,6 @@ from palpate.logs.tables.lines import (
     lines_of,
     seconds_of_text,
 )  # fmt: skip
-from palpate.logs.tables.preamble import read_preamble
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
 
 if TYPE_CHECKING:

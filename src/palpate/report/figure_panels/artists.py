@@ -2,19 +2,52 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.report.figure_panels.labels import plain
-from palpate.report.look.tokens import DATA, PAIRS, SERIES
+from palpate.report.look.assets import DATA, PAIRS, SERIES
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
+
+_SIGNS = {r"\eta": "η", r"\mu": "µ", r"\theta": "θ", r"\lambda": "λ", r"\cdot": "·", r"\pm": "±"}
+_BELOW = str.maketrans("aehijklmnoprstuvx0123456789", "ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ₀₁₂₃₄₅₆₇₈₉")
+_UNIT = re.compile(r"\[([^\]]+)\]\s*$")
+
+
+def plain(text: str) -> str:
+    """A label without its formulas: `$K_e$ [N/m]` is Kₑ [N/m]; a letter that is not written so keeps its underscore."""
+    return re.sub(r"\$([^$]*)\$", lambda found: _spell(found[1]), text).replace("\n", " ").strip()
+
+
+def unit(text: str) -> str:
+    """The bracketed end of a label."""
+    found = _UNIT.search(text)
+    return found[1] if found else ""
+
+
+def title(axes: Axes) -> str:
+    """Of a panel; wherever it stands."""
+    return plain(axes.get_title(loc="left") or axes.get_title() or axes.get_title(loc="right"))
+
+
+def _spell(formula: str) -> str:
+    for sign, letter in _SIGNS.items():
+        formula = formula.replace(sign, letter)
+    formula = re.sub(r"_\{?(\w)\}?", _lower, formula)
+    return re.sub(r"\\[a-z]+|[{}^]", "", formula)
+
+
+def _lower(found: re.Match[str]) -> str:
+    letter = found[1].translate(_BELOW)
+    return found[0] if letter == found[1] else letter
+
 
 Kind = tuple[str, str, str]
 
@@ -105,7 +138,7 @@ def label_of(one: Artist) -> str:
 
 
 def _of_line(axes: Axes, line: Line2D) -> Drawn:
-    x, y = (_filled(v) for v in line.get_data(orig=False))
+    x, y = (_fill(v) for v in line.get_data(orig=False))
     along, up = _by_data(axes, line)
     label, look = label_of(line), look_of(line)
     if not len(x):
@@ -121,7 +154,7 @@ def _of_line(axes: Axes, line: Line2D) -> Drawn:
     return Curve(x, y, label, kind_of(line), look)
 
 
-def _filled(values: Any) -> Array:
+def _fill(values: Any) -> Array:
     return np.ma.filled(np.ma.asarray(values, dtype=float), np.nan)
 
 

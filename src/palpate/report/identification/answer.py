@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import hypot, sqrt
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.text import Text
 
-from palpate.identification.causes import cause_of
+from palpate.errors import InputError
+from palpate.identification.causes import Code, cause_of
 from palpate.identification.result import Identification, Parameter, Verdict
-from palpate.identification.warning_codes import Code
+from palpate.report.identification import figure
+from palpate.report.identification import page as pages
 from palpate.report.identification.words import (
     ADVICE,
     CALLED,
     MARKS,
     UNIT_WARNINGS,
     UNTOUCHED,
+    Source,
     behind_the_arm,
     by_the_model,
     first_reason,
@@ -25,12 +29,16 @@ from palpate.report.identification.words import (
     limited_by,
     lost,
     place_of,
+    sentence,
     unit_warnings,
     units_of,
 )
-from palpate.report.numbers import NONE, plain, quantity, with_half
+from palpate.report.numbers import NONE, as_html, plain, printed, quantity, with_half
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 VERDICTS = {
@@ -305,3 +313,50 @@ def _assumed_lag(found: Identification) -> str:
             called = CALLED[name]
             return f"{text}: calibrate it, and the {called} is known {whole / rest:.2g} times as well."
     return f"{text}."
+
+
+NAME = "a record"
+HEAD = ("parameter", "value", "verdict", "why")
+
+
+def line(found: Identification) -> str:
+    """The model, and each parameter with its verdict."""
+    values = [f"{name} {_value(own)} {own.verdict}" for name, own in found.parameters.items()]
+    return printable(f"{found.model}; {', '.join(values)}")
+
+
+def text(found: Identification) -> str:
+    """The output of `palpate identify`; `report` has all evidence."""
+    return printed(lambda console: show(found, NAME, console))
+
+
+def html(found: Identification) -> str:
+    """The sentence, a row a parameter, and the warnings."""
+    rows = [HEAD, *(_row(name, parameter) for name, parameter in found.parameters.items())]
+    return as_html(sentence(found), rows, [f"{warn.code.word}: {warn.text}" for warn in found.warnings])
+
+
+def _row(name: str, own: Parameter) -> tuple[str, ...]:
+    return name, _value(own), str(own.verdict), own.reason
+
+
+def _value(own: Parameter) -> str:
+    return "-" if own.value is None else formatted(own)
+
+
+def draw(found: Identification) -> Figure:
+    """The figure of `palpate identify`.
+
+    Raises:
+        InputError: its traces were left out.
+    """
+    if found.traces is None:
+        raise InputError(
+            "this identification holds no traces, as many logs' do not; identify its log alone to draw it"
+        )
+    return figure.draw(found, NAME)
+
+
+def page(found: Identification) -> str:
+    """The page of `palpate identify --report`."""
+    return pages.page(found, Source(NAME, found.options, command="palpate.identify(...).report(...)"))

@@ -9,11 +9,77 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
 from palpate.report import style
-from palpate.report.identification.fit_panels import empty, labelled, length_of
-from palpate.report.look.columns import thinned
+from palpate.report.identification.spectra import band_of, leaving, resting, stretches, white
+from palpate.report.look.assets import thinned, with_peaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from palpate.identification.result import Identification, Traces
+
+_FIT_POINTS = 4800
+"""Of a line: more than a page has columns for; each stretch keeps its least and its largest value."""
+_MARGIN = 0.35
+"""Of a contact's length, that is shown before and after it."""
+
+
+def force(axes: Axes, found: Identification, traces: Traces) -> None:
+    """Force over time, with the contacts and the model's prediction in them."""
+    style.panel(axes, labelled("force", traces.force_unit), "time [s]")
+    contacts(axes, found)
+    axes.plot(
+        *with_peaks(traces.time, traces.force, _FIT_POINTS), color=style.MEASURED, lw=1.0, label="measured"
+    )
+    if len(traces.fitted_time):
+        for i, piece in enumerate(stretches(traces.fitted_time)):
+            line = with_peaks(traces.fitted_time[piece], traces.predicted[piece], _FIT_POINTS)
+            axes.plot(*line, color=style.INK, lw=1.4, label="model" if i == 0 else None)
+    axes.set_xlim(*window(found, traces))
+    style.legend_above(axes)
+
+
+def residual(axes: Axes, found: Identification, traces: Traces) -> None:
+    """Residual of the force over time."""
+    style.panel(axes, labelled("misfit", traces.force_unit), "time [s]")
+    contacts(axes, found)
+    left = traces.fitted_force - traces.predicted
+    for i, piece in enumerate(stretches(traces.fitted_time)):
+        line = with_peaks(traces.fitted_time[piece], left[piece], _FIT_POINTS)
+        axes.plot(*line, color=style.MEASURED, lw=0.9, label="measured less model" if i == 0 else None)
+    axes.set_xlim(*window(found, traces))
+    style.legend_above(axes)
+
+
+def contacts(axes: Axes, found: Identification) -> None:
+    """Shade the spans in contact."""
+    for i, (start, end) in enumerate(found.contacts):
+        axes.axvspan(start, end, color=style.F, alpha=0.09, lw=0, label="in contact" if i == 0 else None)
+
+
+def window(found: Identification, traces: Traces) -> tuple[float, float]:
+    """From when to when to look: the whole log, or the contacts with their surroundings where they are short [s]."""
+    first, last = float(traces.time[0]), float(traces.time[-1])
+    if not found.contacts:
+        return first, last
+    start, end = found.contacts[0][0], found.contacts[-1][1]
+    margin = _MARGIN * (end - start)
+    return max(first, start - margin), min(last, end + margin)
+
+
+def labelled(name: str, unit: str) -> str:
+    """The name of an axis with its unit, if there is one."""
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
+def length_of(traces: Traces) -> tuple[float, str]:
+    """Unit of an axis of depth."""
+    return (1e3, "mm") if traces.position_unit == "m" else (1.0, traces.position_unit)
+
+
+def empty(axes: Axes, why: str) -> None:
+    """A panel with nothing to draw says so."""
+    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes, color=style.QUIET)
+    axes.set_axis_off()
 
 
 _BAND: dict[str, Any] = {"alpha": 0.22, "lw": 0}
@@ -204,3 +270,26 @@ def scaled_unit(unit: str, values: Array) -> tuple[float, str]:
     """Unit of an axis: kN/m where that is shorter."""
     large = unit == "N/m" and float(np.abs(values).max()) >= _KILO
     return (1e3, "kN/m") if large else (1.0, unit)
+
+
+def residual_spectrum(axes: Axes, found: Identification, traces: Traces) -> None:
+    """The spectrum of what is left, against white noise of the same power behind the same filters."""
+    left = leaving(found, traces)
+    if left is None or left.power == 0:
+        empty(axes, "too short a contact for a spectrum")
+        return
+    unit = "" if traces.force_unit == "1" else traces.force_unit
+    style.panel(axes, f"misfit [{unit}/√Hz]", "frequency [Hz]")
+    expected, low, high = (np.sqrt(d) for d in white(left, band_of(found, traces)))
+    axes.fill_between(
+        left.frequency, low, high, color=style.MEASURED, alpha=0.22, lw=0, label="white noise, 95 %"
+    )
+    axes.plot(left.frequency, expected, color=style.QUIET, lw=1.1, ls=(0, (5, 4)))
+    axes.plot(left.frequency, np.sqrt(left.density), color=style.INK, lw=1.5, label="misfit")
+    rest = resting(found, traces)
+    if rest is not None:
+        axes.plot(rest.frequency, np.sqrt(rest.density), color=style.MEASURED, lw=1.0, label="out of contact")
+    style.logarithmic(axes, "x")
+    axes.set_ylim(bottom=max(float(low.min()), 1e-2 * float(np.sqrt(left.density).min())) / 2)
+    style.logarithmic(axes, "y")
+    style.legend_above(axes)

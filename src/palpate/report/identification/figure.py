@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.report import style
 from palpate.report.identification import evidence_panels as evidence
-from palpate.report.identification import fit_panels as fit
-from palpate.report.identification import trust_panels as trust
+from palpate.report.identification import evidence_panels as fit
+from palpate.report.identification import evidence_panels as trust
 from palpate.report.identification.words import MARKS, formatted, model_line, sentence, subtitle
 from palpate.text import printable
 
@@ -58,7 +58,7 @@ def draw(found: Identification, title: str) -> Figure:
         if fitted:
             _panels(body, found, traces)
         else:
-            fit.force(_titled(body.subplots(), "Force"), found, traces)
+            fit.force(_title(body.subplots(), "Force"), found, traces)
     return figure
 
 
@@ -79,20 +79,20 @@ def _panels(figure: Any, found: Identification, traces: Traces) -> None:
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.35, 1.0))
     left, right = top.subfigures(1, 2)
     dynamic(left, found, traces, "Dynamic stiffness")
-    evidence.press(_titled(right.subplots(), "Press"), found, traces)
+    evidence.press(_title(right.subplots(), "Press"), found, traces)
     left, right = bottom.subfigures(1, 2, width_ratios=(1.3, 1.0))
     above, below = left.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
-    fit.force(_titled(above, "Force"), found, traces)
-    fit.residual(_titled(below, "Misfit"), found, traces)
+    fit.force(_title(above, "Force"), found, traces)
+    fit.residual(_title(below, "Misfit"), found, traces)
     above.set_xlabel("")
-    trust.residual_spectrum(_titled(right.subplots(), "Is the misfit noise?"), found, traces)
+    trust.residual_spectrum(_title(right.subplots(), "Is the misfit noise?"), found, traces)
 
 
 def dynamic(figure: Any, found: Identification, traces: Traces, title: str = "") -> None:
     """Storage above loss, over the same frequencies."""
     above, below = figure.subplots(2, 1, sharex=True)
-    evidence.storage(_titled(above, title), found, traces)
-    evidence.loss(_titled(below, ""), found, traces)
+    evidence.storage(_title(above, title), found, traces)
+    evidence.loss(_title(below, ""), found, traces)
 
 
 def one(panel: Panel, found: Identification, traces: Traces, width: int, height: int) -> Figure:
@@ -117,7 +117,7 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), dpi=style.DPI, layout="constrained")
 
 
-def _titled(axis: Axes, text: str) -> Axes:
+def _title(axis: Axes, text: str) -> Axes:
     if text:
         axis.set_title(text, loc="left", fontsize=11.5, fontweight="bold", pad=40)
     return axis

@@ -9,20 +9,23 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from palpate.identification.result import Identification, Parameter, Traces, Verdict
-from palpate.report.identification import captions
 from palpate.report.identification import evidence_panels as evidence
-from palpate.report.identification import fit_panels as fit
-from palpate.report.identification import trust_panels as trust
+from palpate.report.identification import evidence_panels as fit
+from palpate.report.identification import evidence_panels as trust
+from palpate.report.identification.evidence_panels import shown_by
 from palpate.report.identification.figure import Panel, both_parts, one
-from palpate.report.identification.source import Source, as_json
+from palpate.report.identification.spectra import over_noise, whiteness_of
 from palpate.report.identification.words import (
     CALLED,
     NO_NUMBER,
+    Source,
     advice,
+    as_json,
     facts_of,
     formatted,
     interval,
     limited_by,
+    lost,
     model_line,
     sentence,
     subtitle,
@@ -35,6 +38,106 @@ from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+DOUBTED = 1e-3
+"""Probability below which residuals count as not white."""
+_FAR = 1000.0
+"""Times beyond which a ratio of powers says no more by its figures."""
+_AS_LARGE = 1.3
+"""Times the noise out of contact up to which a misfit is no larger than that."""
+
+
+def untouched(found: Identification, traces: Traces) -> str:
+    """Of a log without a contact."""
+    return "The force over the whole log: it never leaves its resting level for long enough."
+
+
+def spectrum(found: Identification, traces: Traces) -> str:
+    """Of storage and loss by frequency."""
+    octaves = found.dynamic_stiffness
+    if not octaves:
+        return "The contact is too short to tell frequencies apart."
+    told = [o.frequency for o, yes in zip(octaves, shown_by(octaves, "storage"), strict=True) if yes]
+    if not told:
+        where = "No octave shows it with an interval narrower than its value"
+    else:
+        where = f"The log shows the storage from {plain(told[0], 2)} to {plain(told[-1], 2)} Hz"
+        where = where if len(told) > 1 else f"The log shows the storage about {plain(told[0], 2)} Hz"
+    return (
+        f"Force over position, by octave, whatever the model. {where}. Storage gives the force back, loss turns it into"
+        " heat. Flat storage and loss in proportion to frequency are a spring beside a damper; storage that falls with"
+        " the square of the frequency is a mass."
+    )
+
+
+def press(found: Identification, traces: Traces) -> str:
+    """Of force over depth."""
+    own = found.press
+    if own is None:
+        return "The log has no loading long enough for a slope."
+    force = units_of(found)[0]
+    told = ["The slope is the stiffness, the width of the loop the lost work. The ring is the working point."]
+    if own.hysteresis_loss is not None:
+        told.append(f"{lost(own.hysteresis_loss)}.")
+    if own.relaxation is not None:
+        r = own.relaxation
+        told.append(
+            f"In a hold of {plain(r.duration, 2)} s the force falls by {100 * r.share:.2g} %,"
+            f" half of that within {plain(r.half_time, 2)} s."
+        )
+    if len(own.tangent) > 1:
+        first, last = own.tangent[0], own.tangent[-1]
+        told.append(
+            f"From {quantity(first.force, force)} to {quantity(last.force, force)} the slope goes from"
+            f" {plain(first.stiffness, 3)} ± {plain(first.half, 2)} to {plain(last.stiffness, 3)} ±"
+            f" {plain(last.half, 2)}{_of_stiffness(found)}."
+        )
+    return " ".join(told)
+
+
+def _of_stiffness(found: Identification) -> str:
+    unit = found.working_point.stiffness.unit if found.working_point else "1"
+    return "" if unit == "1" else f" {unit}"
+
+
+def force(found: Identification, traces: Traces) -> str:
+    """Of the force over time."""
+    count = len(found.contacts)
+    seconds = sum(end - start for start, end in found.contacts)
+    each = f"{count} contacts" if count != 1 else "One contact"
+    return f"{each} of {plain(seconds, 3)} s in all. The model is drawn where it was fitted."
+
+
+def residual(found: Identification, traces: Traces) -> str:
+    """Of the misfit over time."""
+    return (
+        "Noise looks the same all along. Waves, steps, or a shape that repeats in every contact are forces that the"
+        " model cannot follow."
+    )
+
+
+def noise(found: Identification, traces: Traces) -> str:
+    """Of the misfit's spectrum."""
+    p, times = whiteness_of(found, traces), over_noise(found, traces)
+    size = f" It is {_times(times)} the usual noise out of contact." if times is not None else ""
+    if p is None:
+        return "Too few samples to test whether the misfit is white."
+    chance = f"p = {p:.2g}" if p >= 1e-4 else "p < 0.0001"
+    band = "White noise would stay within the shaded band."
+    if p >= DOUBTED:
+        return f"{band} The misfit is consistent with white noise ({chance}).{size}"
+    if times is not None and times < _AS_LARGE:
+        return f"{band} The misfit is not white ({chance}), but no noise here seems to be.{size}"
+    return (
+        f"{band} The misfit is not white ({chance}): the noise is coloured, or the model lacks something. The 95 %"
+        f" interval allows for both; the one that holds if the model does allows for the colour alone.{size}"
+    )
+
+
+def _times(ratio: float) -> str:
+    """A force that is rounded to nothing out of contact has a noise of nothing."""
+    return f"{plain(ratio, 2)} times" if ratio < _FAR else "far above"
+
 
 Drawn = Callable[[Identification, Traces, int, int], "Figure"]
 
@@ -78,14 +181,14 @@ def page(found: Identification, source: Source) -> str:
         json=json.dumps(as_json(found, source), indent=1),
         source=source,
         options=", ".join(
-            f"{printable(str(k))} {printable(str(v))}" for k, v in _told(found, source).items()
+            f"{printable(str(k))} {printable(str(v))}" for k, v in _describe(found, source).items()
         ),
         file=printable(source.file),
         command=printable(source.command),
     )
 
 
-def _told(found: Identification, source: Source) -> dict[str, Any]:
+def _describe(found: Identification, source: Source) -> dict[str, Any]:
     return {**source.options, **found.options}
 
 
@@ -196,8 +299,8 @@ def _evidence(found: Identification) -> list[dict[str, str]]:
     if found.traces is None or not found.contacts:
         return []
     return [
-        _figure(found, "Dynamic stiffness", both_parts, captions.spectrum, (_HALF, 430)),
-        _figure(found, "Press", partial(one, evidence.press), captions.press, (_HALF, 430)),
+        _figure(found, "Dynamic stiffness", both_parts, spectrum, (_HALF, 430)),
+        _figure(found, "Press", partial(one, evidence.press), press, (_HALF, 430)),
     ]
 
 
@@ -207,11 +310,11 @@ def _figures(found: Identification) -> list[dict[str, str]]:
     if traces is None:
         return []
     if not len(traces.fitted_time):
-        return [_panel(found, "Force over time", fit.force, captions.untouched, (_WIDE, 260))]
+        return [_panel(found, "Force over time", fit.force, untouched, (_WIDE, 260))]
     return [
-        _panel(found, "Force over time", fit.force, captions.force, (_WIDE, 260)),
-        _panel(found, "Misfit over time", fit.residual, captions.residual, (_HALF, 260)),
-        _panel(found, "Is the misfit noise?", trust.residual_spectrum, captions.noise, (_HALF, 260)),
+        _panel(found, "Force over time", fit.force, force, (_WIDE, 260)),
+        _panel(found, "Misfit over time", fit.residual, residual, (_HALF, 260)),
+        _panel(found, "Is the misfit noise?", trust.residual_spectrum, noise, (_HALF, 260)),
     ]
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import ORDER
-from palpate.identification.residuals import whiteness
+from palpate.identification.least_squares import whiteness
 from palpate.identification.result import Identification, Traces
 
 _SHORTEST = 16

@@ -1,4 +1,8 @@
-"""Style sheets and scripts that lie in the page itself, and the policy that lets nothing else run."""
+"""Style sheets and scripts that lie in the page itself, and the policy that lets nothing else run.
+
+A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2, 1.4.11); what is written in a
+quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_look.py` measures both.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,147 @@ import hashlib
 import json
 from functools import cache
 from importlib import resources
+from itertools import pairwise
 from typing import Any
 
-from palpate.report.look.tokens import style_sheet
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.arrays import Array, Mask
+
+GAP = -32768
+"""Where there is no value."""
+NO_PLACE = -32767
+"""Where a column has no place, and a line goes on over it."""
+ABSENT = "absent"
+"""The same, in a column that is not packed."""
+_HALF = 32500
+"""Steps of a two-byte number on either side of the middle, but for what says that there is none."""
+
+
+def packed(values: Array) -> dict[str, Any]:
+    """A column: `b` its values as little-endian int16 in base64, value = origin `o` + step `s` (i + 32500).
+
+    Infinite stands for a place that the column does not have, NaN for a gap. The step is a 65,000th of the column's
+    range: finer than a screen, and than four digits of most readings.
+    """
+    known = np.isfinite(values)
+    low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
+    step = (high - low) / (2 * _HALF) or 1.0
+    codes = np.full(len(values), GAP, dtype="<i2")
+    codes[np.isinf(values)] = NO_PLACE
+    codes[known] = np.round((values[known] - low) / step).astype(np.int64) - _HALF
+    return {"b": base64.b64encode(codes.tobytes()).decode(), "s": step, "o": low}
+
+
+def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
+    """A line through values over x, of about so many points that keep its peaks."""
+    rows = thinned(values, most)
+    return x[rows], values[rows]
+
+
+def thinned(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
+    """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
+
+    Args:
+        values: that must keep their peaks, shape (n,); NaN are passed over.
+        most: rows, about.
+        dense: rows of which half of all that are shown are to be, shape (n,).
+    """
+    n = len(values)
+    if n <= most:
+        return np.arange(n)
+    if dense is not None and dense.any() and not dense.all():
+        inside, outside = np.flatnonzero(dense), np.flatnonzero(~dense)
+        share = max(most // 2, most - len(outside))
+        parts = [
+            inside[thinned(values[inside], share)],
+            outside[thinned(values[outside], most - min(share, len(inside)))],
+        ]
+        return np.unique(np.concatenate(parts))
+    edges = np.linspace(0, n, max(most // 2, 1) + 1).astype(int)
+    kept = [0, n - 1]
+    for a, b in pairwise(edges):
+        piece = values[a:b]
+        if len(piece) and np.isfinite(piece).any():
+            kept += [a + int(np.nanargmin(piece)), a + int(np.nanargmax(piece))]
+        elif len(piece):
+            kept.append(a)
+    return np.unique(kept)
+
+
+DATA = {
+    "K": "#2f8bf2",
+    "B": "#d07a05",
+    "M": "#9457b8",
+    "F": "#268c5e",
+    "measured": "#858d99",
+    "fail": "#d23b47",
+    "warn": "#9a7400",
+    "ok": "#2b8a57",
+}
+"""Stiffness, damping, mass, true force; what a sensor said; it failed, it is in doubt, it holds."""
+
+SERIES = {
+    "s0": "#6a5ff0",
+    "s1": "#a8643f",
+    "s2": "#0793ad",
+    "s3": "#cc4f9c",
+    "s4": "#6f8c00",
+    "s5": "#94707f",
+}
+"""Colours of compared series that are no quantity: laws, settings, seeds; none is a colour of `DATA`."""
+
+OUTCOMES = {
+    "follows": "#7fbf94",
+    "yes": "#7fbf94",
+    "done": "#a9cfb6",
+    "slow": "#9fc3e6",
+    "rings": "#f2c07c",
+    "no": "#e4b7a5",
+    "lost contact": "#d9776f",
+    "diverged": "#8a4a86",
+    "no contact": "#bdbdbd",
+    "failed": "#7a7a7a",
+    "refused": "#dedede",
+}
+"""Background colours of the outcomes of a run in a map."""
+
+MAPS = {"map-low": "#e6f3c9", "map-high": "#173f6b", "map-mark": "#14181d", "map-halo": "#ffffff"}
+"""Of a map: the ends of its scale, what is marked on it, and the rim that keeps a mark legible on any field."""
+
+PAIRS = {
+    "paper": ("#ffffff", "#13161a"),
+    "card": ("#f5f6f8", "#1b1f25"),
+    "lift": ("#ffffff", "#242a31"),
+    "line": ("#dce0e6", "#343b44"),
+    "grid": ("#e9ecf0", "#272d34"),
+    "ink": ("#1a1d21", "#e8eaed"),
+    "quiet": ("#59616c", "#a3abb6"),
+    "link": ("#1665bd", "#6fb1fa"),
+    "K-text": ("#1665bd", "#6fb1fa"),
+    "B-text": ("#96560a", "#e9a24a"),
+    "M-text": ("#7a3f9f", "#c294de"),
+    "F-text": ("#1d6646", "#5cb98a"),
+    "bad": ("#b3242f", "#ff8a8f"),
+    "doubt": ("#7a5a00", "#dcb13c"),
+    "good": ("#1c6e42", "#5cc08b"),
+    "fail-ground": ("#fdeeee", "#331b1f"),
+    "warn-ground": ("#fbf5e2", "#2c2614"),
+}
+"""Colours that change on a dark page: backgrounds, lines, letters."""
+
+
+def style_sheet() -> str:
+    """The tokens as custom properties of CSS; paper that is printed on is always light."""
+    light = "".join(f"--{name}:{value};" for name, value in (DATA | SERIES | MAPS).items())
+    light += "".join(f"--{name}:{pair[0]};" for name, pair in PAIRS.items())
+    dark = "".join(f"--{name}:{pair[1]};" for name, pair in PAIRS.items())
+    return (
+        f":root{{color-scheme:light dark;{light}}}\n"
+        f"@media screen and (prefers-color-scheme:dark){{:root:not([data-print]){{{dark}}}}}\n"
+    )
+
 
 CHARTS = ("vendor/uplot/uPlot.iife.min.js", "charts.js")
 """Library of the interactive charts."""

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
 from palpate.report.identification.words import CALLED
-from palpate.report.many.rows import POINT, LogRow, drawn, quantities
-from palpate.report.many.words import failures, sentence
+from palpate.report.many.table import POINT, LogRow, drawn, failures, quantities, sentence
 from palpate.text import printable
 
 if TYPE_CHECKING:

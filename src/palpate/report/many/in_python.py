@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING
 
 from palpate.errors import InputError
 from palpate.identification.pooling import Pooled, PooledParameter
-from palpate.report.identification.source import Source
-from palpate.report.identification.words import formatted, interval
+from palpate.report.identification.words import Source, formatted, interval
 from palpate.report.many import forest
 from palpate.report.many import page as pages
-from palpate.report.many.rows import LogRow, drawn, quantities
-from palpate.report.many.table import show
-from palpate.report.many.words import failures, sentence
-from palpate.report.result_text import as_html, printed
+from palpate.report.many.table import LogRow, drawn, failures, quantities, sentence, show
+from palpate.report.numbers import as_html, printed
 from palpate.text import printable
 
 if TYPE_CHECKING:

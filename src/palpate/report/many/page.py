@@ -8,12 +8,10 @@ from typing import Any
 
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.page import TONES, picture, split
-from palpate.report.identification.source import Source
-from palpate.report.identification.words import CALLED, facts_of, formatted, interval
+from palpate.report.identification.words import CALLED, Source, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many import forest
-from palpate.report.many.rows import POINT, LogRow, drawn, json_of, quantities
-from palpate.report.many.words import failures, place, sentence
+from palpate.report.many.table import POINT, LogRow, drawn, failures, json_of, place, quantities, sentence
 from palpate.report.numbers import quantity
 from palpate.report.page import render
 from palpate.text import printable

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from palpate.files import write_text
 from palpate.identification.pooling import Pooled, PooledParameter
-from palpate.report.many.rows import POINT, LogRow, has_number, quantities
+from palpate.report.many.table import POINT, LogRow, has_number, quantities
 from palpate.report.numbers import si_prefix, with_half
 
 ENDINGS = (".csv", ".md", ".tex")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from palpate.contact_frame import Weighed
+from palpate.report.numbers import as_html, as_text
 from palpate.report.payload import page as pages
-from palpate.report.result_text import as_html, as_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def line(found: Weighed) -> str:
-    """The sentence."""
+    """The answer in one line."""
     return printable(pages.sentence(found))
 
 

@@ -9,21 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.force_input import CONTACT, LOST
 from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, scripts, text_of
-from palpate.report.look.columns import packed, thinned
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed, scripts, text_of, thinned
 from palpate.report.numbers import quantity
 from palpate.report.page import embedded, render
-from palpate.report.run.cards import force_cards
 from palpate.report.run.figures import drawings
-from palpate.report.run.table import force_rows, thesis_table
-from palpate.report.run.words import alerts, motors, sentence
+from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
 from palpate.report.svg import svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
@@ -214,10 +211,10 @@ def _columns(record: Record) -> dict[str, Array]:
         columns[f"{name}_low"], columns[f"{name}_high"] = columns[name] - half, columns[name] + half
     columns["depth"] = 1e3 * record["penetration"]
     columns["wall"] = record["x"] - record["penetration"]
-    return {name: _bounded(values) for name, values in columns.items()}
+    return {name: _limit(values) for name, values in columns.items()}
 
 
-def _bounded(values: Array) -> Array:
+def _limit(values: Array) -> Array:
     """Without the few values from far away that would leave no steps for the others: gaps in their place."""
     known = values[np.isfinite(values)]
     if not len(known):
@@ -253,7 +250,7 @@ def _range(parts: Sequence[Array], known: float | None) -> list[float]:
 
 
 def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
-    """Touches and losses."""
+    """Marks at touches and losses of contact."""
     found = []
     for i in np.flatnonzero(np.diff(phase, prepend=0.0))[:40]:
         if phase[i] == CONTACT:

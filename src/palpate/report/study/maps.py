@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.report import style
-from palpate.report.look.tokens import MAPS, OUTCOMES
-from palpate.report.study.axes import Scale, decades, grid
+from palpate.report.look.assets import MAPS, OUTCOMES
+from palpate.report.study.lines import Scale, decades, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.report.look.columns import ABSENT
-from palpate.report.look.tokens import MAPS, OUTCOMES
-from palpate.report.study.axes import COLORS, Scale, decades
-from palpate.report.study.clouds import Cloud, Points, middles
-from palpate.report.study.lines import Curve, Line
+from palpate.report.look.assets import ABSENT, CHARTS, MAPS, OUTCOMES, TABLES, data, scripts, text_of
+from palpate.report.page import Table, captioned, render
+from palpate.report.study.lines import COLORS, Cloud, Curve, Line, Points, Scale, decades, middles
 from palpate.report.study.maps import Heat
 
 MOST = 1500
@@ -31,7 +31,7 @@ def numbers(values: Any) -> list[float | None]:
 
 
 def scale(one: Scale) -> dict[str, Any]:
-    """An axis."""
+    """Scale of an axis, with its ticks."""
     shown = [f"{v:g}" if isinstance(v, float) else str(v) for v in one.values]
     return {
         "label": one.label,
@@ -111,7 +111,7 @@ def _line(one: Line) -> dict[str, Any]:
 
 
 def heat(one: Heat) -> dict[str, Any]:
-    """A map."""
+    """A map as cells of colour."""
     words = one.values.dtype.kind in "US"
     flat = one.values.ravel()
     return {
@@ -130,3 +130,58 @@ def heat(one: Heat) -> dict[str, Any]:
 
 
 _OF: dict[type, Any] = {Cloud: cloud, Curve: curve, Heat: heat}
+
+
+@dataclass(frozen=True)
+class StudyPage:
+    """Content of the page.
+
+    Args:
+        title, about: of the study.
+        sentence, answers: the answer, and further ones.
+        notes: warnings.
+        tables: in the order to be read.
+        below: tables that stand below the figures.
+        charts: plain values from which the page draws; empty where there is nothing to draw.
+        figures: the same as PNG files with a caption each, for a browser that runs no scripts.
+        command: that makes it.
+        study: its file.
+        origin: lines of its foot, name and text.
+    """
+
+    title: str
+    about: str
+    sentence: str
+    answers: Sequence[str]
+    notes: Sequence[str]
+    tables: Sequence[Table]
+    below: Sequence[Table]
+    charts: Mapping[str, Any]
+    figures: Mapping[Path, str]
+    command: str
+    study: str
+    origin: Sequence[tuple[str, str]]
+
+
+def study_page(of: StudyPage) -> str:
+    """The page as HTML."""
+    worth = bool(of.charts.get("figures") or of.charts.get("comparisons"))
+    own = text_of("study.js", "palpate.report.study")
+    return render(
+        "study.html",
+        "palpate.report.study",
+        room="study",
+        title=of.title,
+        about=of.about,
+        sentence=of.sentence,
+        answers=of.answers,
+        notes=of.notes,
+        tables=of.tables,
+        below=of.below,
+        charts=data(of.charts) if worth else "",
+        figures=captioned(of.figures),
+        command=of.command,
+        study=of.study,
+        origin=of.origin,
+        scripts=(*scripts(*TABLES, *CHARTS), own) if worth else scripts(*TABLES),
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from palpate.force.tuning import Tuning
-from palpate.report.result_text import as_html, printed
+from palpate.report.numbers import as_html, printed
 from palpate.report.tuning import page as pages
 from palpate.report.tuning.table import rows, show
 from palpate.text import printable

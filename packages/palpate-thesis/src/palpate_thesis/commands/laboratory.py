@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli._answer import print_answer
-from palpate.cli._progress import counted
-from palpate.cli._terminal import console, place, say, show_table
+from palpate.cli._terminal import console, counted, place, say, show_table
 from palpate.cli.options.flags import FLAG
-from palpate.cli.options.known import FolderOptions
+from palpate.cli.options.values import FolderOptions
 
 if TYPE_CHECKING:
     from palpate_thesis.inference.result import Result

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import changed, load
-from palpate.bench.sequence import CONTACT, LOST
+from palpate.bench.force_input import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import Claim, claim, texts

@@ -10,9 +10,9 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import changed
+from palpate.bench.force_input import CONTACT, LOST
 from palpate.bench.metrics.following import LIMIT
 from palpate.bench.metrics.window import SETTLE, rms
-from palpate.bench.sequence import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import Claim, claim, spread, texts

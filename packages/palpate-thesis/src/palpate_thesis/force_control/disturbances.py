@@ -10,8 +10,8 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
-from palpate.bench.sequence import COLUMNS, DIVERGED, DONE
-from palpate.bench.tick import Loop, LoopState
+from palpate.bench.force_input import COLUMNS, DIVERGED, DONE
+from palpate.bench.plant import Loop, LoopState
 from palpate.environments import KelvinVoigt, join
 from palpate.records import Record
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
+from palpate.bench.force_input import CONTACT
 from palpate.bench.metrics import Look
 from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
 from palpate.bench.metrics.window import SETTLE, losses, rms
-from palpate.bench.sequence import CONTACT
 from palpate.records import Record
 from palpate_thesis.claims import often, spread
 from palpate_thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, build
-from palpate.bench.sequence import COLUMNS, CONTACT, LOST
+from palpate.bench.force_input import COLUMNS, CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 

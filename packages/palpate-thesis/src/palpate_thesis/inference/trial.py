@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from palpate.bench import Experiment, build, changed
-from palpate.bench.sequence import DONE, INTERRUPTED
+from palpate.bench.force_input import DONE, INTERRUPTED
 from palpate.records import Record
 from palpate_thesis.figures import (
     fig_4_02,

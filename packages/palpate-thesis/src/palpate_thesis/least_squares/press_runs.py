@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, changed, load
-from palpate.bench.sequence import CONTACT
+from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall
 from palpate_thesis.laboratory.laboratory import own_damping
