@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from palpate.cli._answer import print_answer
-from palpate.cli._progress import counted
-from palpate.cli._terminal import console, place, print_lines, show_table
+from palpate.cli._terminal import console, counted, place, print_lines, show_table
 from palpate.cli.options.flags import FLAG
 
 if TYPE_CHECKING:
