@@ -1,0 +1,308 @@
+"""Slides simulated: an arm with its lags, a one-sided curved surface with friction, a sensor, and a law, compiled.
+
+The surface's own axes are x and y along it at its first point and z out of it. Nothing of the tangent filter is in here:
+friction is a bristle that sticks until mu N (Coulomb) and weakens with speed (Stribeck), shapes are distance functions.
+"""
+
+from typing import NamedTuple
+
+from palpate._jit import kernel, law, part
+from palpate._vector import ZERO3, Vec3, cos, exp, sin, sqrt
+from palpate.force.law import gain
+from palpate.force.sliding.slide_law import (
+    BOUND,
+    NORMAL,
+    PHASE,
+    SLIDE,
+    TROUBLE,
+    put_vector,
+    slide_step,
+    vector_at,
+)
+from palpate.force.sliding.sliding_loop import numbers_in
+from palpate.force.sliding.tangent_filter import G1, G2, LOG_K, MU, STATES, stiffness_of, unit, variance
+
+PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP, GRID = (float(i) for i in range(9))
+SHAPES = {"plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES, "eggs": EGGS, "step": STEP, "mesh": GRID}  # fmt: skip
+OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
+LAWS = {"sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE}  # fmt: skip
+COLUMNS = (
+    "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness", "log_std",
+    "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
+)  # fmt: skip
+"""Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
+speed commanded along the surface [m/s], reading [N], friction as it acts."""
+ELASTIC = 0.85
+"""Tangential over normal stiffness of the simulated contact if none is given."""
+
+
+@part
+class Ground(NamedTuple):
+    """A surface and its friction.
+
+    Args:
+        shape: one of `SHAPES`.
+        radius: of curvature; of waves at their crest [m].
+        period: of waves; place of a step [m].
+        height: of a step, downwards if negative [m].
+        stiffness: K [N/m].
+        damping: B [N s/m].
+        friction: mu at speed.
+        sticking: mu of a contact at rest, at least `friction`.
+        creep: speed over which one becomes the other [m/s].
+        ratio: tangential over normal stiffness.
+    """
+
+    shape: float
+    radius: float
+    period: float
+    height: float
+    stiffness: float
+    damping: float
+    friction: float
+    sticking: float
+    creep: float
+    ratio: float
+
+
+@law
+def outside(ground, heights, p):
+    """Distance of a point from the surface [m], negative inside, and the direction out of it."""
+    R, shape = ground.radius, ground.shape
+    up = Vec3(0.0, 0.0, 1.0)
+    if shape == PLANE:
+        return p.z, up
+    if shape == SPHERE:
+        away = p + R * up
+        return sqrt(away @ away) - R, unit(away, up)
+    if shape == BOWL:
+        away = R * up - p
+        return R - sqrt(away @ away), unit(away, up)
+    if shape == CYLINDER:
+        away = Vec3(p.x, 0.0, p.z + R)
+        return sqrt(away @ away) - R, unit(away, up)
+    h, hx, hy = height_at(ground, heights, p.x, p.y)
+    size = sqrt(1.0 + hx * hx + hy * hy)
+    return (p.z - h) / size, Vec3(-hx, -hy, 1.0) / size
+
+
+@law
+def height_at(ground, heights, x, y):
+    """Height of a surface that is one over the plane [m], and its slopes."""
+    R, k = ground.radius, 6.283185307179586 / ground.period
+    if ground.shape == SADDLE:
+        return 0.5 * (x * x - y * y) / R, x / R, -y / R
+    if ground.shape == WAVES:
+        return (cos(k * x) - 1.0) / (R * k * k), -sin(k * x) / (R * k), 0.0
+    if ground.shape == EGGS:
+        a = 1.0 / (R * k * k)
+        return (
+            a * (cos(k * x) * cos(k * y) - 1.0),
+            -a * k * sin(k * x) * cos(k * y),
+            -a * k * cos(k * x) * sin(k * y),
+        )
+    if ground.shape == STEP:
+        u = min(max((x - ground.period) / 2e-3 + 0.5, 0.0), 1.0)  # the tip's radius rounds an edge over 2 mm
+        return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
+    return on_grid(heights, ground.period, x, y)
+
+
+@law
+def on_grid(heights, spacing, x, y):
+    """Height and slopes of a square grid about (0, 0) at these places, by cubic splines of four points each way."""
+    n = heights.shape[0]
+    u, v = x / spacing + 0.5 * (n - 1), y / spacing + 0.5 * (n - 1)
+    i, j = int(min(max(u, 1.0), n - 3.0)), int(min(max(v, 1.0), n - 3.0))
+    a, b = u - i, v - j
+    h, hx, hy = 0.0, 0.0, 0.0
+    for k in range(4):
+        for m in range(4):
+            z = heights[i + k - 1, j + m - 1]
+            h += z * cubic(a, k) * cubic(b, m)
+            hx += z * slope_of_cubic(a, k) * cubic(b, m)
+            hy += z * cubic(a, k) * slope_of_cubic(b, m)
+    return h, hx / spacing, hy / spacing
+
+
+@law
+def cubic(t, k):
+    """Weight of the k-th of four points at t between the second and the third: a uniform cubic B-spline."""
+    if k == 0:
+        return (1.0 - t) ** 3 / 6.0
+    if k == 1:
+        return (3.0 * t**3 - 6.0 * t**2 + 4.0) / 6.0
+    if k == 2:
+        return (-3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0) / 6.0
+    return t**3 / 6.0
+
+
+@law
+def slope_of_cubic(t, k):
+    """Derivative of `cubic`."""
+    if k == 0:
+        return -0.5 * (1.0 - t) ** 2
+    if k == 1:
+        return 1.5 * t * t - 2.0 * t
+    if k == 2:
+        return -1.5 * t * t + t + 0.5
+    return 0.5 * t * t
+
+
+@part
+class Carried(NamedTuple):
+    """Tip and contact."""
+
+    x: Vec3  # of the arm [m]
+    v: Vec3  # of it [m/s]
+    stuck: Vec3  # place from which the bristle is bent [m]
+    depth: float  # the surface's own deflection [m]
+    touching: float
+    force: Vec3  # on the surface [N]
+    normal: float  # N [N]
+    friction: float  # of now
+
+
+@law
+def contact(world, ground, heights, tip, x, v, h):
+    """The contact of a tip at x with a speed v: spring and damper along the normal, a bristle along the surface."""
+    series = world.stiffness if world.torque == 0.0 else 1e12
+    where = x - tip.force / series
+    distance, out = outside(ground, heights, where)
+    n = -out
+    pen = -distance + n @ (x - where)
+    if pen <= 0.0:
+        return Carried(x, v, x, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    K, b = ground.stiffness, ground.damping
+    if world.torque == 0.0:
+        depth = (series * pen + b / h * tip.depth) / (series + K + b / h)
+        N = max(series * (pen - depth), 0.0)
+    else:
+        depth, N = pen, max(K * pen + b * (n @ v), 0.0)
+    stuck = tip.stuck if tip.touching > 0.0 else x
+    bent = x - stuck
+    bent = bent - (bent @ n) * n
+    k = ground.ratio * K / (1.0 + ground.ratio * K / series)
+    slip = v - (v @ n) * n
+    mu = ground.friction + (ground.sticking - ground.friction) * exp(
+        -slip @ slip / (ground.creep * ground.creep)
+    )
+    most, pull = mu * N / k, sqrt(bent @ bent)
+    if pull > most:
+        bent = bent * (most / pull)
+    return Carried(x, v, x - bent, depth, 1.0, N * n + k * bent, N, mu)
+
+
+# More than seven arguments: the kernel takes numbers, room and what it fills.
+@law
+def slide(world, ground, heights, numbers, s, rival, start, directions, desired, noise, line, out):
+    """A run from free motion until the directions are used up; row k of `out` is `COLUMNS`; returns the rows.
+
+    Args:
+        world: arm and sensor, each axis alike.
+        ground: the surface.
+        heights: of a mesh [m], shape (m, m); any others without one.
+        numbers: of the sliding law, flat.
+        s: its state, as it starts, shape (SIZE,).
+        rival: one of `LAWS`, which takes over when the force is held for the first time.
+        start: of the tip [m], shape (3,).
+        directions: for each tick of the slide, shape (m, 3).
+        desired: F_d [N].
+        noise: standard normal numbers, shape (n, 3).
+        line: room for what is on its way, shape (delay + 1, 3).
+        out: shape (n, 20).
+    """
+    law = numbers_in(numbers)
+    work, h, ticks = directions[0:1, 0].repeat(STATES), world.tick / world.steps, 0
+    tip = Carried(vector_at(start, 0), ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    x = y = z = ZERO3
+    reading, command, samples = world.noise * vector_at(noise[0], 0), tip.x, 0.0
+    n_rival, v_rival, filtered = ZERO3, ZERO3, ZERO3
+    for i in range(world.delay + 1):
+        put_vector(line[i], 0, command if world.torque == 0.0 else ZERO3)
+    for k in range(len(out)):
+        if ticks >= len(directions):
+            return k
+        seen = Vec3(
+            world.step * round(tip.x.x / world.step),
+            world.step * round(tip.x.y / world.step),
+            world.step * round(tip.x.z / world.step),
+        )
+        wanted = vector_at(directions[ticks], 0)
+        if rival == OWN or ticks == 0:
+            velocity = slide_step(law, s, work, desired, reading, seen, wanted, 0.0)
+            n_rival, filtered = vector_at(s, NORMAL), seen
+        if rival != OWN and ticks > 0:
+            n_rival, velocity = rival_step(
+                law, s, rival, n_rival, v_rival, filtered, seen, reading, wanted, desired
+            )
+            filtered = filtered + (0.05 * world.tick / 2e-3) * (seen - filtered)
+            v_rival = velocity
+        ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
+        command = command + world.tick * velocity
+        into = command
+        if world.torque > 0.0:
+            into = world.stiffness * (command - seen) - world.second * tip.v
+        put_vector(line[world.delay], 0, into)
+        held = vector_at(line[0], 0)
+        for i in range(world.delay):
+            for j in range(3):
+                line[i, j] = line[i + 1, j]
+        mean = 0.0
+        for j in range(world.steps):
+            pull = held - tip.force
+            rate = (
+                world.first * (held - tip.x) - world.second * tip.v
+                if world.torque == 0.0
+                else pull / world.first
+            )
+            v = tip.v + h * rate
+            tip = contact(world, ground, heights, tip, tip.x + h * v, v, h)
+            f = tip.force
+            x, y, z = world.E @ x + f.x * world.e, world.E @ y + f.y * world.e, world.E @ z + f.z * world.e
+            mean += tip.normal
+            if (k * world.steps + j + 1) * h >= world.phase + samples / world.sampling:
+                samples += 1.0
+                reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
+                reading = reading + world.noise * vector_at(noise[k], 0)
+        n = n_rival
+        _, up = outside(ground, heights, tip.x)
+        row = out[k]
+        row[0] = mean / world.steps
+        put_vector(row, 1, tip.x)
+        put_vector(row, 4, n)
+        row[7] = sqrt(max(2.0 + 2.0 * (n @ up), 0.0))
+        row[8] = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 0.0))
+        row[9], row[10] = s[MU], sqrt(max(variance(s, MU, MU), 0.0))
+        row[11], row[12] = stiffness_of(s), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
+        row[13], row[14] = 1.0 if ticks > 0 else 0.0, s[TROUBLE]
+        across = velocity - (velocity @ n) * n
+        row[15] = sqrt(across @ across)
+        put_vector(row, 16, reading)
+        row[19] = tip.friction
+        if s[PHASE] != SLIDE and ticks > 0:
+            row[13] = 2.0
+    return len(out)
+
+
+@law
+def rival_step(law, s, rival, n, v, filtered, seen, force, direction, desired):
+    """A tick of another law from the held force on, with the K_u that the press found: normal and velocity [m/s]."""
+    c = law.press
+    if rival == VELOCITY:
+        moved = seen - filtered
+        size = sqrt(moved @ moved)
+        if size > 5e-4:
+            along = moved / size
+            n = unit(n - 0.05 * (n @ along) * along, n)
+    flat = direction - (direction @ n) * n
+    across = law.speed * flat / max(sqrt(flat @ flat), 0.1)
+    g = gain(c, s[BOUND])
+    if rival == FZI:  # the whole vector of force error moves the tip, and motion is superposed
+        return n, g * (desired * n - force) + across + g * (force - (force @ n) * n) * 0.5
+    if rival == ADMITTANCE:  # M dv/dt + B v = F_d - f.n with B = 1/g and M/B of three lags
+        press = v @ n
+        return n, (press + c.tick / (3.0 * c.theta) * (g * (desired - force @ n) - press)) * n + across
+    return n, g * (desired - force @ n) * n + across
+
+
+compiled_slide = kernel(slide)
