@@ -27,6 +27,8 @@ HUBER = 3.0
 """Deviations from which an innovation counts no more than linearly."""
 WANDER = 0.05
 """Standard deviation of phi about Dahl's law after one length of its relaxation, in units of mu."""
+STICKS = 0.15
+"""The same in units of what phi lacks of mu: what Dahl's law leaves of a contact that sticks."""
 CHANGES = 0.5, 0.3
 """Standard deviations of ln K and of mu along a metre of path, per square root of it."""
 
@@ -91,14 +93,16 @@ def predict(s, d1, d2, dz, ratio, turning, noise):
     spread(s, FORCE, (stiffness * noise) ** 2)
     if way <= 0.0:
         return
-    length = max(s[MU], 0.02) * max(s[FORCE], 0.1) / (ratio * stiffness)
-    share = 1.0 - exp(-way / length)
+    mu = max(s[MU], 0.02)
+    lengths = way * ratio * stiffness / (mu * max(s[FORCE], 0.1))
+    kept = exp(-lengths)
     for i in range(2):
         along = (d1 if i == 0 else d2) / way
-        scale_row(s, F1 + i, 1.0 - share)
-        add_row(s, F1 + i, MU, share * along)
-        s[F1 + i] += share * (s[MU] * along - s[F1 + i])
-        spread(s, F1 + i, (WANDER * max(s[MU], 0.05)) ** 2 * (1.0 - (1.0 - share) ** 2))
+        lacks = s[MU] * along - s[F1 + i]
+        scale_row(s, F1 + i, kept)
+        add_row(s, F1 + i, MU, along * (1.0 - kept) - lacks * kept * lengths / mu)  # while it sticks, nothing tells mu
+        s[F1 + i] += (1.0 - kept) * lacks
+        spread(s, F1 + i, ((WANDER * max(mu, 0.05)) ** 2 + (STICKS * lacks) ** 2) * (1.0 - kept * kept))
     for i in range(H11, H22 + 1):
         spread(s, i, turning * way * (0.5 if i == H12 else 1.0))
     spread(s, LOG_K, CHANGES[0] ** 2 * way)
