@@ -71,8 +71,6 @@ WORTH = 0.06
 """Share of F_d that the slope's uncertainty may cost: the speed is limited so that it costs no more."""
 SLOWEST = 0.1
 """Share of the speed that is kept however unsure the slope is."""
-LONGEST = 1e-3
-"""Least share of friction's relaxation in a reading for which errors of the slope count as new."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
@@ -125,14 +123,14 @@ class Sliding(NamedTuple):
 
 
 (PHASE, TROUBLE, SILENT, UNCHANGED, TICKS, BOUND, SLOW, ROUGH, WAY, LOSS) = (FILTER + i for i in range(10))
-"""Places behind the filter: phase, trouble, ticks without a good reading and since one changed, ticks of all, K_u, share
-of the speed after a step, mean squared deviation of the force's angle, path in lengths of the relaxation of friction,
+"""Places behind the filter: phase, trouble, ticks without a good reading and since one changed, ticks of all, K_u,
+share of the speed after a step, mean squared deviation of the force's angle, path in lengths of the relaxation of friction,
 and ticks without contact."""
 (NORMAL, EDGE, VELOCITY, READ_AT, SEEN, FELT, POSITION, ORIGIN, AXIS) = (
     FILTER + 10 + 3 * i for i in range(9)
 )
-"""Vectors: normal, e1, velocity along the surface [m/s], position at the last reading and in the last tick as the sensor
-saw it [m], last force [N], last position and its origin [m]; then the sensor's low-pass of three axes."""
+"""Vectors: normal, e1, velocity along the surface [m/s], position at the last reading and in the last tick as the
+sensor saw it [m], last force [N], last position and its origin [m]; then the sensor's low-pass of three axes."""
 LAW = AXIS + 9
 SAFETY = LAW + STATE
 SIZE = SAFETY + GUARD
@@ -256,8 +254,7 @@ def learn(law, s, work, late, desired, force):
     put_vector(s, READ_AT, late)
     d1, d2, dz = way @ e1, way @ e2, way @ n
     length = max(s[MU], 0.05) * max(s[FORCE], 0.1) / (law.ratio * stiffness_of(s))
-    share = sqrt(d1 * d1 + d2 * d2) / length
-    s[WAY] += share
+    s[WAY] += sqrt(d1 * d1 + d2 * d2) / length
     predict(s, d1, d2, dz, law.ratio, law.turning, law.encoder + law.doubt * abs(dz) / c.period)
     f, f1, f2 = force @ n, force @ e1, force @ e2
     if f < max(c.level, 0.1 * desired):
@@ -265,7 +262,7 @@ def learn(law, s, work, late, desired, force):
     noise, N = c.noise * c.noise, s[FORCE]
     # the product of two uncertain states is noise here: before slip no reading shows the normal
     slope, friction = variance(s, G1, G1) + variance(s, G2, G2), variance(s, F1, F1) + variance(s, F2, F2)
-    curved = N * N * slope * (friction + slope) / min(max(share, LONGEST), 1.0)
+    curved = N * N * slope * (friction + slope)
     if abs(correct(s, FORCE, 1.0, G1, -N * s[F1], G2, -N * s[F2], f - N, noise + curved, GATE, work)) > GATE:
         s[FORCE], s[SLOW], s[TROUBLE] = f, 0.5, STEPPED
         spread(s, FORCE, noise)
