@@ -6,7 +6,8 @@ A cap too low by 2 to 50, an arm whose lag is twice or half that of its file, a 
 tip, a quiet sensor (0.01 N) that reads in steps which its file states, a surface with a mass. The surface has 300
 N/m to 100 kN/m (even in its logarithm), 20 N are desired, noise is 0.1 N. `hammers`: contact is lost more than three
 times, or later than a second after the first touch, and the press does not stop; a mass swings off the tip by itself.
-`faster again`: an approach after a lost contact faster than the first.
+`silently`: such a press, or one that neither settles nor stops, of which the loop says nothing. `faster again`: an
+approach after a lost contact faster than the first.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import msgspec
 import numpy as np
 
 from palpate.force.arm import load_arm
+from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import gains_for
-from palpate.force.guard import Guarded
+from palpate.force.guard import BEYOND, BOUNCED, SWINGS, TROUBLES, UNREACHED, Guarded
 from palpate.force.simulated_press import pressed, surface, world_of
 
 FORCE, SECONDS, NOISE = 20.0, 4.0, 0.1
@@ -88,7 +90,20 @@ def judge(rows, gains):
     again = force[lost[0] :] <= 0.0 if len(lost) else np.zeros(0, bool)
     faster = bool(len(lost)) and (speed[lost[0] :][again] > 1.0001 * gains.approach).any()
     hammers = (len(lost) > 3 or late) and not stopped
-    return ends, force.max() / FORCE - 1.0, len(lost), hammers, faster, stopped
+    silently = (hammers or not (ends or stopped)) and not said(rows, gains)
+    return ends, force.max() / FORCE - 1.0, len(lost), hammers, silently, faster, stopped
+
+
+def said(rows, gains):
+    """Whether the loop names a trouble with the surface or with the contact."""
+    loop = ForceLoop(gains)
+    troubles = {TROUBLES[code] for code in (BOUNCED, BEYOND, SWINGS, UNREACHED)}
+    places = np.concatenate([rows[:1, 2], rows[:-1, 2]])
+    for force, place in zip(rows[:, 4].tolist(), places.tolist(), strict=True):
+        loop.update(force, place)
+        if loop.trouble in troubles:
+            return True
+    return False
 
 
 def main() -> None:
@@ -101,16 +116,18 @@ def main() -> None:
         arm = load_arm(name)
         arm = msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=NOISE))
         print(f"\n{arm.title}, seed {options.seed}")
-        print(f"{'':32}settled  stopped  neither  hammers  faster again  lost: most  over: p50    most")
+        print(
+            f"{'':32}settled  stopped  neither  hammers  silently  faster again  lost: most  over: p50    most"
+        )
         for title, case in CASES.items():
             rows = [
                 judge(*press(arm, case, np.random.default_rng([options.seed, i])))
                 for i in range(options.touches)
             ]
-            ends, over, lost, hammers, faster, stopped = map(np.array, zip(*rows, strict=True))
+            ends, over, lost, hammers, silently, faster, stopped = map(np.array, zip(*rows, strict=True))
             print(
                 f"{title:32}{ends.sum():7}  {(stopped & ~ends).sum():7}  {(~ends & ~stopped).sum():7}"
-                f"  {hammers.sum():7}  {faster.sum():12}  {lost.max():10}"
+                f"  {hammers.sum():7}  {silently.sum():8}  {faster.sum():12}  {lost.max():10}"
                 f"  {100 * np.median(over):8.0f} %  {100 * over.max():6.0f} %",
                 flush=True,
             )

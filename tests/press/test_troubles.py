@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from palpate.force.guard import LATE, STALE, TROUBLES
+import pytest
+
+from palpate.force.guard import BEYOND, DRIFTS, LATE, STALE, SWINGS, TROUBLES
 from palpate.press.troubles import Troubles
 
 STANDS, LATELY = TROUBLES[STALE], TROUBLES[LATE]
@@ -31,3 +33,12 @@ def test_missed_ticks_alone_end_nothing():
     troubles = Troubles(0.2, lambda text: None)
     assert [troubles.lasting(LATELY, 0.01 * k) for k in range(100)] == [None] * 100
     assert not troubles.ticks
+
+
+@pytest.mark.parametrize("code", [DRIFTS, BEYOND, SWINGS])
+def test_a_trouble_that_is_borne_is_shown_and_counted_and_ends_nothing(code):
+    shown: list[str] = []
+    troubles = Troubles(0.2, shown.append)
+    assert [troubles.lasting(TROUBLES[code], 0.01 * k) for k in range(100)] == [None] * 100
+    assert shown == [TROUBLES[code]]
+    assert troubles.ticks == {TROUBLES[code]: 100}

@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate.force.backstop import MOST
-from palpate.force.contact_evidence import AIR, Watch
+from palpate.force.contact_evidence import AIR, MEMORY, Watch
 from palpate.force.law import Cautious, CautiousState
 from palpate.force.learned import Learned
-from palpate.force.stage import follows_no_tip
+from palpate.force.stage import LEARNING, LOCKED, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
 
 FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
-DRIFTS, UNTARED, BOUNCED, BEYOND = 8.0, 9.0, 10.0, 11.0
+DRIFTS, UNTARED, BOUNCED, BEYOND, SWINGS = 8.0, 9.0, 10.0, 11.0, 12.0
 TROUBLES = {
     FINE: "",
     BLIND: "a reading was no number, or beyond anything that the sensor or the arm can show: the tip was held",
@@ -31,6 +31,8 @@ TROUBLES = {
     BOUNCED: "contact was lost three times before the force was held: the surface is far stiffer than the gains' cap, "
     "or heavy; the tip was stopped: tune for a stiffer surface",
     BEYOND: "the surface is stiffer than the gains' cap, and no proof covers it: tune for a stiffer surface",
+    SWINGS: "the surface swings off the tip before the force is held: it is heavy, and no proof covers it; the tip "
+    "goes on at its approach until the force follows it",
 }
 FARTHEST = 3.0
 """Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer.
@@ -57,10 +59,12 @@ class SafetyState(NamedTuple):
     way: float  # of the command since then [m]
     vain: float  # force that the command should have added since the error last fell [N]
     reached: float  # force from which that counts [N]
+    touched: float  # 1 since the force was above the level, until it is within the noise
+    losses: float  # times that it came to be within the noise before it was held
     trouble: float  # of the last tick
 
 
-QUIET = SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, FINE)
+QUIET = SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, FINE)
 
 
 @law
@@ -68,11 +72,8 @@ def safe_step(law, state, guard, desired, force, position, missed):
     """One tick, with a safe answer to everything that is no reading: speed [m/s], and both states."""
     lag = law.theta / law.tick
     if not (abs(force) <= SCALES * law.full_scale and abs(position) <= FAR):
-        return (
-            0.0,
-            state,
-            SafetyState(guard.silent + 1.0, guard.unchanged, guard.way, guard.vain, guard.reached, BLIND),
-        )
+        silent, unchanged, way, vain, reached, touched, losses, _ = guard
+        return 0.0, state, SafetyState(silent + 1.0, unchanged, way, vain, reached, touched, losses, BLIND)
     gap = guard.silent > 0.0 or not missed <= 0.0
     if guard.silent > lag or not missed <= lag:  # too long to go on from what was known
         state = renewed(law, state)
@@ -82,11 +83,12 @@ def safe_step(law, state, guard, desired, force, position, missed):
     wanted, after = law.step(state, desired, force, position)
     vain, reached = in_vain(law, guard, after, desired, wanted)
     way = guard.way + law.tick * abs(wanted) if unchanged > 0.0 else 0.0
-    guard = SafetyState(0.0, unchanged, way, vain, reached, LATE if gap else FINE)
+    touched, losses = losses_of(law, guard, after)
+    guard = SafetyState(0.0, unchanged, way, vain, reached, touched, losses, LATE if gap else FINE)
     speed, trouble = allowed(law, guard, after, desired, force, wanted)
     if not abs(speed) <= law.speed:  # nothing that is not finite, or too fast, leaves
-        return 0.0, renewed(law, state), SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, BLIND)
-    return speed, after, SafetyState(0.0, unchanged, way, vain, reached, trouble)
+        return 0.0, renewed(law, state), SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BLIND)
+    return speed, after, SafetyState(0.0, unchanged, way, vain, reached, touched, losses, trouble)
 
 
 @part
@@ -141,8 +143,24 @@ def allowed(law, guard, after, desired, force, speed):
         return 0.0, UNTARED
     if after.bound.most > STIFFER * law.cap and guard.trouble == FINE:
         return speed, BEYOND
+    if guard.losses >= MOST and after.stage.phase == LEARNING and guard.trouble == FINE:
+        return speed, SWINGS
     drifts = abs(after.watch.drift) > SEEN * (after.watch.variance * law.period) ** 0.5
     return speed, DRIFTS if drifts and guard.trouble == FINE and after.stage.phase == AIR else guard.trouble
+
+
+@law
+def losses_of(law, guard, after):
+    """Whether the force was above the level, as a surface's is; how often it then fell to the noise before it was held.
+
+    A second of free motion forgets both.
+    """
+    stage, w = after.stage, after.watch
+    if stage.phase == LOCKED or (stage.phase == AIR and stage.since * law.tick > MEMORY):
+        return 0.0, 0.0
+    if guard.touched > 0.0 and stage.firm == 0.0:
+        return 0.0, guard.losses + 1.0
+    return 1.0 if w.mean - w.rest > law.level else guard.touched, guard.losses
 
 
 @law

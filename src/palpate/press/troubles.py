@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from palpate.force.guard import BEYOND, DRIFTS, LATE, TROUBLES
+from palpate.force.guard import BEYOND, DRIFTS, LATE, SWINGS, TROUBLES
 
-BORNE = {TROUBLES[code] for code in (LATE, DRIFTS, BEYOND)}
+BORNE = {TROUBLES[code] for code in (LATE, DRIFTS, BEYOND, SWINGS)}
 """Troubles with which a press goes on, however long they last."""
 
 
 class Troubles:
     """Troubles of the law: each is shown when it begins, and one that lasts longer than the lag ends the press.
 
-    Missed ticks alone do not: the wire counts them, and ends the press where they are too many.
+    Those of `BORNE` end none. Missed ticks are not shown: the wire counts them, and ends the press at too many.
 
     Args:
         lag: of the loop [s].
@@ -33,7 +33,7 @@ class Troubles:
             trouble: of this tick, empty for none.
             time: by the clock of the arm [s].
         """
-        trouble = "" if trouble in BORNE else trouble
+        trouble = "" if trouble == TROUBLES[LATE] else trouble
         if trouble != self._now:
             self._now, self._since = trouble, time
         if not trouble:
@@ -41,4 +41,4 @@ class Troubles:
         if trouble not in self.ticks:
             self._show(trouble)
         self.ticks[trouble] += 1
-        return trouble if time - self._since > self._lag else None
+        return trouble if time - self._since > self._lag and trouble not in BORNE else None
