@@ -20,7 +20,7 @@ from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
 from palpate.force.sensitivity import relief_of
-from palpate.force.sliding.slide_numbers import Slide
+from palpate.force.slide_table import Slide
 
 ALPHA = 0.42
 """Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.

@@ -54,8 +54,8 @@ PRESS, SLIDE = 0.0, 1.0
 ALONG, REFUTED, STEPPED, JERKS, LOST, DIRECTION = 20.0, 21.0, 22.0, 23.0, 24.0, 25.0
 SLIDING_TROUBLES = TROUBLES | {
     ALONG: "the direction asked for is along the normal: the tip does not slide; ask for one along the surface",
-    REFUTED: "the force leaves the friction cone about the estimated normal: the normal was wrong, or friction is above "
-    "mu_max; the tip stopped, and the normal is found again",
+    REFUTED: "the force leaves the friction cone about the estimated normal: the normal was wrong, or friction is "
+    "above mu_max; the tip stopped, and the normal is found again",
     STEPPED: "the force jumped without turning: a step, an edge or a hole in the surface; the tip slows down",
     JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
     LOST: "contact was lost: the tip stopped sliding, and approaches again",
@@ -124,8 +124,8 @@ class Sliding(NamedTuple):
 
 (PHASE, TROUBLE, SILENT, UNCHANGED, TICKS, BOUND, SLOW, ROUGH, WAY, LOSS) = (FILTER + i for i in range(10))
 """Places behind the filter: phase, trouble, ticks without a good reading and since one changed, ticks of all, K_u,
-share of the speed after a step, mean squared deviation of the force's angle, path in lengths of the relaxation of friction,
-and ticks without contact."""
+share of the speed after a step, mean squared deviation of the force's angle, path in lengths of the relaxation of
+friction, and ticks without contact."""
 (NORMAL, EDGE, VELOCITY, READ_AT, SEEN, FELT, POSITION, ORIGIN, AXIS) = (
     FILTER + 10 + 3 * i for i in range(9)
 )

@@ -1,6 +1,6 @@
 """Slides simulated: an arm with its lags, a one-sided curved surface with friction, a sensor, and a law, compiled.
 
-The surface's own axes are x and y along it at its first point and z out of it. Nothing of the tangent filter is in here:
+The surface's own axes are x and y along it at its first point and z out of it. Nothing of the filter is in here:
 friction is a bristle that sticks until mu N (Coulomb) and weakens with speed (Stribeck), shapes are distance functions.
 """
 
@@ -23,9 +23,14 @@ from palpate.force.sliding.sliding_loop import numbers_in
 from palpate.force.sliding.tangent_filter import G1, G2, LOG_K, MU, STATES, stiffness_of, unit, variance
 
 PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP, GRID = (float(i) for i in range(9))
-SHAPES = {"plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES, "eggs": EGGS, "step": STEP, "mesh": GRID}  # fmt: skip
+SHAPES = {
+    "plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES,
+    "eggs": EGGS, "step": STEP, "mesh": GRID,
+}  # fmt: skip
 OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
-LAWS = {"sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE}  # fmt: skip
+LAWS = {
+    "sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE,
+}  # fmt: skip
 COLUMNS = (
     "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness", "log_std",
     "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
@@ -192,9 +197,9 @@ def contact(world, ground, heights, tip, x, v, h):
     return Carried(x, v, x - bent, depth, 1.0, N * n + k * bent, N, mu)
 
 
-# More than seven arguments: the kernel takes numbers, room and what it fills.
+# Long, and with more than seven arguments: a kernel that takes numbers, room and what it fills.
 @law
-def slide(world, ground, heights, numbers, s, rival, start, directions, desired, noise, line, out):
+def slide_run(world, ground, heights, numbers, s, rival, start, directions, desired, noise, line, out):
     """A run from free motion until the directions are used up; row k of `out` is `COLUMNS`; returns the rows.
 
     Args:
@@ -218,15 +223,11 @@ def slide(world, ground, heights, numbers, s, rival, start, directions, desired,
     reading, command, samples = world.noise * vector_at(noise[0], 0), tip.x, 0.0
     n_rival, v_rival, filtered = ZERO3, ZERO3, ZERO3
     for i in range(world.delay + 1):
-        put_vector(line[i], 0, command if world.torque == 0.0 else ZERO3)
+        put_vector(line[i], 0, (1.0 - world.torque) * command)
     for k in range(len(out)):
         if ticks >= len(directions):
             return k
-        seen = Vec3(
-            world.step * round(tip.x.x / world.step),
-            world.step * round(tip.x.y / world.step),
-            world.step * round(tip.x.z / world.step),
-        )
+        seen = by_encoder(world, tip.x)
         wanted = vector_at(directions[ticks], 0)
         if rival == OWN or ticks == 0:
             velocity = slide_step(law, s, work, desired, reading, seen, wanted, 0.0)
@@ -239,10 +240,8 @@ def slide(world, ground, heights, numbers, s, rival, start, directions, desired,
             v_rival = velocity
         ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
         command = command + world.tick * velocity
-        into = command
-        if world.torque > 0.0:
-            into = world.stiffness * (command - seen) - world.second * tip.v
-        put_vector(line[world.delay], 0, into)
+        pulled = world.torque * (world.stiffness * (command - seen) - world.second * tip.v)
+        put_vector(line[world.delay], 0, (1.0 - world.torque) * command + pulled)
         held = vector_at(line[0], 0)
         for i in range(world.delay):
             for j in range(3):
@@ -264,24 +263,35 @@ def slide(world, ground, heights, numbers, s, rival, start, directions, desired,
                 samples += 1.0
                 reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
                 reading = reading + world.noise * vector_at(noise[k], 0)
-        n = n_rival
-        _, up = outside(ground, heights, tip.x)
-        row = out[k]
-        row[0] = mean / world.steps
-        put_vector(row, 1, tip.x)
-        put_vector(row, 4, n)
-        row[7] = sqrt(max(2.0 + 2.0 * (n @ up), 0.0))
-        row[8] = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 0.0))
-        row[9], row[10] = s[MU], sqrt(max(variance(s, MU, MU), 0.0))
-        row[11], row[12] = stiffness_of(s), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
-        row[13], row[14] = 1.0 if ticks > 0 else 0.0, s[TROUBLE]
-        across = velocity - (velocity @ n) * n
-        row[15] = sqrt(across @ across)
-        put_vector(row, 16, reading)
-        row[19] = tip.friction
-        if s[PHASE] != SLIDE and ticks > 0:
-            row[13] = 2.0
+        note(ground, heights, s, tip, n_rival, velocity, reading, mean / world.steps, out[k])
+        out[k, 13] = (1.0 if s[PHASE] == SLIDE else 2.0) * min(ticks, 1)
     return len(out)
+
+
+@law
+def by_encoder(world, x):
+    """A position in steps of the encoder [m]."""
+    step = world.step
+    return Vec3(step * round(x.x / step), step * round(x.y / step), step * round(x.z / step))
+
+
+# More than seven arguments: all that a row has.
+@law
+def note(ground, heights, s, tip, n, velocity, reading, mean, row):
+    """Fills a row of `COLUMNS`."""
+    _, up = outside(ground, heights, tip.x)
+    row[0] = mean
+    put_vector(row, 1, tip.x)
+    put_vector(row, 4, n)
+    row[7] = sqrt(max(2.0 + 2.0 * (n @ up), 0.0))
+    row[8] = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 0.0))
+    row[9], row[10] = s[MU], sqrt(max(variance(s, MU, MU), 0.0))
+    row[11], row[12] = stiffness_of(s), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
+    row[13], row[14] = 0.0, s[TROUBLE]
+    across = velocity - (velocity @ n) * n
+    row[15] = sqrt(across @ across)
+    put_vector(row, 16, reading)
+    row[19] = tip.friction
 
 
 @law
@@ -305,4 +315,4 @@ def rival_step(law, s, rival, n, v, filtered, seen, force, direction, desired):
     return n, g * (desired - force @ n) * n + across
 
 
-compiled_slide = kernel(slide)
+compiled_slide = kernel(slide_run)

@@ -15,12 +15,12 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.flat import flattened
 from palpate.force.gains import Gains, load_gains
-from palpate.force.guard import LEAST, TROUBLES
+from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
 from palpate.force.sliding import slide_law as places
+from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_law import SIZE, SLIDING_TROUBLES, Sliding, put_vector, slide_step, vector_at
-from palpate.force.sliding.slide_numbers import Slide
-from palpate.force.sliding.tangent_filter import BASE, COVARIANCE, F1, G1, LOG_K, MU, STATES
+from palpate.force.sliding.tangent_filter import BASE, COVARIANCE, G1, LOG_K, MU, STATES
 from palpate.results import Readable
 
 CHI2_95 = sqrt(5.991)
@@ -43,12 +43,12 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
     Raises:
         InputError: gains without that table, a direction without length.
     """
-    slide = gains.slide
-    if slide is None:
-        raise InputError("these gains have no numbers for a slide; tune again with --slide")
+    slide = numbers_of(gains)
     n = np.asarray(into, dtype=np.float64)
     if n.shape != (3,) or not np.isfinite(n).all() or not np.linalg.norm(n) > 0.0:
-        raise InputError(f"the direction into the surface needs three numbers that are not all 0, got {into}")
+        raise InputError(
+            f"the direction into the surface needs three numbers that are not all 0, got {into!r}"
+        )
     arm = gains.arm
     return Sliding(
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,

@@ -100,7 +100,9 @@ def predict(s, d1, d2, dz, ratio, turning, noise):
         along = (d1 if i == 0 else d2) / way
         lacks = s[MU] * along - s[F1 + i]
         scale_row(s, F1 + i, kept)
-        add_row(s, F1 + i, MU, along * (1.0 - kept) - lacks * kept * lengths / mu)  # while it sticks, nothing tells mu
+        add_row(
+            s, F1 + i, MU, along * (1.0 - kept) - lacks * kept * lengths / mu
+        )  # while it sticks, nothing tells mu
         s[F1 + i] += (1.0 - kept) * lacks
         spread(s, F1 + i, ((WANDER * max(mu, 0.05)) ** 2 + (STICKS * lacks) ** 2) * (1.0 - kept * kept))
     for i in range(H11, H22 + 1):

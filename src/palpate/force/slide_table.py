@@ -1,8 +1,7 @@
-"""The numbers of a slide in a gains file, and the domain of surfaces in closed form on which it obeys."""
+"""The numbers of a slide in a gains file."""
 
 from __future__ import annotations
 
-from math import atan, hypot
 from typing import Annotated
 
 from msgspec import Meta
