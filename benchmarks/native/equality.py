@@ -2,26 +2,33 @@
 
 Every compiler that is there is asked: gcc and clang on this machine, and Debian's cross compilers with QEMU's emulators
 for aarch64 and for a Cortex-M7. Python's ticks are recorded once for each law, with every fault; each build repeats
-them.
+them. What was measured is kept in `--out` beside a hash of its C, and is not measured again while that stays.
 
-    python benchmarks/native/equality.py --ticks 1e7 --m7 1e5
+    python benchmarks/native/equality.py --write          # 1e7 ticks by gcc and clang, 1e6 for aarch64, 1e5 on the M7
+    python benchmarks/native/equality.py --ticks 1e6 --emulated 1e5 --m7 1e4
 """
 
 from __future__ import annotations
 
 import argparse
-import os
+import hashlib
+import json
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
+from palpate.files import write_json, write_text
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.native.exporting import ExportedLaw, LawRequest, exported_law
-from palpate.native.replay import program, write_rows
+from palpate.native.replay import MARK, program, write_rows
 
+MARKS = "<!-- table: made by benchmarks/native/equality.py -->", "<!-- end of table -->"
+LAWS = {"force loop": "force", "contact identifier": "identifier", "least squares of 3": "squares"}
 PLAIN = "-std=c99 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror -I."
 LEVELS = ("-O0", "-O1", "-O2", "-O3")
 M7 = "-mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16"
@@ -52,7 +59,7 @@ TIMER = """
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
-static double row[ROW]; static double *rows; static float *took;
+static double row[ROW]; static double *rows; static float *took, *once;
 static int order(const void *a, const void *b) {
     float x = *(const float *)a, y = *(const float *)b;
     return x < y ? -1 : x > y;
@@ -68,6 +75,7 @@ int main(int count, char **words) {
     if (!file) return 2;
     while (sign != '\\n') sign = fgetc(file);
     rows = malloc(sizeof row * (size_t)most); took = malloc(sizeof *took * (size_t)most);
+    once = malloc(sizeof *once * (size_t)most);
     while (n < most && fread(rows + ROW * n, sizeof row, 1, file) == 1) n++;
     begun = now();
     for (long k = 0; k < n; ++k) {
@@ -76,31 +84,76 @@ int main(int count, char **words) {
         sum += CALL;
     }
     printf("%.0f ", (now() - begun) / (double)n);
-    for (long k = 0; k < n; ++k) {
-        const double *in = rows + ROW * k + 1; double a = now();
-        if (in[-1] > 0) NAME_init(gains, &state);
-        sum += CALL;
-        took[k] = (float)(now() - a);
+    for (int repeat = 0; repeat < 5; ++repeat) {
+        for (long k = 0; k < n; ++k) {
+            const double *in = rows + ROW * k + 1; double a = now(); float t;
+            if (in[-1] > 0) NAME_init(gains, &state);
+            sum += CALL;
+            t = (float)(now() - a);
+            once[k] = repeat ? once[k] : t;
+            took[k] = repeat && took[k] < t ? took[k] : t;
+        }
     }
     qsort(took, (size_t)n, sizeof *took, order);
-    printf("%.2f %g\\n", 1e-3 * (double)took[(long)(0.9999 * (double)n)], sum);
+    qsort(once, (size_t)n, sizeof *once, order);
+    n = (long)(0.9999 * (double)n);
+    printf("%.2f %.2f %g\\n", 1e-3 * (double)took[n], 1e-3 * (double)once[n], sum);
     return 0;
 }
 """
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ticks", type=float, default=1e6)
-    parser.add_argument("--m7", type=float, default=1e4)
-    parser.add_argument("--laws", nargs="+", default=["force", "squares", "identifier"])
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    worst = 0
-    with tempfile.TemporaryDirectory() as place:
-        for name in given.laws:
-            worst += asked(Path(place), name, int(given.ticks), int(given.m7), given.seed)
-    return int(worst > 0)
+class Bench:
+    """Measurements that are kept from one run to the next.
+
+    Args:
+        out: folder of what was measured.
+        folder: for sources, recordings and programs.
+    """
+
+    def __init__(self, out: Path, folder: Path):
+        self.file, self.folder = out / "equality.json", folder
+        out.mkdir(parents=True, exist_ok=True)
+        self.known = json.loads(self.file.read_text()) if self.file.exists() else {}
+        self.recorded: dict[str, int] = {}
+
+    def measured(self, law: ExportedLaw, title: str, ticks: int, ask) -> list[float] | None:
+        """What `ask` gives, or gave before for the same C."""
+        text = law.sources.header + law.sources.source + program(law.module, law.recording.inputs)
+        text = re.sub(r"palpate/\S+\.py:\d+", "", text)
+        key = f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {law.module.name}: {title}, {ticks}"
+        if key not in self.known:
+            self.known[key] = ask()
+            write_json(self.file, {"written_by": "palpate", **self.known})
+        print(f"{law.module.name}: {title}: {self.known[key]}", flush=True)
+        return self.known[key]
+
+    def rows(self, law: ExportedLaw, ticks: int, seed: int) -> Path:
+        """The file of that many recorded ticks: the first of the longest recording."""
+        path, count = self.folder / f"{law.module.name}.rows", self.recorded.get(law.module.name, 0)
+        if count < ticks:
+            write_rows(path, law.recording.presses(ticks, seed))
+            self.recorded[law.module.name] = count = ticks
+        if count == ticks:
+            return path
+        short = self.folder / "few.rows"
+        with path.open("rb") as source:
+            short.write_bytes(source.read(len(MARK) + 8 * (law.recording.inputs + 3) * ticks))
+        return short
+
+    def unequal(self, build: list[str], run: list[str], law: ExportedLaw, ticks: int, seed: int):
+        """Ticks, and those that differ in a bit; none where the compiler refuses."""
+        rows = self.rows(law, ticks, seed)
+        command([*build, f"{law.module.name}.c", "replay.c", "-lm", "-o", "replay"], self.folder)
+        words = command([word.replace("ROWS", rows.name) for word in run], self.folder, codes=(0, 1)).split()
+        return [int(words[1]), int(words[3])]
+
+
+def command(words: list[str], folder: Path, codes: tuple[int, ...] = (0,)) -> str:
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode not in codes:
+        raise SystemExit(f"{' '.join(words)}: {done.stderr[-500:]}")
+    return done.stdout
 
 
 def exported(name: str, folder: Path) -> ExportedLaw:
@@ -113,120 +166,151 @@ def exported(name: str, folder: Path) -> ExportedLaw:
     return exported_law(LawRequest("contact-identifier", sampling=480.0))
 
 
-def asked(folder: Path, name: str, ticks: int, few: int, seed: int) -> int:
-    law = exported(name, folder)
-    own, recording = law.module.name, law.recording
+def builds(given: argparse.Namespace) -> Iterator[tuple[str, str, list[str], list[str], int]]:
+    """Title, level, build, run and ticks of each that the machine has the programs for."""
+    targets = (
+        ("gcc", [], [], given.ticks),
+        ("clang", [], [], given.ticks),
+        ("aarch64-linux-gnu-gcc", ["-static"], ["qemu-aarch64-static"], given.emulated),
+    )
+    for compiler, more, runner, ticks in targets:
+        if all(map(shutil.which, (compiler, *runner))):
+            for level in LEVELS:
+                build = [compiler, *PLAIN.split(), level, *more]
+                yield compiler, level, build, [*runner, "./replay", "ROWS"], int(ticks)
+    if shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"):
+        build = ["arm-none-eabi-gcc", *M7.split(), *PLAIN.split(), "-O2", "startup.c", "-T", "sections.ld"]
+        run = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial null -kernel replay"
+        run += " -semihosting-config enable=on,target=native,arg=replay,arg=ROWS"
+        yield (
+            "arm-none-eabi-gcc, Cortex-M7",
+            "-O2",
+            [*build, "-specs=rdimon.specs"],
+            run.split(),
+            int(given.m7),
+        )
+
+
+def of_law(bench: Bench, name: str, given: argparse.Namespace) -> dict[str, str]:
+    """The cells of a law's column, by the first word of their row."""
+    law, folder = exported(name, bench.folder), bench.folder
+    own = law.module.name
     for file, text in (
-        (f"{own}.c", law.sources.source), (f"{own}.h", law.sources.header),
-        ("replay.c", program(law.module, recording.inputs)), ("startup.c", STARTUP), ("sections.ld", SECTIONS),
+        (f"{own}.c", law.sources.source), (f"{own}.h", law.sources.header), ("timer.c", timer(law)),
+        ("replay.c", program(law.module, law.recording.inputs)), ("startup.c", STARTUP), ("sections.ld", SECTIONS),
     ):  # fmt: skip
         (folder / file).write_text(text, encoding="utf-8")
-    write_rows(folder / "rows", recording.presses(ticks, seed))
-    write_rows(folder / "few", recording.presses(few, seed))
-    print(
-        f"\n| {own}, state {8 * law.sources.numbers} bytes | ticks | differ in a bit |\n|---|---|---|",
-        flush=True,
-    )
-    unequal = 0
-    builds = [
-        ([compiler], runner, level)
-        for compiler, runner in (
-            ("gcc", []),
-            ("clang", []),
-            ("aarch64-linux-gnu-gcc", ["qemu-aarch64-static"]),
-        )
-        for level in LEVELS
-        if shutil.which(compiler) and (not runner or shutil.which(runner[0]))
-    ]
-    for command, runner, level in builds:
-        words = [*command, *PLAIN.split(), level, f"{own}.c", "replay.c", "-lm", "-o", "replay"]
-        words += ["-static"] if runner else []
-        unequal += counted(folder, [*command, level], words, [*runner, "./replay", "rows"])
-    if name != "identifier" and shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"):
-        words = ["arm-none-eabi-gcc", *M7.split(), *PLAIN.split(), "-O2", f"{own}.c", "replay.c"]
-        words += ["startup.c", "-T", "sections.ld", "-specs=rdimon.specs", "-lm", "-o", "replay"]
-        run = [
-            "qemu-system-arm",
-            "-M",
-            "mps2-an500",
-            "-display",
-            "none",
-            "-monitor",
-            "none",
-            "-serial",
-            "null",
-        ]
-        run += ["-semihosting-config", "enable=on,target=native,arg=replay,arg=few", "-kernel", "replay"]
-        unequal += counted(folder, ["Cortex-M7 (emulated), arm-none-eabi-gcc -O2"], words, run)
-    measured(folder, law)
-    return unequal
-
-
-def counted(folder: Path, title: list[str], build: list[str], run: list[str]) -> int:
-    built = subprocess.run(build, cwd=folder, check=False, capture_output=True, text=True)  # noqa: S603
-    if built.returncode:
-        print(f"| {' '.join(title)} | not built: {built.stderr.strip().splitlines()[-1]} | |", flush=True)
-        return 1
-    done = subprocess.run(run, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-    words = done.stdout.split()
-    good = len(words) == 4
-    print(
-        f"| {' '.join(title)} | {words[1] if good else '-'} | {words[3] if good else done.stderr[-200:]} |",
-        flush=True,
-    )
-    return int(words[3]) if good else 1
-
-
-def measured(folder: Path, law: ExportedLaw) -> None:
-    """Prints sizes of the code, and the time of a tick."""
-    own = law.module.name
-    text = program(law.module, law.recording.inputs)
-    call = text.split("value = (double)")[1].split(";")[0]
-    out = "".join(
-        line + "\n"
-        for line in text.splitlines()
-        if line.startswith("    static double ") and "row" not in line
-    )
-    timer = (
-        TIMER.replace("NAME", own)
-        .replace("CALL", f"(double){call}")
-        .replace("int order", out + "int order", 0)
-    )
-    timer = timer.replace(
-        "static double row[ROW];",
-        f"enum {{ ROW = {law.recording.inputs + 3} }};\nstatic double row[ROW];\n{out}",
-    )
-    (folder / "timer.c").write_text(timer, encoding="utf-8")
-    flags = ["-O2", "-ffp-contract=off", "-fno-math-errno", "-I."]
-    gcc = os.environ.get("CC", "gcc")
-    subprocess.run([gcc, *flags, f"{own}.c", "timer.c", "-lm", "-o", "timer"], cwd=folder, check=True)  # noqa: S603
-    nanoseconds, tail, *_ = subprocess.run(  # noqa: S603
-        [folder / "timer", "rows"], cwd=folder, capture_output=True, text=True, check=True
-    ).stdout.split()
-    print(
-        f"\na tick by {gcc} -O2: {nanoseconds} ns of the processor; 99.99 % within {tail} us, the clock's call included"
-    )
-    targets = ((gcc, []), ("aarch64-linux-gnu-gcc", []), ("arm-none-eabi-gcc", M7.split()))
-    for compiler, more in targets:
+    cells: dict[str, list[str]] = {}
+    for title, level, build, run, ticks in builds(given):
+        if own == "palpate_identifier" and "M7" in title:
+            cells[title] = ["its weights are 1.8 MB"]
+            continue
+        counts = bench.measured(
+            law, f"{title} {level}", ticks,
+            lambda b=build, r=run, t=ticks: bench.unequal(b, r, law, t, given.seed),
+        )  # fmt: skip
+        cells.setdefault(title, []).append(f"{counts[1]} of {counts[0]:.0e}".replace("e+0", "e"))
+    rows = {title: one[0] + (" each" if len(one) > 1 else "") if len(set(one)) == 1 else ", ".join(one)
+            for title, one in cells.items()}  # fmt: skip
+    rows["state"] = f"{8 * law.sources.numbers} bytes"
+    for compiler in ("gcc", "clang"):
         if shutil.which(compiler):
-            for level in ("-O2", "-Os"):
-                words = [
-                    compiler,
-                    *more,
-                    *flags,
-                    level,
-                    "-fno-asynchronous-unwind-tables",
-                    "-c",
-                    f"{own}.c",
-                    "-o",
-                    "own.o",
-                ]
-                subprocess.run(words, cwd=folder, check=True)  # noqa: S603
-                ask = ["size", "own.o"]
-                sizes = subprocess.run(  # noqa: S603
-                    ask, cwd=folder, capture_output=True, text=True, check=True
-                )
-                print(f"text by {compiler} {level}: {sizes.stdout.split()[6]} bytes", flush=True)
+            took = bench.measured(
+                law, f"a tick by {compiler} -O2", 400_000, lambda c=compiler: ticked(bench, law, c)
+            )
+            row = f"a tick by {compiler} -O2; 99.99 % within, by the least of five repeats; by the first"
+            rows[row] = f"{took[0]:.0f} ns; {took[1]:.1f} us; {took[2]:.1f} us"
+    sizes = []
+    for compiler, more in (
+        ("gcc", ""),
+        ("clang", ""),
+        ("aarch64-linux-gnu-gcc", ""),
+        ("arm-none-eabi-gcc", M7),
+    ):
+        if shutil.which(compiler):
+            size = bench.measured(
+                law, f"code by {compiler} -O2", 0, lambda c=compiler, m=more: code(bench, law, c, m)
+            )
+            sizes.append(f"{1e-3 * size[0]:.1f}")
+    rows["code by gcc, clang, gcc for aarch64, for Cortex-M7, -O2 [kB]"] = ", ".join(sizes)
+    return rows
+
+
+FLAGS = ["-O2", "-std=gnu99", "-ffp-contract=off", "-fno-math-errno", "-I."]
+
+
+def ticked(bench: Bench, law: ExportedLaw, compiler: str) -> list[float]:
+    """A tick's time, the least of three runs [ns], and in that run two 99.99th percentiles [us].
+
+    The first takes of each tick the least of five repeats, the second its first: that of the machine, too.
+    """
+    rows = bench.rows(law, 400_000, 1).name
+    command([compiler, *FLAGS, f"{law.module.name}.c", "timer.c", "-lm", "-o", "timer"], bench.folder)
+    runs = [command(["./timer", rows], bench.folder).split() for _ in range(3)]
+    return min([float(word) for word in words[:3]] for words in runs)
+
+
+def code(bench: Bench, law: ExportedLaw, compiler: str, more: str) -> list[int]:
+    """Bytes of the code, constants included."""
+    words = [compiler, *more.split(), *FLAGS, "-fno-asynchronous-unwind-tables", "-c", f"{law.module.name}.c"]
+    command([*words, "-o", "own.o"], bench.folder)
+    return [int(command(["size", "own.o"], bench.folder).split()[6])]
+
+
+def timer(law: ExportedLaw) -> str:
+    """The program that measures a tick."""
+    text = program(law.module, law.recording.inputs)
+    lines = text.splitlines()
+    out = "".join(
+        f"{line}\n" for line in lines if line.startswith("    static double ") and "row" not in line
+    )
+    filled = TIMER.replace("NAME", law.module.name).replace("CALL", text.split("value = ")[1].split(";")[0])
+    size = f"enum {{ ROW = {law.recording.inputs + 3} }};\nstatic double row[ROW];\n{out}"
+    return filled.replace("static double row[ROW];", size)
+
+
+def table(columns: dict[str, dict[str, str]], given: argparse.Namespace) -> str:
+    """The table of all laws, in Markdown."""
+    rows = dict.fromkeys(row for cells in columns.values() for row in cells)
+    levels = ", ".join(LEVELS)
+    lines = [f"| ticks that differ in a bit, of | {' | '.join(columns)} |", "|---|" + "---|" * len(columns)]
+    for row in rows:
+        title = f"{row} {levels}" if row in {"gcc", "clang", "aarch64-linux-gnu-gcc"} else row
+        title += " -O2" if "M7" in row and "gcc," in row and "code" not in row else ""
+        emulated = ", emulated" if "aarch64-linux" in title or title.startswith("arm-none") else ""
+        lines.append(
+            f"| {title}{emulated} | {' | '.join(cells.get(row, '') for cells in columns.values())} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ticks", type=float, default=1e7)
+    parser.add_argument("--emulated", type=float, default=1e6)
+    parser.add_argument("--m7", type=float, default=1e5)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--laws", nargs="+", default=list(LAWS.values()))
+    parser.add_argument("--out", type=Path, default=Path("runs/native"))
+    parser.add_argument("--write", action="store_true", help="put the table into docs/native.md")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(dir=given.out if given.out.is_dir() else None) as place:
+        bench = Bench(given.out, Path(place))
+        columns = {title: of_law(bench, name, given) for title, name in LAWS.items() if name in given.laws}
+    text = table(columns, given)
+    print(text)
+    if given.write:
+        page = Path("docs/native.md")
+        before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
+        after = rest.split(MARKS[1])[1]
+        write_text(page, f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}")
+    bad = [
+        cell
+        for cells in columns.values()
+        for cell in cells.values()
+        if " of " in cell and not cell.startswith("0 ")
+    ]
+    return int(bool(bad))
 
 
 if __name__ == "__main__":

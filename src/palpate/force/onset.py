@@ -69,17 +69,17 @@ NO_STARTS = Starts(0.0, EMPTY, EMPTY, EMPTY, EMPTY, EMPTY, EMPTY)
 def later(starts, every, x, force):
     """With one more reading; each `every` readings there is a new start, and every second of them moves one back."""
     n, new, a, b, c, d, old = starts
-    if n % (32.0 * every) == 0.0:
-        old = d
-    if n % (16.0 * every) == 0.0:
-        d = c
-    if n % (8.0 * every) == 0.0:
-        c = b
-    if n % (4.0 * every) == 0.0:
-        b = a
-    if n % (2.0 * every) == 0.0:
-        a = new
     if n % every == 0.0:
+        if n % (32.0 * every) == 0.0:
+            old = d
+        if n % (16.0 * every) == 0.0:
+            d = c
+        if n % (8.0 * every) == 0.0:
+            c = b
+        if n % (4.0 * every) == 0.0:
+            b = a
+        if n % (2.0 * every) == 0.0:
+            a = new
         new = Line(x, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Starts(
         n + 1.0, new.taking(x, force), a.taking(x, force), b.taking(x, force), c.taking(x, force),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -23,38 +24,27 @@ class Constants:
 
     def __init__(self, structs: Structs, claim: Callable[[str, str], str]):
         self._structs, self._claim = structs, claim
-        self._names: dict[tuple[str, str, str], str] = {}
+        self._names: dict[Any, str] = {}
         self.definitions: list[str] = []
 
-    def value(self, name: str, value: Any, file: str) -> Value | None:
+    def value(self, name: str, value: Any, function: Callable[..., Any]) -> Value | None:
         """A number or a part that a module's name stands for; None if it is none of them."""
-        if isinstance(value, bool) or not isinstance(value, int | float | tuple):
-            return None
-        if isinstance(value, tuple) and not hasattr(value, "_fields"):
+        part = isinstance(value, tuple) and hasattr(value, "_fields")
+        if not part and (type(value) not in (int, float) or not math.isfinite(value)):
             return None
         import numba
 
-        kind = plain(numba.typeof(value))
-        key, note = self._home(name, value, file)
-        if key not in self._names:
-            own = self._names[key] = self._claim(c_name(name), key[1].rpartition(".")[2])
-            text = self.initial(value, kind)
-            self._define(f"static const {self._structs.name(kind)} {own} = {text};", note)
-        return Value(self._names[key], kind, place="named")
+        kind, (module, note) = plain(numba.typeof(value)), _home(name, value, function)
+        text = f"{self._structs.name(kind)} NAME = {self.initial(value, kind)};"
+        return Value(self._define(name, module, text, note), kind, place="named")
 
     def table(self, name: str, numbers: Any, function: Callable[..., Any]) -> str:
         """The name of a table of numbers that a module holds, row by row."""
-        key, note = self._home(name, None, function.__code__.co_filename)
-        key = (key[0], function.__module__, name)
-        if key not in self._names:
-            own = self._names[key] = self._claim(c_name(name), key[1].rpartition(".")[2])
-            flat = np.asarray(numbers, dtype=np.float64).ravel()
-            rows = [
-                ", ".join(number(float(x)) for x in row) for row in np.split(flat, range(6, len(flat), 6))
-            ]
-            text = "".join(f"\n    {row}," for row in rows)
-            self._define(f"static const double {own}[{len(flat)}] = {{{text}\n}};", note)
-        return self._names[key]
+        flat = np.asarray(numbers, dtype=np.float64).ravel()
+        rows = (", ".join(map(number, row.tolist())) for row in np.split(flat, range(6, len(flat), 6)))
+        text = f"double NAME[{len(flat)}] = {{" + "".join(f"\n    {row}," for row in rows) + "\n};"
+        note = constant_notes(function.__code__.co_filename).get(name, "")
+        return self._define(name, function.__module__, text, note)
 
     def initial(self, value: Any, kind: Any) -> str:
         """A part's numbers as C initialises a struct with them."""
@@ -63,15 +53,18 @@ class Constants:
         inner = (self.initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True))
         return "{" + ", ".join(inner) + "}"
 
-    def _home(self, name: str, value: Any, file: str) -> tuple[tuple[str, str, str], str]:
-        """Where a name is defined: the module that has the same value under it, and the sentence there."""
-        for module in [m for m in list(sys.modules.values()) if getattr(m, "__file__", None)]:
-            own = vars(module)
-            if own.get("__name__", "").startswith("palpate") and own.get(name) is value and value is not None:
-                note = constant_notes(str(module.__file__)).get(name)
-                if note:
-                    return ("value", module.__name__, name), note
-        return ("value", file, name) if value is None else ("value", repr(value), name), ""
+    def _define(self, name: str, module: str, text: str, note: str) -> str:
+        if (name, text) not in self._names:
+            own = self._names[name, text] = self._claim(c_name(name), module.rpartition(".")[2])
+            says = f"/* {note} */\n" if note else ""
+            self.definitions.append(f"{says}static const {text.replace('NAME', own, 1)}")
+        return self._names[name, text]
 
-    def _define(self, text: str, note: str) -> None:
-        self.definitions.append((f"/* {note} */\n" if note else "") + text)
+
+def _home(name: str, value: Any, function: Callable[..., Any]) -> tuple[str, str]:
+    """The module of ours that says what the value under the name is, and the sentence; or the function's."""
+    for module in [one for one in list(sys.modules.values()) if getattr(one, "__file__", None)]:
+        ours = module.__name__.startswith("palpate") and vars(module).get(name) is value
+        if ours and (note := constant_notes(str(module.__file__)).get(name)):
+            return module.__name__, note
+    return function.__module__, ""

@@ -32,9 +32,8 @@ def force_init(gains):
 
 @law
 def force_update(gains, state, desired, force, position, missed):
-    """One tick: the speed [m/s] and the state after it."""
-    speed, after, guard = safe_step(gains, state.law, state.guard, desired, force, position, missed)
-    return speed, GuardedState(after, guard)
+    """One tick: the speed [m/s] and both states after it."""
+    return safe_step(gains, state.law, state.guard, desired, force, position, missed)
 
 
 @law

@@ -54,7 +54,7 @@ class Entry:
     Args:
         name: of it, behind the prefix.
         law: of Python, called with gains, state and the arguments; one that changes a state of parts gives
-            it back last.
+            its fields back behind the value.
         meaning: of it and of its value.
         arguments: beside gains and state.
     """
@@ -187,7 +187,8 @@ class _Writer:
         kinds = [self.kind, self.state_kind, *kinds]
         result = plain(self.whole.rules.result(entry.law, tuple(kinds)))
         inner = members(result) if is_struct(result) else []
-        changes = not self.flat and bool(inner) and inner[-1][1] == self.state_kind
+        fields = [] if self.flat else members(self.state_kind)
+        changes = bool(fields) and [kind for _, kind in inner[1:]] == [kind for _, kind in fields]
         public = structs.publish(inner[0][1] if changes else result)
         known = self.whole.function(entry.law, tuple(kinds))
         values = ["gains" if by_pointer(self.kind) else "*gains"]
@@ -206,7 +207,10 @@ class _Writer:
         self._declare(head, entry.meaning, entry.arguments)
         if changes:
             of = structs.name(known.result)
-            body = f"    const {of} value = {call};\n    *state = value.{inner[-1][0]};\n    return value.v0;"
+            pairs = zip(fields, inner[1:], strict=True)
+            body = f"    const {of} value = {call};\n"
+            body += "".join(f"    state->{field} = value.{at};\n" for (field, _), (at, _) in pairs)
+            body += "    return value.v0;"
         else:
             body = f"    {'' if public == 'void' else 'return '}{call};"
         self.functions.append(f"{head} {{\n{body}\n}}")
@@ -267,7 +271,7 @@ class _Writer:
         return "\n".join(f"// {line.removeprefix('// ')}" for line in lines)
 
 
-_IEEE = """#if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0)
+_IEEE = """#if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
 #error "each operation is to be that of IEEE doubles: no -ffast-math, no -mfpmath=387"
 #endif
 #ifdef __clang__

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 from palpate.native.source import field_notes, first_sentence
 
 LARGE = 4
 """Numbers that a struct passes by value at most: two registers' worth more than a vector; larger ones go by pointer."""
-VIEW = (
-    "/* View of {0} numbers in memory of the caller: {1}. */\n"
-    "typedef struct {{\n    double *at;\n    int64_t shape[{2}];\n}} array{2};"
-)
+VIEW = """/* View of numbers in memory of the caller, one behind the other{}. */
+typedef struct {{
+    double *at;
+    int64_t shape[{}];
+}} {};"""
 
 
 def plain(kind: Any) -> Any:
@@ -65,13 +67,12 @@ _OF_ITS_LIBRARY = """
     main exp log pow sin cos sqrt floor fmod fabs isnan isfinite copysign y0 y1 yn j0 j1 jn gamma signal index memset
     nan NAN INFINITY I
 """
-_KEYWORDS, _LIBRARY = frozenset(_OF_THE_LANGUAGE.split()), frozenset(_OF_ITS_LIBRARY.split())
 
 
 def c_name(name: str, field: bool = False) -> str:
     """A name of Python as one of C: no leading underscore, none that the language or its library has."""
     bare = name.strip("_") or "unnamed"
-    taken = bare in _KEYWORDS or (not field and bare in _LIBRARY)
+    taken = bare in _OF_THE_LANGUAGE.split() or (not field and bare in _OF_ITS_LIBRARY.split())
     return f"{bare}_" if taken or bare != name else bare
 
 
@@ -83,8 +84,12 @@ class Structs:
     """
 
     def __init__(self, prefix: str):
+        from numba import types
+
         self.prefix = prefix
-        self._names: dict[Any, str] = {}
+        self._names: dict[Any, str] = {
+            types.float64: "double", types.int64: "int64_t", types.boolean: "bool", types.none: "void"
+        }  # fmt: skip
         self._public: dict[str, str] = {}
         self.definitions: list[str] = []
         self.header: list[str] = []
@@ -95,20 +100,8 @@ class Structs:
         Raises:
             KeyError: a type that the subset does not have.
         """
-        from numba import types
-
         kind = plain(kind)
-        scalars = {types.float64: "double", types.int64: "int64_t", types.boolean: "bool", types.none: "void"}
-        if kind in scalars:
-            return scalars[kind]
-        if kind not in self._names:
-            if isinstance(kind, types.Array):
-                self._names[kind] = self._define_view(kind)
-            elif is_struct(kind):
-                self._names[kind] = self._define(kind)
-            else:
-                raise KeyError(kind)
-        return self._names[kind]
+        return self._names.get(kind) or self._define(kind, self.name)
 
     @property
     def names_in_use(self) -> set[str]:
@@ -117,62 +110,44 @@ class Structs:
 
     def publish(self, kind: Any, name: str = "") -> str:
         """Defines a type in the header, with those inside it, under names of their own; the name there."""
-        from numba import types
-
         kind = plain(kind)
-        if isinstance(kind, types.Array) and kind not in self._names:
-            short = self._define_view(kind)
-            public = f"{self.prefix}_{short}"
-            self.header.append(self.definitions.pop().replace(f"}} {short};", f"}} {public};"))
-            self.definitions.append(f"typedef {public} {short};")
-            self._names[kind], self._public[short] = short, public
-        if not is_struct(kind):
-            name = self.name(kind)
-            return self._public.get(name, name)
-        if kind not in self._names:
-            inner = [(field, self.publish(one)) for field, one in members(kind)]
-            short = self._free_name(self._basis(kind))
-            public = name or f"{self.prefix}_{short}"
-            self.header.append(self._text(kind, inner, public))
-            self.definitions.append(f"typedef {public} {short};")
-            self._names[kind], self._public[short] = short, public
-        return self._public[self._names[kind]]
+        short = self._names.get(kind) or self._define(kind, self.publish, name)
+        return self._public.get(short, short)
 
-    def _define_view(self, kind: Any) -> str:
+    def _define(self, kind: Any, of: Callable[[Any], str], name: str = "") -> str:
+        """Defines a type whose fields have types that `of` names; where that publishes, in the header."""
+        text, basis = self._view(kind) if hasattr(kind, "ndim") else self._struct(kind, of)
+        choices = (basis, *(f"{basis}{i}" for i in range(2, 99)))
+        short = next(choice for choice in choices if choice not in self.names_in_use)
+        self._names[kind] = short
+        if of != self.publish:
+            self.definitions.append(text.replace("NAME;", f"{short};"))
+            return short
+        public = self._public[short] = name or f"{self.prefix}_{short}"
+        self.header.append(text.replace("NAME;", f"{public};"))
+        self.definitions.append(f"typedef {public} {short};")
+        return short
+
+    def _view(self, kind: Any) -> tuple[str, str]:
         from numba import types
 
         if kind.dtype != types.float64 or kind.layout != "C":
             raise KeyError(kind)
-        order = {1: "", 2: ", row by row", 3: ", table by table, row by row"}[kind.ndim]
-        self.definitions.append(VIEW.format("so many", f"one behind the other{order}", kind.ndim))
-        return f"array{kind.ndim}"
+        order = ["", ", row by row", ", table by table, row by row"][kind.ndim - 1]
+        return VIEW.format(order, kind.ndim, "NAME"), f"array{kind.ndim}"
 
-    def _define(self, kind: Any) -> str:
-        inner = [(field, self.name(one)) for field, one in members(kind)]
-        short = self._free_name(self._basis(kind))
-        self.definitions.append(self._text(kind, inner, short))
-        return short
-
-    def _basis(self, kind: Any) -> str:
+    def _struct(self, kind: Any, of: Callable[[Any], str]) -> tuple[str, str]:
+        if not is_struct(kind):
+            raise KeyError(kind)
         cls = getattr(kind, "instance_class", None)
-        if cls is not None:
-            return c_name(cls.__name__)
-        return "_and_".join(self.name(one).removesuffix("_t") for _, one in members(kind))
-
-    def _free_name(self, basis: str) -> str:
-        return next(
-            name for name in (basis, *(f"{basis}{i}" for i in range(2, 99))) if name not in self.names_in_use
+        notes = field_notes(cls) if cls else {}
+        says = first_sentence(inspect.getdoc(cls) or "") if cls and "__doc__" in vars(cls) else ""
+        fields = [(field, of(one)) for field, one in members(kind)]
+        lines = (
+            f"    {one} {field};" + (f" /* {notes[field]} */" if field in notes else "")
+            for field, one in fields
         )
-
-    def _text(self, kind: Any, inner: list[tuple[str, str]], name: str) -> str:
-        cls = getattr(kind, "instance_class", None)
-        notes = field_notes(cls) if cls is not None else {}
-        says = first_sentence(inspect.getdoc(cls) or "") if cls is not None and "__doc__" in vars(cls) else ""
-        if cls is None or says.startswith(f"{cls.__name__}("):
-            says = ""
-        lines = [f"    {of} {field};" + _comment(notes.get(field, "")) for field, of in inner]
-        return (f"/* {says} */\n" if says else "") + "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};"
-
-
-def _comment(text: str) -> str:
-    return f" /* {text} */" if text else ""
+        head = f"/* {says} */\n" if cls and says and not says.startswith(f"{cls.__name__}(") else ""
+        joined = "_and_".join(self.name(one).removesuffix("_t") for _, one in members(kind))
+        basis = c_name(cls.__name__) if cls else joined
+        return f"{head}typedef struct {{\n" + "\n".join(lines) + "\n} NAME;", basis

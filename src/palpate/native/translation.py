@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from palpate._jit.typing_rules import TypingRules
@@ -12,52 +14,12 @@ from palpate.native.source import place_of, refuse, syntax_of
 from palpate.native.statements import FunctionBody
 from palpate.native.structs import Structs, by_pointer, c_name, is_struct, members, plain
 
-HELPERS = {
-    ("larger", "double"): "(double a, double b) { return b > a ? b : a; }",
-    ("smaller", "double"): "(double a, double b) { return b < a ? b : a; }",
-    ("larger", "int64_t"): "(int64_t a, int64_t b) { return b > a ? b : a; }",
-    ("smaller", "int64_t"): "(int64_t a, int64_t b) { return b < a ? b : a; }",
-    ("square", "double"): "(double x) { return x * x; }",
-    ("cube", "double"): "(double x) { return x * (x * x); }",
-    ("root", "double"): "(double x) { return x == -INFINITY ? INFINITY : fabs(sqrt(x)); }",
-    ("modulo", "int64_t"): "(int64_t a, int64_t b) {\n    int64_t rest = a % b;\n"
-    "    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;\n}",
-    ("floored", "int64_t"): "(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a % b < 0) != (b < 0)); }",
-    ("modulo", "double"): """(double a, double b) {
-    double rest = fmod(a, b);
-    if (b == 0.0) {
-        return rest;
-    }
-    if (rest != 0.0) {
-        return (b < 0.0) != (rest < 0.0) ? rest + b : rest;
-    }
-    return b < 0.0 ? -0.0 : 0.0;
-}""",
-    ("floored", "double"): """(double a, double b) {
-    double rest = fmod(a, b), whole = (a - rest) / b, down;
-    if (b == 0.0) {
-        return a / b;
-    }
-    if (rest != 0.0 && (b < 0.0) != (rest < 0.0)) {
-        whole -= 1.0;
-    }
-    if (!(whole < 0.0 || whole > 0.0)) {
-        return whole * whole * a / b;
-    }
-    down = floor(whole);
-    return whole - down > 0.5 ? down + 1.0 : down;
-}""",
-}  # fmt: skip
-"""Operators whose meaning in Python is not that of one in C, as Numba compiles them."""
-_SAYS = {
-    "larger": "The larger of two, as Python's max: the first where they are equal or not comparable.",
-    "smaller": "The smaller of two, as Python's min.",
-    "square": "x ** 2.",
-    "cube": "x ** 3.",
-    "root": "x ** 0.5.",
-    "modulo": "a % b with Python's sign, that of b.",
-    "floored": "a // b of Python: rounded down.",
+_OPERATOR = re.compile(r"/\* (?P<says>.*) \*/\nstatic (?P<of>\w+) (?P<name>\w+)(?P<body>(?:.+\n)+)")
+OPERATORS = {
+    (found["name"], found["of"]): found
+    for found in _OPERATOR.finditer(Path(__file__).with_name("operators.c").read_text(encoding="utf-8"))
 }
+"""Operators whose meaning in Python is not that of one in C: a function in C for each and each type of its value."""
 
 
 class Translated(NamedTuple):
@@ -100,11 +62,10 @@ class Translation:
         Raises:
             OutsideSubset: it has something that the subset has not.
         """
-        kinds = tuple(plain(kind) for kind in kinds)
-        key = (function, kinds)
+        key = (function, tuple(plain(kind) for kind in kinds))
         if key not in self._functions:
             self._functions[key] = None
-            self._functions[key] = self._translate(function, kinds)
+            self._functions[key] = self._translate(*key)
         known = self._functions[key]
         if known is None:
             refuse(function, syntax_of(function), "a function that calls itself", "write a loop")
@@ -114,57 +75,44 @@ class Translation:
         result = plain(self.rules.result(function, kinds))
         body = FunctionBody(self, function, kinds, result)
         try:
-            for kind in (*kinds, result):
-                self.structs.name(kind)
+            names = [self.structs.name(kind) for kind in (*kinds, result)]
             part = function.__qualname__.rpartition(".")[0].rpartition(".")[2]
             method = part and "<locals>" not in function.__qualname__
-            name = c_name(f"{part}_{function.__name__.strip('_')}" if method else function.__name__)
-            structs = [self.structs.name(kind) for kind in kinds if is_struct(kind)]
-            name = self._claim(name, structs[0] if structs else "again")
-            text = body.text(name)
-        except KeyError as error:
-            refuse(
-                function,
-                body.tree,
-                f"a value of type {error.args[0]}",
-                "use numbers, truths, parts, float arrays",
+            own = c_name(f"{part}_{function.__name__.strip('_')}" if method else function.__name__)
+            beside = next(
+                (name for name, kind in zip(names, kinds, strict=False) if is_struct(kind)), "again"
             )
+            own = self._claim(own, beside)
+            text = body.text(own)
+        except KeyError as error:
+            remedy = "use numbers, truths, parts, float arrays"
+            refuse(function, body.tree, f"a value of type {error.args[0]}", remedy)
         says = [*_docstring(function), place_of(function)]
         comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
         self.definitions.append(f"/* {comment} */\n{text}")
-        return Translated(name, result, body.writes)
-
-    def implementation(self, callee: Any, kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
-        """The Python function that Numba compiles for a call with such types; None if it knows none."""
-        return self.rules.implementation(callee, kinds)
-
-    def signature(self, callee: Any, kinds: tuple[Any, ...]) -> Any:
-        """Numba's types of the operands and of the value of an operation on numbers."""
-        return self.rules.signature(callee, kinds)
+        return Translated(own, result, body.writes)
 
     def helper(self, name: str, kind: Any) -> str:
         """The name of a function that stands for one of Python's operators."""
         key = (name, self.structs.name(kind))
         if key not in self._helpers:
-            own = self._claim(name, f"of_{key[1].removesuffix('_t')}")
+            own, found = self._claim(name, f"of_{key[1].removesuffix('_t')}"), OPERATORS[key]
             self._helpers[key] = own
-            text = f"static {key[1]} {own}{HELPERS[key]}"
-            self.definitions.append(f"/* {_SAYS[name]} */\n{text}")
+            self.definitions.append(f"/* {found['says']} */\nstatic {key[1]} {own}{found['body'].rstrip()}")
         return self._helpers[key]
 
     def selector(self, kind: Any) -> str:
         """The name of a function that gives a field of a struct by its place."""
-        own = self.structs.name(kind)
-        key = ("at", own)
-        if key not in self._helpers:
-            name = self._helpers[key] = self._claim(f"{own}_at", "again")
-            fields, inner = members(kind), self.structs.name(members(kind)[0][1])
-            dot, given = ("->", f"const {own} *") if by_pointer(kind) else (".", f"{own} ")
-            choices = " : ".join(f"i == {k} ? v{dot}{field}" for k, (field, _) in enumerate(fields[:-1]))
+        of, inner = self.structs.name(kind), self.structs.name(members(kind)[0][1])
+        if ("at", of) not in self._helpers:
+            own = self._helpers["at", of] = self._claim(f"{of}_at", "again")
+            dot, given = ("->", f"const {of} *v") if by_pointer(kind) else (".", f"{of} v")
+            *first, last = (f"v{dot}{field}" for field, _ in members(kind))
+            choices = "".join(f"i == {k} ? {field} : " for k, field in enumerate(first))
             self.definitions.append(
-                f"static {inner} {name}({given}v, int64_t i) {{\n    return {choices} : v{dot}{fields[-1][0]};\n}}"
+                f"static {inner} {own}({given}, int64_t i) {{\n    return {choices}{last};\n}}"
             )
-        return self._helpers[key]
+        return self._helpers["at", of]
 
     def _claim(self, name: str, beside: str) -> str:
         """A name that nothing else of the file has: the name, that with another beside it, or with a number."""

@@ -1,0 +1,59 @@
+/* Operators whose meaning in Python is not that of one in C, as Numba compiles them. */
+
+/* The larger of two, as Python's max: the first where they are equal or not comparable. */
+static double larger(double a, double b) { return b > a ? b : a; }
+
+/* The smaller of two, as Python's min. */
+static double smaller(double a, double b) { return b < a ? b : a; }
+
+/* The larger of two, as Python's max: the first where they are equal or not comparable. */
+static int64_t larger(int64_t a, int64_t b) { return b > a ? b : a; }
+
+/* The smaller of two, as Python's min. */
+static int64_t smaller(int64_t a, int64_t b) { return b < a ? b : a; }
+
+/* x ** 2. */
+static double square(double x) { return x * x; }
+
+/* x ** 3. */
+static double cube(double x) { return x * (x * x); }
+
+/* x ** 0.5. */
+static double root(double x) { return x == -INFINITY ? INFINITY : fabs(sqrt(x)); }
+
+/* a % b with Python's sign, that of b. */
+static int64_t modulo(int64_t a, int64_t b) {
+    int64_t rest = a % b;
+    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
+}
+
+/* a // b of Python: rounded down. */
+static int64_t floored(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a % b < 0) != (b < 0)); }
+
+/* a % b with Python's sign, that of b. */
+static double modulo(double a, double b) {
+    double rest = fmod(a, b);
+    if (b == 0.0) {
+        return rest;
+    }
+    if (rest != 0.0) {
+        return (b < 0.0) != (rest < 0.0) ? rest + b : rest;
+    }
+    return b < 0.0 ? -0.0 : 0.0;
+}
+
+/* a // b of Python: rounded down. */
+static double floored(double a, double b) {
+    double rest = fmod(a, b), whole = (a - rest) / b, down;
+    if (b == 0.0) {
+        return a / b;
+    }
+    if (rest != 0.0 && (b < 0.0) != (rest < 0.0)) {
+        whole -= 1.0;
+    }
+    if (!(whole < 0.0 || whole > 0.0)) {
+        return whole * whole * a / b;
+    }
+    down = floor(whole);
+    return whole - down > 0.5 ? down + 1.0 : down;
+}
