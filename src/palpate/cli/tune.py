@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from palpate.force.inner_loop import InnerLoop
 
 
+# More than seven arguments: groups of options.
 def tune(
     found: Path | None = None,
     /,

@@ -23,7 +23,6 @@ LONGEST = 30.0
 """Time in which the surface is to be found and the force held [s]."""
 SETTLED = 0.5
 """Time after which a slide is judged [s]."""
-NO_MESH = np.zeros((4, 4))
 
 
 def directions(
@@ -57,7 +56,6 @@ def directions(
     return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
 
 
-# More than seven arguments: rivals and meshes are for few callers.
 def simulate(
     gains: Gains,
     ground: Ground,
@@ -66,7 +64,6 @@ def simulate(
     into: ArrayLike = DOWN,
     seed: int = 0,
     rival: str = "sliding",
-    heights: Array = NO_MESH,
 ) -> Array:
     """A slide from free motion on: rows of `COLUMNS`, shape (n, 20).
 
@@ -77,7 +74,6 @@ def simulate(
         into: direction in which the law looks for the surface, shape (3,).
         seed: of the noise.
         rival: one of `LAWS`.
-        heights: of a mesh [m], shape (k, k), at distances of `ground.period`.
     """
     if rival not in LAWS:
         raise unknown("law", rival, LAWS)
@@ -91,7 +87,7 @@ def simulate(
     start = -GAP * np.array(law.into)
     line = np.zeros((world.delay + 1, 3))
     rows = compiled_slide(
-        world, ground, heights, flattened(law), state, LAWS[rival], start, ways, gains.force, noise, line, out
+        world, ground, flattened(law), state, LAWS[rival], start, ways, gains.force, noise, line, out
     )
     return out[:rows]
 

@@ -15,7 +15,7 @@ UNSURE, AHEAD = 5e-3, 0.01
 
 
 def slide_terms(gains: Gains, stiffness: float, friction: float, radius: float) -> dict[str, float]:
-    """What a surface costs a slide: terms that are to be below `LIMITS`.
+    """Costs of a surface to a slide: terms that are to be below `LIMITS`.
 
     Args:
         gains: with a table `slide`.

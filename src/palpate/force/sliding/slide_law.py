@@ -51,7 +51,7 @@ from palpate.force.stage import LOCKED
 
 PRESS, SLIDE = 0.0, 1.0
 """Phases: the cautious law alone, and the slide."""
-ALONG, REFUTED, STEPPED, JERKS, LOST, DIRECTION = 20.0, 21.0, 22.0, 23.0, 24.0, 25.0
+ALONG, REFUTED, STEPPED, JERKS, LOST, DIRECTION, FRAMES = 20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0
 SLIDING_TROUBLES = TROUBLES | {
     ALONG: "the direction asked for is along the normal: the tip does not slide; ask for one along the surface",
     REFUTED: "the force leaves the friction cone about the estimated normal: the normal was wrong, or friction is "
@@ -59,6 +59,8 @@ SLIDING_TROUBLES = TROUBLES | {
     STEPPED: "the force jumped without turning: a step, an edge or a hole in the surface; the tip slows down",
     JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
     LOST: "contact was lost: the tip stopped sliding, and approaches again",
+    FRAMES: "the force is not along the direction into the surface: force and position need the same axes, those of "
+    "the base; the tip was held",
     DIRECTION: "the direction is no number: the tip does not slide",
 }
 CONE = 0.07
@@ -71,6 +73,9 @@ WORTH = 0.06
 """Share of F_d that the slope's uncertainty may cost: the speed is limited so that it costs no more."""
 SLOWEST = 0.1
 """Share of the speed that is kept however unsure the slope is."""
+CROOKED = 0.4
+"""Cosine between force and direction below which a press is in other axes: friction of 0.9 and a tilt of 20 degrees
+have 0.48."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
@@ -227,6 +232,9 @@ def press_tick(law, s, late, desired, force, position, missed):
         s[TROUBLE] = guard.trouble
     put_vector(s, READ_AT, late)
     size = sqrt(force @ force)
+    if size > 0.5 * desired and force @ n < CROOKED * size:
+        s[TROUBLE] = FRAMES
+        return ZERO3
     if press.stage.phase == LOCKED and size > 0.5 * desired and guard.trouble == FINE:
         stiffness = max(c.cap * press.known.found.x, c.floor)
         relative = min(max(c.cap * press.known.std.x / stiffness, 0.1), 0.5)

@@ -22,10 +22,10 @@ from palpate.force.sliding.slide_law import (
 from palpate.force.sliding.sliding_loop import numbers_in
 from palpate.force.sliding.tangent_filter import G1, G2, LOG_K, MU, STATES, stiffness_of, unit, variance
 
-PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP, GRID = (float(i) for i in range(9))
+PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP = (float(i) for i in range(8))
 SHAPES = {
     "plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES,
-    "eggs": EGGS, "step": STEP, "mesh": GRID,
+    "eggs": EGGS, "step": STEP,
 }  # fmt: skip
 OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
 LAWS = {
@@ -71,7 +71,7 @@ class Ground(NamedTuple):
 
 
 @law
-def outside(ground, heights, p):
+def outside(ground, p):
     """Distance of a point from the surface [m], negative inside, and the direction out of it."""
     R, shape = ground.radius, ground.shape
     up = Vec3(0.0, 0.0, 1.0)
@@ -86,19 +86,17 @@ def outside(ground, heights, p):
     if shape == CYLINDER:
         away = Vec3(p.x, 0.0, p.z + R)
         return sqrt(away @ away) - R, unit(away, up)
-    h, hx, hy = height_at(ground, heights, p.x, p.y)
+    h, hx, hy = height_at(ground, p.x, p.y)
     size = sqrt(1.0 + hx * hx + hy * hy)
     return (p.z - h) / size, Vec3(-hx, -hy, 1.0) / size
 
 
 @law
-def height_at(ground, heights, x, y):
+def height_at(ground, x, y):
     """Height of a surface that is one over the plane [m], and its slopes."""
     R, k = ground.radius, 6.283185307179586 / ground.period
     if ground.shape == SADDLE:
         return 0.5 * (x * x - y * y) / R, x / R, -y / R
-    if ground.shape == WAVES:
-        return (cos(k * x) - 1.0) / (R * k * k), -sin(k * x) / (R * k), 0.0
     if ground.shape == EGGS:
         a = 1.0 / (R * k * k)
         return (
@@ -106,51 +104,10 @@ def height_at(ground, heights, x, y):
             -a * k * sin(k * x) * cos(k * y),
             -a * k * cos(k * x) * sin(k * y),
         )
-    if ground.shape == STEP:
-        u = min(max((x - ground.period) / 2e-3 + 0.5, 0.0), 1.0)  # the tip's radius rounds an edge over 2 mm
-        return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
-    return on_grid(heights, ground.period, x, y)
-
-
-@law
-def on_grid(heights, spacing, x, y):
-    """Height and slopes of a square grid about (0, 0) at these places, by cubic splines of four points each way."""
-    n = heights.shape[0]
-    u, v = x / spacing + 0.5 * (n - 1), y / spacing + 0.5 * (n - 1)
-    i, j = int(min(max(u, 1.0), n - 3.0)), int(min(max(v, 1.0), n - 3.0))
-    a, b = u - i, v - j
-    h, hx, hy = 0.0, 0.0, 0.0
-    for k in range(4):
-        for m in range(4):
-            z = heights[i + k - 1, j + m - 1]
-            h += z * cubic(a, k) * cubic(b, m)
-            hx += z * slope_of_cubic(a, k) * cubic(b, m)
-            hy += z * cubic(a, k) * slope_of_cubic(b, m)
-    return h, hx / spacing, hy / spacing
-
-
-@law
-def cubic(t, k):
-    """Weight of the k-th of four points at t between the second and the third: a uniform cubic B-spline."""
-    if k == 0:
-        return (1.0 - t) ** 3 / 6.0
-    if k == 1:
-        return (3.0 * t**3 - 6.0 * t**2 + 4.0) / 6.0
-    if k == 2:
-        return (-3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0) / 6.0
-    return t**3 / 6.0
-
-
-@law
-def slope_of_cubic(t, k):
-    """Derivative of `cubic`."""
-    if k == 0:
-        return -0.5 * (1.0 - t) ** 2
-    if k == 1:
-        return 1.5 * t * t - 2.0 * t
-    if k == 2:
-        return -1.5 * t * t + t + 0.5
-    return 0.5 * t * t
+    if ground.shape == WAVES:
+        return (cos(k * x) - 1.0) / (R * k * k), -sin(k * x) / (R * k), 0.0
+    u = min(max((x - ground.period) / 2e-3 + 0.5, 0.0), 1.0)  # the tip's radius rounds an edge over 2 mm
+    return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
 
 
 @part
@@ -168,11 +125,11 @@ class Carried(NamedTuple):
 
 
 @law
-def contact(world, ground, heights, tip, x, v, h):
+def contact(world, ground, tip, x, v, h):
     """The contact of a tip at x with a speed v: spring and damper along the normal, a bristle along the surface."""
     series = world.stiffness if world.torque == 0.0 else 1e12
     where = x - tip.force / series
-    distance, out = outside(ground, heights, where)
+    distance, out = outside(ground, where)
     n = -out
     pen = -distance + n @ (x - where)
     if pen <= 0.0:
@@ -199,13 +156,12 @@ def contact(world, ground, heights, tip, x, v, h):
 
 # Long, and with more than seven arguments: a kernel that takes numbers, room and what it fills.
 @law
-def slide_run(world, ground, heights, numbers, s, rival, start, directions, desired, noise, line, out):
+def slide_run(world, ground, numbers, s, rival, start, directions, desired, noise, line, out):
     """A run from free motion until the directions are used up; row k of `out` is `COLUMNS`; returns the rows.
 
     Args:
         world: arm and sensor, each axis alike.
         ground: the surface.
-        heights: of a mesh [m], shape (m, m); any others without one.
         numbers: of the sliding law, flat.
         s: its state, as it starts, shape (SIZE,).
         rival: one of `LAWS`, which takes over when the force is held for the first time.
@@ -255,7 +211,7 @@ def slide_run(world, ground, heights, numbers, s, rival, start, directions, desi
                 else pull / world.first
             )
             v = tip.v + h * rate
-            tip = contact(world, ground, heights, tip, tip.x + h * v, v, h)
+            tip = contact(world, ground, tip, tip.x + h * v, v, h)
             f = tip.force
             x, y, z = world.E @ x + f.x * world.e, world.E @ y + f.y * world.e, world.E @ z + f.z * world.e
             mean += tip.normal
@@ -263,7 +219,7 @@ def slide_run(world, ground, heights, numbers, s, rival, start, directions, desi
                 samples += 1.0
                 reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
                 reading = reading + world.noise * vector_at(noise[k], 0)
-        note(ground, heights, s, tip, n_rival, velocity, reading, mean / world.steps, out[k])
+        note(ground, s, tip, n_rival, velocity, reading, mean / world.steps, out[k])
         out[k, 13] = (1.0 if s[PHASE] == SLIDE else 2.0) * min(ticks, 1)
     return len(out)
 
@@ -277,9 +233,9 @@ def by_encoder(world, x):
 
 # More than seven arguments: all that a row has.
 @law
-def note(ground, heights, s, tip, n, velocity, reading, mean, row):
+def note(ground, s, tip, n, velocity, reading, mean, row):
     """Fills a row of `COLUMNS`."""
-    _, up = outside(ground, heights, tip.x)
+    _, up = outside(ground, tip.x)
     row[0] = mean
     put_vector(row, 1, tip.x)
     put_vector(row, 4, n)
