@@ -29,7 +29,7 @@ WANDER = 0.05
 """Standard deviation of phi about Dahl's law after one length of its relaxation, in units of mu."""
 STICKS = 0.15
 """The same in units of what phi lacks of mu: what Dahl's law leaves of a contact that sticks."""
-CHANGES = 0.5, 0.3
+CHANGES = 0.1, 0.3
 """Standard deviations of ln K and of mu along a metre of path, per square root of it."""
 
 
