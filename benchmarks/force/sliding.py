@@ -2,10 +2,10 @@
 
     python benchmarks/force/sliding.py [--slides 300] [--rivals 60] [--faults 60] [--arms ur5e fr3 iiwa14] [--seed 100]
 
-The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N, noise
-0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along lines, circles, there and back, 4 s each.
-The normal is told with an error of up to 22 degrees (`far`), or of 3 degrees (standard deviation, `near`). `obeys`: after 0.5 s
-the true normal force is within 3 % rms and 10 %, and contact is kept. `domain`: the slides that the closed form of
+The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N,
+noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along circles, there and back, 4 s
+each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (standard deviation, `near`). `obeys`: after
+0.5 s the true normal force is within 3 % rms and 10 %, contact kept. `domain`: the slides that the closed form of
 palpate tune admits. Rivals begin where the force is first held, with the same K_u. Steps of 1 mm up or down, and
 friction that is 1.5 times as high at rest (below 10 mm/s), are counted apart.
 """
@@ -91,7 +91,7 @@ def main():
     parser.add_argument("--seed", type=int, default=100)
     args = parser.parse_args()
     print(
-        "arm, start                  n  obeys %  rms %  worst (p99)  lost  normal  cone %  mu %  K %  domain %  obeys in it %"
+        "arm, start, n, obeys %, rms %, worst (p99), lost, normal deg, cone %, mu %, K %, domain %, in it %"
     )
     for arm in args.arms:
         for start in ("far", "near"):

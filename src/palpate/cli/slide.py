@@ -36,7 +36,7 @@ class SlideOptions:
     arm
         ur5e, fr3, panda, iiwa14, or a TOML file.
     force
-        Desired force, as 15:N.
+        Desired force, as 20:N; that of the gains if left out, or 15 N.
     speed
         Along the surface, as 30:mm/s.
     shape
@@ -62,7 +62,7 @@ class SlideOptions:
     """
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
-    force: Annotated[str, SIGNED] = "15:N"
+    force: Annotated[str | None, SIGNED] = None
     speed: Annotated[str, SIGNED] = "30:mm/s"
     shape: str = "sphere:200:mm"
     surface: str = "K=20000,mu=0.3"
@@ -97,12 +97,18 @@ class SlideOptions:
 
     def tuned(self, radius: float) -> Gains:
         """Gains for the slide."""
+        from msgspec.structs import replace as msgspec_replace
+
         from palpate.force import load_arm, load_gains
         from palpate.force.gains import gains_for
 
+        wanted = in_si("--force", self.force or "15:N", "force")
         if self.gains is not None:
-            return load_gains(self.gains)
-        gains = gains_for(load_arm(self.arm), in_si("--force", self.force, "force"))
+            gains = load_gains(self.gains)
+            return gains if self.force is None else msgspec_replace(gains, force=wanted)
+        if not wanted > 0.0:
+            raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
+        gains = gains_for(load_arm(self.arm), wanted)
         return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt)
 
 
@@ -130,18 +136,19 @@ def slide(
         Print one JSON object and nothing else.
     """
     from palpate.force.sliding.simulated_slide import GAP, directions, simulate
+    from palpate.force.sliding.slide_domain import numbers_of
     from palpate.report.slide import sentence, summarise, write_report
 
     asked = asked or SlideOptions()
     ground, radius = asked.ground()
     gains = asked.tuned(abs(radius))
+    slide_numbers = numbers_of(gains)
     if not 1.0 <= asked.seconds <= 600.0:
         raise InputError(f"--seconds must be from 1 to 600, got {asked.seconds:g}")
     length = in_si("--length", asked.length, "length")
     if not length >= GAP:
         raise InputError(f"--length must be at least {1e3 * GAP:g} mm, got {1e3 * length:g} mm")
-    assert gains.slide is not None
-    ways = directions(asked.path, asked.seconds, gains.arm.rate, gains.slide.speed, length)
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, length)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     into = vector("normal", asked.normal, "number")
     with fresh_folder(folder, replace=replace) as fresh:

@@ -84,7 +84,7 @@ def simulate(
     n = len(ways) + round(LONGEST * arm.rate)
     out = np.zeros((n, len(COLUMNS)))
     noise = np.random.default_rng(seed).standard_normal((n, 3))
-    start = -GAP * np.array(law.into)
+    start = -GAP * np.array(law.into) * (-1.0 if law.into.z > 0.0 else 1.0)  # outside, however wrong it is
     line = np.zeros((world.delay + 1, 3))
     rows = compiled_slide(
         world, ground, flattened(law), state, LAWS[rival], start, ways, gains.force, noise, line, out
@@ -170,4 +170,8 @@ def ground_of(shape: str, radius: float, stiffness: float, **others: float) -> G
     low = [f"{name} of {value:g}" for name, value in numbers.items() if value < 0.0 and name != "height"]
     if low or not radius > 0.0 or not stiffness > 0.0:
         raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
+    if numbers["sticking"] < numbers["friction"]:
+        raise InputError(
+            f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"
+        )
     return Ground(SHAPES[shape], **{name: float(value) for name, value in numbers.items()})
