@@ -177,7 +177,7 @@ def test_the_domain_shrinks_with_speed_and_ends_where_its_terms_say() -> None:
     assert slow is not None
     assert fast is None or fast[1] <= slow[1]
     terms = slide_terms(tuned(speed=0.02), 2e4, 0.5, 0.1)
-    assert terms["start"] == pytest.approx(0.5 * 15.0 / (0.85 * load_arm("ur5e").seen(2e4) * 0.02))
+    assert terms["sticking"] == pytest.approx(0.5 * 15.0 / (0.85 * load_arm("ur5e").seen(2e4) * 0.1))
 
 
 @pytest.mark.parametrize(
