@@ -40,6 +40,11 @@ def chirp():
 
 
 @pytest.fixture(scope="module")
+def chirp_of_one_surface():
+    return design(replace(PROBLEM, kind="chirp", surfaces=KNOWN))
+
+
+@pytest.fixture(scope="module")
 def ten_seconds():
     return design(replace(PROBLEM, duration=10.0))
 
@@ -69,7 +74,9 @@ def test_it_is_no_longer_than_needed(multisine):
     assert multisine.needed <= multisine.seconds < multisine.needed + PERIOD
 
 
-@pytest.mark.parametrize("kind", ["multisine", "chirp"])
+@pytest.mark.parametrize(
+    "kind", ["multisine", "chirp_of_one_surface", pytest.param("chirp", marks=pytest.mark.long)]
+)
 def test_the_desired_force_keeps_to_its_budget(kind, request):
     found = request.getfixturevalue(kind)
     time, force = found.force(20_000.0)

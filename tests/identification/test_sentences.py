@@ -25,6 +25,12 @@ from palpate.report.identification.answer import lines
 from palpate.report.identification.words import UNTOUCHED, formatted, sentence
 
 DATA = Path(__file__).parents[3] / "shared/data"
+_SURFACES, _NUISANCES = (
+    list(dict.fromkeys(names)) for names in zip(*((c.surface, c.nuisance) for c in CELLS), strict=True)
+)
+SLICE = [c for c in CELLS if (_SURFACES.index(c.surface) + _NUISANCES.index(c.nuisance)) % 3 == 0]
+"""A third of the cells: each surface under ten nuisances, each nuisance on three surfaces. What a sentence says
+depends on the verdicts, the warnings and the working point, and each of them occurs many times among these."""
 MEASURED = {
     "skin_indentation/press_*.csv": {"time": "time_s", "position": "position_mm:mm", "force": "force_mN:mN"},
     "lattice_probe/probe_states.csv": {"time": "0", "position": "3:mm", "force": "4:g"},
@@ -83,7 +89,7 @@ def follows_strokes(record):
 
 
 @pytest.mark.parametrize(
-    "seed", [4, 5, 12, 25, 59, *(pytest.param(s, marks=pytest.mark.long) for s in range(100, 160))]
+    "seed", [4, 5, 12, 25, 59, *(pytest.param(s, marks=pytest.mark.long) for s in range(100, 120))]
 )
 def test_of_a_press_at_constant_speed(seed):
     world = plain_presses.world_of(seed)
@@ -94,7 +100,7 @@ def test_of_a_press_at_constant_speed(seed):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("cell", CELLS, ids=str)
+@pytest.mark.parametrize("cell", SLICE, ids=str)
 def test_of_any_surface_motion_and_nuisance(cell):
     log = make_log(cell, 77)
     record = record_of(log)

@@ -2,14 +2,21 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import polars
 import pytest
+from scipy.spatial.distance import cdist
 
 from palpate.cli import main
 from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
+from palpate.maps.presses import read_table
+from palpate.maps.result import MapRequest, map_of
 
 PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
 
@@ -60,6 +67,79 @@ def test_files_are_written_and_a_page_holds_the_numbers(table, tmp_path, capsys)
     assert ply[0] == "ply"
     assert int(next(line for line in ply if line.startswith("element vertex")).split()[2]) == len(grid)
     assert main(["map", "--table", str(table), *words]) == 0  # its own files are replaced
+
+
+def test_a_map_grows_to_the_whole_one(table):
+    result = map_of(read_table(table), MapRequest())
+    counts = [count for count, _ in result.film]
+    assert counts == sorted(set(counts))
+    assert counts[-1] == len(result.map)
+    inside = result.coarse.inside
+    width = [np.mean(seen.std[inside]) for _, seen in result.film]
+    assert np.all(np.diff(width) <= 0.0)
+    whole, _ = result.map.process.likeliest.predict(cdist(result.map.places, result.coarse.places))
+    assert result.film[-1][1].mean == pytest.approx(whole)
+
+
+def test_a_growing_map_is_written_for_foxglove(table, tmp_path):
+    mcap = pytest.importorskip("foxglove.mcap")
+    path = tmp_path / "map.mcap"
+    assert main(["map", "--table", str(table), "--mcap", str(path), "--next", "0"]) == 0
+    assert main(["map", "--table", str(table), "--mcap", str(path), "--next", "0"]) == 0  # replaces its own
+    assert path.read_bytes().startswith(b"\x89MCAP0\r\n")
+    assert path.read_bytes().endswith(b"\x89MCAP0\r\n")
+    assert mcap
+
+
+def test_a_live_map_follows_its_table(table, tmp_path):
+    """The file grows under the running command; the page loads itself again until a signal ends it."""
+    rows = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    growing, page = tmp_path / "growing.csv", tmp_path / "map.html"
+    growing.write_text("".join(rows[:25]), encoding="utf-8")
+    words = ["map", "--table", str(growing), "--live", "--report", str(page), "--next", "0"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "palpate", *words], stdout=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert _until(lambda: page.exists() and "24 presses" in page.read_text(encoding="utf-8"))
+            assert 'http-equiv="refresh"' in page.read_text(encoding="utf-8")
+            growing.write_text("".join(rows[:35]), encoding="utf-8")
+            assert _until(lambda: "34 presses" in page.read_text(encoding="utf-8"))
+            process.send_signal(signal.SIGINT)
+            assert process.wait(60) == 130
+        finally:
+            process.kill()
+    assert 'http-equiv="refresh"' not in page.read_text(encoding="utf-8")
+
+
+def _until(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.1)
+    return condition()
+
+
+def test_further_columns_are_mapped_beside_the_stiffness(table, tmp_path, capsys):
+    rows = table.read_text(encoding="utf-8").splitlines()
+    x = [float(row.split(",")[0]) for row in rows[1:]]
+    wide = tmp_path / "wide.csv"
+    lines = [
+        f"{row},{0.2 + 0.005 * at:.4f},{'' if at > 55 else 2.0 + 0.02 * at}"
+        for row, at in zip(rows[1:], x, strict=True)
+    ]
+    wide.write_text("\n".join([f"{rows[0]},loss,depth_mm", *lines]), encoding="utf-8")
+    files = ["--csv", str(tmp_path / "map.csv"), "--report", str(tmp_path / "map.html")]
+    assert main(["map", "--table", str(wide), "--fields", "loss,depth_mm", "--json", *files]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["units"] == {"stiffness": "N/m", "loss": "1", "depth": "m"}
+    for row in answer["map"]:
+        assert row["loss"] == pytest.approx(0.2 + 5.0 * row["x"], abs=0.01)
+        assert row["depth_low"] <= row["depth"] <= row["depth_high"]
+        assert row["depth"] == pytest.approx(2e-3 + 0.02 * row["x"], abs=1e-4)
+    assert "depth_high" in polars.read_csv(tmp_path / "map.csv").columns
+    assert "Depth. Half-width of its 95 % interval" in (tmp_path / "map.html").read_text(encoding="utf-8")
+    assert main(["map", "--table", str(wide), "--fields", "half_N/mm"]) == 2
+    assert "has already" in capsys.readouterr().err
 
 
 def test_logs_of_presses_are_identified_and_placed(tmp_path, capsys):

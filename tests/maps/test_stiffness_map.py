@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.maps import StiffnessMap
+from palpate.maps import FieldMap, StiffnessMap
 from palpate.maps.lumps import lumps_of
 from palpate.maps.next_press import choose, importance, travel
 
@@ -139,6 +139,24 @@ def test_a_curved_surface_is_mapped_in_its_own_places():
     low, high = result.predict(grid.places[grid.inside]).ci95.T
     known = truth(grid.places[grid.inside])
     assert np.mean((low < known) & (known < high)) > 0.85
+
+
+def test_a_field_without_intervals_has_the_scatter_of_its_presses():
+    """Values that may be negative; the shift and the scale of the unit change nothing."""
+    rng = np.random.default_rng(4)
+    places = np.vstack([CORNERS, rng.uniform(0.0, 0.1, (116, 2))])
+    value = lambda at: np.sin(50.0 * at[:, 0])  # noqa: E731
+    stated = value(places) + 0.05 * rng.normal(size=len(places))
+    field, other = FieldMap(), FieldMap()
+    field.update(places, stated)
+    other.update(places, 1e-3 * (stated + 7.0))
+    seen = field.predict(GRID)
+    low, high = seen.ci95.T
+    assert np.mean((low < value(GRID)) & (value(GRID) < high)) > 0.88
+    assert field.process.repeat == pytest.approx(0.05, rel=0.3)
+    assert other.predict(GRID).value == pytest.approx(1e-3 * (seen.value + 7.0), rel=1e-3)
+    with pytest.raises(InputError, match="value must be finite"):
+        field.update([[0.0, 0.0]], [np.nan])
 
 
 @pytest.mark.parametrize(

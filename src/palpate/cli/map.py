@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
+from time import sleep as wait
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
+from palpate.cli._interrupts import noticed
 from palpate.cli._one_log import OneLog
 from palpate.cli._program import command
 from palpate.cli._progress import bar
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from palpate.maps.result import MapRequest, MapResult
 
 MAP = Group("The map", sort_key=2)
+POLL = 0.5
+"""Time between two looks for presses [s]."""
 
 
 @Parameter(name="*", group=MAP)
@@ -47,6 +51,9 @@ class PlaceOptions:
         Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm.
     place
         Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
+    fields
+        Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss,
+        loss tangent and depth are mapped where presses show them.
     each_contact
         Each contact of a log is a press of its own, at its own place; else a log is one press.
     """
@@ -54,6 +61,7 @@ class PlaceOptions:
     table: Path | None = None
     columns: str | None = None
     place: str | None = None
+    fields: str | None = None
     each_contact: Annotated[bool, FLAG] = False
 
 
@@ -79,6 +87,8 @@ class MapOptions:
         Where the robot stands, as 10,20:mm; with --way a next press costs the way to it.
     way
         That the robot travels in the time of one press, as 50:mm.
+    live
+        Wait for more presses, and map them as they come, until Ctrl-C; a page that is written loads itself again.
     """
 
     next: int = 5
@@ -88,6 +98,7 @@ class MapOptions:
     common: float = 0.0
     start: str | None = None
     way: str | None = None
+    live: Annotated[bool, FLAG] = False
 
     def request(self) -> MapRequest:
         """The same for the library."""
@@ -128,11 +139,14 @@ class OutputOptions(ReportOption, JsonOption):
         Where to write the map as a table: place, stiffness, both intervals.
     ply
         Where to write the map as coloured points, for a viewer of point clouds.
+    mcap
+        Where to write the map as it grew, for Foxglove and Lichtblick.
     """
 
     figure: Path | None = None
     csv: Path | None = None
     ply: Path | None = None
+    mcap: Path | None = None
 
     def check(self) -> None:
         """Check every path before any work is done."""
@@ -141,6 +155,7 @@ class OutputOptions(ReportOption, JsonOption):
             (self.figure, "--figure", (".png", ".svg", ".pdf")),
             (self.csv, "--csv", (".csv",)),
             (self.ply, "--ply", (".ply",)),
+            (self.mcap, "--mcap", (".mcap",)),
         ):  # fmt: skip
             if path is not None:
                 ending = path.suffix.lower()
@@ -185,13 +200,74 @@ def map(  # noqa: A001 - the command's name
     one = OneLog(
         fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     )
+    name = places.table.name if places.table else logs[0].name
+    if asked is not None and asked.live:
+        return _watch(lambda known: _growth(logs, places, one, known), request, output, name)
     result = map_of(_presses(logs, places, one), request)
-    _write(result, output, places.table.name if places.table else logs[0].name)
+    _answer(result, output, name)
+    return 1 if result.presses.refused else 0
+
+
+def _answer(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
+    _write(result, output, name, live)
     if output.json:
         print_answer(result.to_json())
     else:
         _show(result, output)
-    return 1 if result.presses.refused else 0
+
+
+Known = dict[Path, tuple[tuple[int, int], "Presses | str", bool]]
+"""Of files: time and size; the presses in them or the reason why there are none; whether they are those of now."""
+
+
+def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: OutputOptions, name: str) -> int:
+    """Map again whenever there are other presses than before, until a signal; a map that fails is said once."""
+    from palpate.maps.result import map_of
+
+    known: Known = {}
+    result: MapResult | None = None
+    last: object = None
+    with noticed() as interrupted:
+        while not interrupted():
+            try:
+                presses = growth(known)
+                new = (len(presses.names), len(presses.refused), float(presses.stiffness.sum()))
+                if new != last:
+                    last, result = new, map_of(presses, request)
+                    _answer(result, output, name, live=True)
+            except InputError as error:
+                if str(error) != last:
+                    last = str(error)
+                    console(stderr=True).print(f"waiting: {error}", markup=False)
+            wait(POLL)
+        if result is not None:
+            _write(result, output, name)
+    return interrupted.code
+
+
+def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Known) -> Presses:
+    """The presses by now; a file is read when it has rested since the last look, and once."""
+    from palpate.logs.gathered import gather_logs
+    from palpate.maps.presses import merge_presses
+
+    for path in [places.table] if places.table is not None else gather_logs(logs):
+        state = path.stat()
+        mark = (state.st_mtime_ns, state.st_size)
+        last, part, read = known.get(path, (None, "", False))
+        if last == mark and not read:
+            try:
+                part = _presses([] if places.table else [path], places, one)
+            except InputError as error:
+                part = str(error)
+            read = True
+        known[path] = (mark, part, read and last == mark)
+    found = {path: part for path, (_, part, _) in known.items() if part}
+    parts = [part for part in found.values() if not isinstance(part, str)]
+    refused = {path.name: part for path, part in found.items() if isinstance(part, str)}
+    if not parts:
+        raise InputError(next(iter(refused.values()), "no press yet"))
+    presses = merge_presses(parts)
+    return replace(presses, refused=presses.refused | refused)
 
 
 def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses:
@@ -200,9 +276,10 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
     if places.table is not None:
         if places.place is not None:
             raise InputError("--place is of logs; the columns of a table are given with --columns")
-        return read_table(places.table, places.columns.split(",") if places.columns else ())
-    if places.columns is not None:
-        raise InputError("--columns is of --table; the place in logs is given with --place")
+        columns, fields = (each.split(",") if each else () for each in (places.columns, places.fields))
+        return read_table(places.table, columns, fields)
+    if places.columns is not None or places.fields is not None:
+        raise InputError("--columns and --fields are of --table; the place in logs is given with --place")
     from palpate.logs.gathered import gather_logs
 
     with bar(console(stderr=True)) as progress:
@@ -214,7 +291,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
         return read_logs(gather_logs(logs), one.identifier, named, places.each_contact, track)
 
 
-def _write(result: MapResult, output: OutputOptions, name: str) -> None:
+def _write(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
     from palpate.report.map import page
 
     if output.figure is not None:
@@ -225,8 +302,12 @@ def _write(result: MapResult, output: OutputOptions, name: str) -> None:
         result.write_csv(output.csv)
     if output.ply is not None:
         result.write_ply(output.ply)
+    if output.mcap is not None:
+        from palpate.maps.mcap import write_mcap
+
+        write_mcap(result, output.mcap)
     if output.report is not None:
-        write_text(output.report, page.page(result, f"Stiffness map of {name}", command()))
+        write_text(output.report, page.page(result, f"Stiffness map of {name}", command(), live=live))
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
@@ -242,6 +323,7 @@ def _show(result: MapResult, output: OutputOptions) -> None:
         ("figure", output.figure),
         ("table", output.csv),
         ("points", output.ply),
+        ("film", output.mcap),
     ):
         if path is not None:
             show_place(screen, f"{kind}:", path)

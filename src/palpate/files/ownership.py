@@ -20,7 +20,8 @@ SQLITE_ID = int.from_bytes(b"palp", "big")
 FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
-_KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file", ".csv": "CSV file"}
+_KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file", ".csv": "CSV file",
+          ".ply": "PLY file", ".mcap": "MCAP file"}  # fmt: skip
 _HEAD, _FOOT, _TAIL = 4096, 1 << 20, 8
 """Bytes that are looked at; the last ones of a Parquet file say how long what stands before them is."""
 _FEET = {
@@ -35,6 +36,7 @@ _MARKS = re.compile(
             rb'<meta name="generator" content="palpate">',
             rb'\A\s*\{\s*"written_by": ?"palpate',
             rb"^(?:#|//|<!--|%|comment) Made by palpate",
+            rb"\A\x89MCAP0\r\n\x01(?s:.{12})palpate",  # the profile, behind two lengths
             rb"\A(?:log|map) \(palpate\),",  # a table of identifications, a map
             rb"\A%s\r?\n" % ",".join(FORCE).encode(),
             rb"\ASQLite format 3\x00(?s:.{52})palp",  # where the application id stands

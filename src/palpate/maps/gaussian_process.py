@@ -6,7 +6,9 @@ Equations are those of Rasmussen and Williams, Gaussian Processes for Machine Le
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,8 +25,9 @@ SMOOTH, ROUGH = 5.0**0.5, 3.0**0.5
 """Factors of the distance in the Matern correlations (eq. 4.17)."""
 BLOCK = 300
 """Presses of one likelihood: of more, random blocks are independent (composite likelihood), so that time is linear."""
-CHUNK = 500
-"""Places of one prediction."""
+CHUNK = 10_000
+"""Covariances of one part of a prediction: few enough for a processor's cache, and for BLAS to start no threads of its
+own, which on a busy machine wait for each other a hundred times longer than they compute."""
 LEAST_WEIGHT = 0.02
 """Of a set of parameters that counts; `benchmarks/maps/coverage.py` prints the same coverage without this bound."""
 
@@ -48,14 +51,19 @@ class Hyperparameters:
     repeat: float
 
     def covariance(self, distance: Array) -> Array:
-        """Covariance of the field at distances [m] of any shape, in their precision."""
-        smooth, rough = distance * (SMOOTH / self.long), distance * (ROUGH / self.short)
-        fall, total = np.exp(-rough), np.exp(-smooth)
-        total *= self.smooth**2 * (1.0 + smooth * (1.0 + smooth / 3.0))
-        rough += 1.0
-        fall *= rough
-        fall *= self.rough**2
-        total += fall
+        """Covariance of the field at distances [m] of any shape."""
+        total, rough = distance * (-SMOOTH / self.long), distance * (-ROUGH / self.short)
+        fall = np.exp(total)
+        total -= 1.5  # 1 + s + s^2 / 3 is ((1.5 + s)^2 + .75) / 3
+        total *= total
+        total += 0.75
+        total *= self.smooth**2 / 3.0
+        total *= fall
+        np.exp(rough, out=fall)
+        rough -= 1.0
+        rough *= -(self.rough**2)
+        rough *= fall
+        total += rough
         return total
 
     @property
@@ -131,10 +139,9 @@ class Conditioned:
     def _reduce(self, distance: Array) -> tuple[Array, Array, Array]:
         """Mean, what the values take off the covariance, and what the mean's uncertainty adds."""
         k = self.parameters.covariance(distance)
-        kind = k.dtype
-        reduced = self.whitening.astype(kind) @ k
-        left = (1.0 - self.ones.astype(kind) @ reduced) / np.sqrt(self.ones @ self.ones)
-        return self.level + self.weights.astype(kind) @ k, reduced, left
+        reduced = self.whitening @ k
+        left = (1.0 - self.ones @ reduced) / np.sqrt(self.ones @ self.ones)
+        return self.level + self.weights @ k, reduced, left
 
 
 @dataclass(frozen=True)
@@ -154,12 +161,13 @@ def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     """A prior from the scales of the data: a factor of e or more either way about what the presses themselves show.
 
     The field varies as the values do; the long scale is half the region, the short one twice the spacing of presses;
-    presses repeat as they say.
+    presses repeat as they say or, where they say nothing, to a fifth of the values' spread.
     """
-    spread = max(float(np.std(values)), float(np.median(noise)))
+    spread = max(float(np.std(values)), float(np.median(noise)), 1e-9 * float(np.abs(values).max()), 1e-300)
     nearest = np.where(distance > 0.0, distance, np.inf).min(axis=1)
     region, spacing = float(distance.max()), float(np.median(nearest))
-    middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), float(np.median(noise)))
+    repeat = float(np.median(noise)) or spread / 5.0
+    middle = (spread, region / 2.0, spread / 2.0, min(2.0 * spacing, region / 2.0), repeat)
     return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
 
@@ -206,18 +214,20 @@ class GaussianProcess:
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
 
     def predict(self, places: Array) -> tuple[Array, Array]:
-        """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture.
+        """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture."""
 
-        Single precision, in parts that fit a processor's cache, is four times as fast as double precision at once.
-        """
-        mean, variance = np.empty(len(places)), np.empty(len(places))
-        for first in range(0, len(places), CHUNK):
-            part = slice(first, first + CHUNK)
-            distance = cdist(self.likeliest.places, places[part]).astype(np.float32)
-            moments = [node.predict(distance) for node in self.nodes]
-            means, variances = (np.array(each, dtype=float) for each in zip(*moments, strict=True))
-            mean[part] = self.weights @ means
-            variance[part] = self.weights @ (variances + (means - mean[part]) ** 2)
+        def moments(part: Array) -> Array:
+            distance = cdist(self.likeliest.places, part)
+            means, variances = np.moveaxis(np.array([node.predict(distance) for node in self.nodes]), 1, 0)
+            mean = self.weights @ means
+            return np.array([mean, self.weights @ (variances + (means - mean) ** 2)])
+
+        for node in self.nodes:
+            node.whitening, node.weights  # noqa: B018 - of all parts
+        size = max(CHUNK // len(self.likeliest.values), 16)
+        parts = [places[first : first + size] for first in range(0, len(places), size)]
+        with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
+            mean, variance = np.concatenate(list(pool.map(moments, parts)), axis=1)
         return mean, variance
 
 
@@ -234,6 +244,7 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
     """
     distance = cdist(places, places)
     prior = prior_of(distance, values, noise)
+    noise = np.maximum(noise, 1e-4 * np.std(values))  # else rounding decides between presses at one place
     order = np.random.default_rng(0).permutation(len(values))
     blocks = np.array_split(order, -(-len(values) // BLOCK))
 

@@ -18,10 +18,10 @@ from palpate.logs.read import read_log
 from palpate.logs.roles import POSE
 from palpate.logs.signals import Signals
 from palpate.logs.tables import Sheet, open_table
-from palpate.units import split_spec, unit, unit_in_name
+from palpate.units import UNITS, split_spec, unit, unit_in_name
 
 if TYPE_CHECKING:
-    from palpate.identification import Identification
+    from palpate.identification.result import Identification
 
 AXES = ("x", "y", "z")
 _NAMES = {"stiffness": ("stiffness", "K", "k"), "half": ("half", "half_width", "K_half")}
@@ -38,6 +38,8 @@ class Presses:
         half: half-width of each 95 % interval (n,) [N/m].
         names: of the presses: a log's name, or a row of the table.
         refused: logs that give no stiffness, by name, each with the reason.
+        fields: further quantities of the presses by name, each (n,), NaN where a press has none.
+        units: of the fields, SI.
     """
 
     places: Array
@@ -45,15 +47,32 @@ class Presses:
     half: Array
     names: Sequence[str]
     refused: dict[str, str] = field(default_factory=dict)
+    fields: dict[str, Array] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
 
-def read_table(path: Path, columns: Sequence[str] = ()) -> Presses:
+def merge_presses(parts: Sequence[Presses]) -> Presses:
+    """The presses of several readings; a quantity that one lacks is NaN there."""
+    fields = {name: unit for part in parts for name, unit in part.units.items()}
+    columns = {
+        name: np.concatenate([p.fields.get(name, np.full(len(p.stiffness), np.nan)) for p in parts])
+        for name in fields
+    }
+    return Presses(
+        np.vstack([p.places for p in parts]), np.concatenate([p.stiffness for p in parts]),
+        np.concatenate([p.half for p in parts]), [name for p in parts for name in p.names],
+        {name: why for p in parts for name, why in p.refused.items()}, columns, fields,
+    )  # fmt: skip
+
+
+def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] = ()) -> Presses:
     """Presses from a table with a row each.
 
     Args:
         path: of text, Parquet, a spreadsheet or a MATLAB file.
         columns: of x, y, stiffness and half, or of x, y, z, stiffness and half, each NAME or NAME:UNIT; by the names
             x, y, z, stiffness or K, and half if none are given. A name such as x_mm carries its unit.
+        further: columns of further quantities, each NAME or NAME:UNIT; a row may lack them.
 
     Raises:
         InputError: a column is missing, or a number is none.
@@ -69,7 +88,18 @@ def read_table(path: Path, columns: Sequence[str] = ()) -> Presses:
         values[role] = numbers * _factor(role, spec, sheet.names[place])
     where = np.column_stack([values[axis] for axis in AXES if axis in values])
     names = [f"row {i + 1}" for i in range(len(where))]
-    return Presses(where, values["stiffness"], values["half"], names)
+    fields, units = {}, {}
+    for spec in further:
+        column = sheet.resolve(split_spec(spec)[0])
+        name, symbol = sheet.names[column], split_spec(spec)[1]
+        for quantity in {each.quantity for each in UNITS.values()}:
+            symbol = symbol or unit_in_name(name, quantity)
+        name = _without_unit(name, unit(symbol or "1").quantity)
+        if name in (*values, "name", "low", "high"):
+            raise InputError(f"--fields names {name!r}, which the map has already")
+        (numbers,) = sheet.numbers([column], ())
+        fields[name], units[name] = numbers * unit(symbol or "1").factor, unit(symbol or "1").si
+    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units)
 
 
 def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
@@ -79,7 +109,7 @@ def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
                 f"--columns needs x,y,stiffness,half or x,y,z,stiffness,half, got {len(columns)} names"
             )
         return dict(zip((*AXES[: len(columns) - 2], "stiffness", "half"), columns, strict=True))
-    plain = {_without_unit(name, role): name for role in _QUANTITIES for name in sheet.names}
+    plain = {_without_unit(name, _QUANTITIES[role]): name for role in _QUANTITIES for name in sheet.names}
     found = {role: plain[name] for role in _QUANTITIES for name in _NAMES.get(role, (role,)) if name in plain}
     lacking = [role for role in ("x", "y", "stiffness", "half") if role not in found]
     if lacking:
@@ -90,8 +120,8 @@ def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
     return {role: found[role] for role in _QUANTITIES if role in found}
 
 
-def _without_unit(name: str, role: str) -> str:
-    symbol = unit_in_name(name, _QUANTITIES[role])
+def _without_unit(name: str, quantity: str) -> str:
+    symbol = unit_in_name(name, quantity)
     return (
         name
         if symbol is None
@@ -132,7 +162,7 @@ def read_logs(
     Raises:
         InputError: no log has a place and a stiffness.
     """
-    places, numbers, names, refused = [], [], [], dict[str, str]()
+    places, numbers, names, refused, further = [], [], [], dict[str, str](), []
     for log in track(logs):
         try:
             parts = _contacts(log, identifier) if each_contact else {log.name: identifier}
@@ -141,12 +171,14 @@ def read_logs(
         for name, part in parts.items():
             try:
                 where = _named_place(log, part, place) if place else _pose_of(log, part)
-                numbers.append(_stiffness(part.identify(log)[0]))
+                found = part.identify(log)[0]
+                numbers.append(_stiffness(found))
             except (PalpateError, OSError) as error:
                 refused[name] = " ".join(str(error).split())
                 continue
             places.append(where)
             names.append(name)
+            further.append([each(found) for _, each in FIELDS.values()])
     if not places:
         raise InputError(
             f"none of {len(logs)} logs gives a press with a place: {next(iter(refused.values()))}"
@@ -154,7 +186,40 @@ def read_logs(
     if len({len(where) for where in places}) > 1:
         raise InputError("some logs have a place of two coordinates and some of three; a map has one frame")
     stiffness, half = np.array(numbers).T
-    return Presses(np.array(places), stiffness, half, names, refused)
+    columns = np.array(further, dtype=float).T
+    fields = {name: each for name, each in zip(FIELDS, columns, strict=True) if np.isfinite(each).any()}
+    units = {name: FIELDS[name][0] for name in fields}
+    return Presses(np.array(places), stiffness, half, names, refused, fields, units)
+
+
+def _relaxation(found: Identification) -> float | None:
+    """Share of the force that is gone at the end of a hold."""
+    return found.press.relaxation.share if found.press and found.press.relaxation else None
+
+
+def _loss(found: Identification) -> float | None:
+    """Share of the work that does not come back."""
+    return found.press.hysteresis_loss if found.press else None
+
+
+def _tangent(found: Identification) -> float | None:
+    """Tangent of the loss angle in the lowest octave."""
+    octave = found.dynamic_stiffness[0] if found.dynamic_stiffness else None
+    return octave.loss / octave.storage if octave and octave.storage > 0.0 else None
+
+
+def _depth(found: Identification) -> float | None:
+    """Mean depth in contact, from the surface [m]."""
+    point = found.working_point
+    return point.depth_m if point and point.from_surface else None
+
+
+FIELDS: dict[str, tuple[str, Callable[[Identification], float | None]]] = {
+    "relaxation": ("1", _relaxation), "loss": ("1", _loss), "loss_tangent": ("1", _tangent), "depth": ("m", _depth),
+}  # fmt: skip
+"""Further quantities of a press, by name: the unit, and the quantity of an identification."""
+LEAST = 5
+"""Presses with a quantity of which there is a map: the field, its two scales, its repetition and its mean."""
 
 
 def _contacts(log: Path, identifier: LogIdentifier) -> dict[str, LogIdentifier]:

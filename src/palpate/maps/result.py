@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from palpate.arrays import Array
+from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.maps.lumps import Lump, lumps_of
 from palpate.maps.next_press import Goal, NextPresses
-from palpate.maps.presses import AXES, Presses
-from palpate.maps.stiffness_map import Prediction, StiffnessMap
+from palpate.maps.presses import AXES, LEAST, Presses
+from palpate.maps.stiffness_map import FieldMap, Prediction, StiffnessMap
 from palpate.maps.surface import Grid
 
 SHOWN = 2500
 """Places of the grid that is shown and printed: finer than presses lie, and a page of 200 kB."""
+
+FRAMES = 16
+"""Of the map as it grew."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,38 @@ class MapResult:
         """Presses that their neighbours contradict."""
         return self.map.disagreeing()
 
+    @cached_property
+    def fields(self) -> dict[str, Prediction]:
+        """Further fields at the grid, by name: those that vary, over presses that span a surface."""
+        found = {}
+        for name, values in self.presses.fields.items():
+            known = np.isfinite(values)
+            if known.sum() < LEAST or np.ptp(values[known]) == 0.0:
+                continue
+            field = FieldMap(name=name)
+            field.update(self.presses.places[known], values[known])
+            with suppress(InputError):
+                found[name] = field.predict(self.grid.places)
+        return found
+
+    @cached_property
+    def film(self) -> list[tuple[int, Prediction]]:
+        """The map of the first presses, of ever more of them, at `coarse`, all with the scales of the whole map."""
+        whole, n = self.map.process.likeliest, len(self.map)
+        counts = np.unique(np.linspace(min(n, 4), n, FRAMES).round().astype(int))
+        distance = cdist(whole.places, self.coarse.places)
+        frames = []
+        for k in map(int, counts):
+            first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
+            mean, variance = first.predict(distance[:k])
+            frames.append((k, Prediction(mean, np.sqrt(variance), np.sqrt(variance), self.request.common)))
+        return frames
+
+    @cached_property
+    def coarse(self) -> Grid:
+        """Places of the film."""
+        return self.map.grid(SHOWN // 4)
+
     @property
     def repeat(self) -> float:
         """Relative half-width by which two presses at one place differ, 95 %, beyond their own intervals."""
@@ -104,10 +142,15 @@ class MapResult:
                    "next_low": seen.next95[:, 0], "next_high": seen.next95[:, 1]}  # fmt: skip
         if self.request.stiffer_than is not None:
             columns["stiffer"] = seen.exceeds(self.request.stiffer_than)
+        for name, field in self.fields.items():
+            columns |= {name: field.value, f"{name}_low": field.ci95[:, 0], f"{name}_high": field.ci95[:, 1]}
         found: dict[str, Any] = {
             "places": _rows(
-                self.map.places, {"stiffness": self.map.stiffness, "half": self.map.half}, self.presses.names
+                self.map.places,
+                {"stiffness": self.map.stiffness, "half": self.map.half} | self.presses.fields,
+                self.presses.names,
             ),
+            "units": {"stiffness": "N/m"} | self.presses.units,
             "map": _rows(
                 self.grid.places[inside], {name: values[inside] for name, values in columns.items()}
             ),
@@ -183,6 +226,6 @@ def _rows(places: Array, columns: dict[str, Array], names: Sequence[str] = ()) -
     rows = []
     for i, place in enumerate(places):
         where = dict(zip(AXES, map(float, place), strict=False))
-        row = where | {name: float(values[i]) for name, values in columns.items()}
+        row = where | {name: float(v[i]) for name, v in columns.items() if np.isfinite(v[i])}
         rows.append(row | ({"name": names[i]} if names else {}))
     return rows

@@ -1,4 +1,4 @@
-"""A map of the stiffness of a surface from presses at places, with an interval everywhere."""
+"""Maps of a surface from presses at places, with an interval everywhere: of its stiffness, and of any other field."""
 
 from __future__ import annotations
 
@@ -25,28 +25,35 @@ MOST_PRESSES = 1000
 
 @dataclass(frozen=True)
 class Prediction:
-    """The stiffness at places.
+    """A field at places.
 
     Args:
-        mean: of its natural logarithm (n,).
-        std: of the logarithm of the surface's own stiffness (n,).
-        next_std: of the logarithm that a next press would state (n,).
-        common: standard deviation of the error that all presses share, relative to the stiffness [1].
+        mean: of the field's natural logarithm or, where it is not logarithmic, of the field itself (n,).
+        std: of the surface's own value, alike (n,).
+        next_std: of the value that a next press would state, alike (n,).
+        common: standard deviation of the error that all presses share, alike.
+        logarithmic: whether the four are of the logarithm.
     """
 
     mean: Array
     std: Array
     next_std: Array
     common: float
+    logarithmic: bool = True
+
+    @property
+    def value(self) -> Array:
+        """The median of the field (n,), in the unit of its presses."""
+        return np.exp(self.mean) if self.logarithmic else self.mean
 
     @property
     def stiffness(self) -> Array:
         """The median of the stiffness (n,) [N/m]."""
-        return np.exp(self.mean)
+        return self.value
 
     @property
     def ci95(self) -> Array:
-        """95 % interval of the surface's stiffness (n, 2) [N/m]."""
+        """95 % interval of the surface's own value (n, 2)."""
         return self._interval(np.hypot(self.std, self.common))
 
     @property
@@ -55,33 +62,40 @@ class Prediction:
         return self._interval(self.next_std)
 
     def exceeds(self, threshold: float) -> Array:
-        """Probability that the stiffness is above a threshold [N/m] (n,)."""
-        return np.asarray(norm.sf(np.log(threshold), self.mean, np.hypot(self.std, self.common)))
+        """Probability that the field is above a threshold (n,)."""
+        level = np.log(threshold) if self.logarithmic else threshold
+        return np.asarray(norm.sf(level, self.mean, np.hypot(self.std, self.common)))
 
     def _interval(self, std: Array) -> Array:
-        return np.exp(self.mean[:, None] + Z95 * np.outer(std, [-1.0, 1.0]))
+        ends = self.mean[:, None] + Z95 * np.outer(std, [-1.0, 1.0])
+        return np.exp(ends) if self.logarithmic else ends
 
 
-class StiffnessMap:
-    """A Gaussian process on the logarithm of the stiffness over a surface.
+class FieldMap:
+    """A Gaussian process on a quantity over a surface, such as relaxation, loss or depth.
 
     Args:
-        common: standard deviation of an error that all presses share, such as the scale of the force sensor, relative
-            to the stiffness [1].
+        logarithmic: whether the process is on the logarithm of the quantity, which is then above zero.
+        common: standard deviation of an error that all presses share, such as the scale of the force sensor: relative
+            to the value if logarithmic, else in its unit.
+        name: of the quantity, for messages.
     """
 
-    def __init__(self, common: float = 0.0):
-        if not 0.0 <= common < 1.0:
-            raise InputError(f"common must be at least 0 and below 1, got {common:g}")
-        self._common = common
-        self._places, self._stiffness, self._half = np.empty((0, 2)), np.empty(0), np.empty(0)
+    def __init__(self, *, logarithmic: bool = False, common: float = 0.0, name: str = "value"):
+        if not 0.0 <= common < (1.0 if logarithmic else np.inf):
+            raise InputError(
+                f"common must be at least 0{' and below 1' if logarithmic else ''}, got {common:g}"
+            )
+        self.logarithmic, self.name, self._common = logarithmic, name, common
+        self._places, self._values, self._half = np.empty((0, 2)), np.empty(0), np.empty(0)
         self._process: GaussianProcess | None = None
+        self._surface: Surface | None = None
 
     def __repr__(self) -> str:
-        return f"StiffnessMap({len(self)} presses)"
+        return f"{type(self).__name__}({len(self)} presses)"
 
     def __len__(self) -> int:
-        return len(self._stiffness)
+        return len(self._values)
 
     @property
     def places(self) -> Array:
@@ -89,35 +103,39 @@ class StiffnessMap:
         return self._places
 
     @property
-    def stiffness(self) -> Array:
-        """Of the presses (n,) [N/m]."""
-        return self._stiffness
+    def values(self) -> Array:
+        """Of the presses (n,)."""
+        return self._values
 
     @property
     def half(self) -> Array:
-        """Half-width of each press' own 95 % interval (n,) [N/m]."""
+        """Half-width of each press' own 95 % interval (n,), in the values' unit."""
         return self._half
 
     @property
     def surface(self) -> Surface:
         """The hull of the presses."""
-        return Surface(self._places)
+        if self._surface is None:
+            self._surface = Surface(self._places)
+        return self._surface
 
-    def update(self, places: Any, stiffness: Any, half: Any) -> None:
+    def update(self, places: Any, values: Any, half: Any = None) -> None:
         """Add presses.
 
         Args:
             places: (n, 2) or (n, 3) [m], of one frame.
-            stiffness: (n,) [N/m].
-            half: half-width of each 95 % interval (n,) [N/m].
+            values: (n,), such as stiffness [N/m].
+            half: half-width of each 95 % interval (n,), in the values' unit; None where presses state none, and the
+                presses' own scatter is all that is known of their error.
 
         Raises:
-            InputError: shapes differ, a number is not finite or not above zero, or one place has two stiffnesses.
+            InputError: shapes differ, a number is not finite or not above zero, or one place has two values.
         """
-        where, value, width = (np.asarray(each, dtype=float) for each in (places, stiffness, half))
-        if where.ndim != 2 or where.shape[1] not in (2, 3) or not len(where) == value.size == width.size:
+        where, value = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
+        width = np.zeros(len(value)) if half is None and value.ndim else np.asarray(half, dtype=float)
+        if where.ndim != 2 or where.shape[1] not in (2, 3) or not (len(where),) == value.shape == width.shape:
             raise InputError(
-                "a map takes places (n, 2) or (n, 3), stiffness (n,) and half (n,), got shapes "
+                f"a map takes places (n, 2) or (n, 3), {self.name} (n,) and half (n,), got shapes "
                 f"{where.shape}, {value.shape} and {width.shape}"
             )
         if len(self) and where.shape[1] != self._places.shape[1]:
@@ -125,33 +143,43 @@ class StiffnessMap:
                 f"the map has places of {self._places.shape[1]} coordinates, these have {where.shape[1]}; a map has "
                 "one frame"
             )
-        for name, each in (("places", where), ("stiffness", value), ("half", width)):
-            bad = ~np.isfinite(each) if each is where else ~(np.isfinite(each) & (each > 0.0))
+        for name, each, positive in (
+            ("places", where, False),
+            (self.name, value, self.logarithmic),
+            ("half", width, half is not None),
+        ):
+            bad = ~np.isfinite(each) | (positive & (each <= 0.0))
             if bad.any():
                 raise InputError(
-                    f"{name} must be finite{'' if each is where else ' and above 0'}, got {each[bad][0]:g} at press "
+                    f"{name} must be finite{' and above 0' if positive else ''}, got {each[bad][0]:g} at press "
                     f"{int(np.argwhere(bad)[0][0]) + 1}"
                 )
         together = [np.concatenate(pair) for pair in (
-            (self._places.reshape(-1, where.shape[1]), where), (self._stiffness, value), (self._half, width),
+            (self._places.reshape(-1, where.shape[1]), where), (self._values, value), (self._half, width),
         )]  # fmt: skip
-        _refuse_contradictions(*together)
-        self._places, self._stiffness, self._half = together
-        self._process = None
+        if half is not None:
+            self._refuse_contradictions(*together)
+        self._places, self._values, self._half = together
+        self._process = self._surface = None
 
     @property
     def process(self) -> GaussianProcess:
         """The Gaussian process of all presses."""
         if self._process is None:
             self.surface  # noqa: B018 - refuses presses that span no surface
-            noise = self._half / (Z95 * self._stiffness)
-            self._process = fit(self._places, np.log(self._stiffness), noise)
+            self._process = fit(self._places, *self._scaled(self._values, self._half))
         return self._process
 
     def predict(self, places: Any) -> Prediction:
-        """The stiffness at places (n, d) [m], and that of a next press whose own interval is the presses' median."""
-        mean, variance = self.process.predict(np.atleast_2d(np.asarray(places, dtype=float)))
-        return Prediction(mean, np.sqrt(variance), np.sqrt(variance + self._noise), self._common)
+        """The field at places (n, d) [m], and that of a next press whose own interval is the presses' median."""
+        at = np.atleast_2d(np.asarray(places, dtype=float))
+        if len(self) and (at.ndim != 2 or at.shape[1] != self._places.shape[1]):
+            raise InputError(
+                f"the map has places of {self._places.shape[1]} coordinates, got shape {at.shape}"
+            )
+        mean, variance = self.process.predict(at)
+        next_std = np.sqrt(variance + self._noise)
+        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic)
 
     def next(
         self,
@@ -168,9 +196,9 @@ class StiffnessMap:
         Args:
             count: places.
             candidates: among which to choose (m, d) [m]; a grid within the hull of the presses if None.
-            goal: least `interval` over the candidates, the `edge` where the stiffness crosses a threshold, or the
+            goal: least `interval` over the candidates, the `edge` where the field crosses a threshold, or the
                 `maximum`.
-            stiffer_than: threshold of the edge [N/m].
+            stiffer_than: threshold of the edge, in the values' unit.
             start: where the robot stands (d,) [m].
             way: that the robot travels in the time of one press [m]; infinite where travel costs nothing.
         """
@@ -178,7 +206,8 @@ class StiffnessMap:
             raise InputError(f"the next presses must be 1 to {MOST_PRESSES}, got {count}")
         among = self._candidates() if candidates is None else np.asarray(candidates, dtype=float)
         mean, variance = self.process.predict(among)
-        weights = importance(goal, mean, variance, None if stiffer_than is None else np.log(stiffer_than))
+        level = np.log(stiffer_than) if stiffer_than is not None and self.logarithmic else stiffer_than
+        weights = importance(goal, mean, variance, level)
         cost = None if np.isinf(way) else travel(among, None if start is None else np.asarray(start), way)
         covariance = self.process.likeliest.covariance(among)
         steps = list(islice(choose(covariance, weights, self._noise, cost), count))
@@ -186,20 +215,22 @@ class StiffnessMap:
         std = np.sqrt(
             left[chosen] + np.maximum(variance - np.diag(covariance), 0.0)[chosen] + self._common**2
         )
-        return NextPresses(among[chosen], np.exp(mean[chosen]) * np.sinh(Z95 * std))
+        half = np.exp(mean[chosen]) * np.sinh(Z95 * std) if self.logarithmic else Z95 * std
+        return NextPresses(among[chosen], half)
 
     def presses_until(self, half: float) -> int | None:
         """Presses after which the interval is under a half-width nearly everywhere.
 
         Args:
-            half: of the 95 % interval relative to the stiffness, asked of 95 % of the surface [1].
+            half: of the 95 % interval asked of 95 % of the surface, relative to the value if logarithmic, else in its
+                unit.
 
         Returns:
             How many more presses; None if it needs more than `MOST_PRESSES` or the presses' common error is larger.
         """
         if not half > 0.0:
             raise InputError(f"the half-width must be above 0, got {half:g}")
-        asked = (np.log1p(half) / Z95) ** 2 - self._common**2
+        asked = ((np.log1p(half) if self.logarithmic else half) / Z95) ** 2 - self._common**2
         covariance, noise = self.process.likeliest.covariance(self._candidates()), self._noise
         presses = choose(covariance, np.ones(len(covariance)), noise)
         variances = chain([np.diag(covariance)], (variance for _, variance in presses))
@@ -217,30 +248,52 @@ class StiffnessMap:
 
     @property
     def _noise(self) -> float:
-        """Variance of a next press, of the logarithm."""
-        return float(np.median(self._half / (Z95 * self._stiffness)) ** 2 + self.process.repeat**2)
+        """Variance of a next press, of the logarithm if logarithmic."""
+        own = np.median(self._scaled(self._values, self._half)[1])
+        return float(own**2 + self.process.repeat**2)
 
     def _candidates(self) -> Array:
         grid = self.grid(CANDIDATES)
         return grid.places[grid.inside]
 
+    def _scaled(self, values: Array, half: Array) -> tuple[Array, Array]:
+        """Values (n,) and their own standard deviations (n,) on the scale of the process."""
+        return (np.log(values), half / (Z95 * values)) if self.logarithmic else (values, half / Z95)
 
-def _refuse_contradictions(places: Array, stiffness: Array, half: Array) -> None:
-    """Refuse two presses at one place that no repetition explains.
+    def _refuse_contradictions(self, places: Array, values: Array, half: Array) -> None:
+        """Refuse two presses at one place that no repetition explains.
 
-    They differ by more than their intervals and twice what all other presses span. Of twenty normal values the span is
-    3.7 standard deviations (Tippett 1925), so that two repeated presses differ so with a probability below 1e-6.
+        They differ by more than their intervals and twice what all other presses span. Of twenty normal values the
+        span is 3.7 standard deviations (Tippett 1925), so that two repeated presses differ so with a probability below
+        1e-6.
+        """
+        value, std = self._scaled(values, half)
+        _, place = np.unique(places, axis=0, return_inverse=True)
+        place = place.ravel()
+        for i, j in pairwise(np.argsort(place, kind="stable")):
+            others = np.delete(value, [i, j])
+            if place[i] != place[j] or not len(others):
+                continue
+            if abs(value[i] - value[j]) > Z95 * np.hypot(std[i], std[j]) + 2.0 * np.ptp(others):
+                where = ", ".join(f"{1e3 * c:.6g}" for c in places[i])
+                raise InputError(
+                    f"presses {i + 1} and {j + 1} are at one place ({where} mm) with a {self.name} of {values[i]:.4g} "
+                    f"and {values[j]:.4g}, further apart than their intervals and than the map; leave the wrong one out"
+                )
+
+
+class StiffnessMap(FieldMap):
+    """A Gaussian process on the logarithm of the stiffness over a surface.
+
+    Args:
+        common: standard deviation of an error that all presses share, such as the scale of the force sensor, relative
+            to the stiffness [1].
     """
-    value, std = np.log(stiffness), half / (Z95 * stiffness)
-    _, place = np.unique(places, axis=0, return_inverse=True)
-    place = place.ravel()
-    for i, j in pairwise(np.argsort(place, kind="stable")):
-        others = np.delete(value, [i, j])
-        if place[i] != place[j] or not len(others):
-            continue
-        if abs(value[i] - value[j]) > Z95 * np.hypot(std[i], std[j]) + 2.0 * np.ptp(others):
-            where = ", ".join(f"{1e3 * c:.6g}" for c in places[i])
-            raise InputError(
-                f"presses {i + 1} and {j + 1} are at one place ({where} mm) with {stiffness[i]:.4g} and "
-                f"{stiffness[j]:.4g} N/m, further apart than their intervals and than the map; leave the wrong one out"
-            )
+
+    def __init__(self, common: float = 0.0):
+        super().__init__(logarithmic=True, common=common, name="stiffness")
+
+    @property
+    def stiffness(self) -> Array:
+        """Of the presses (n,) [N/m]."""
+        return self.values

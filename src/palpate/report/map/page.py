@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.maps.lumps import Lump
+from palpate.maps.presses import AXES
 from palpate.maps.result import MapResult
 from palpate.report import style
 from palpate.report.answer import Answer, Card, answer_page
@@ -18,6 +20,7 @@ from palpate.report.svg import svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
 
 _GOALS = {
@@ -117,8 +120,8 @@ def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
     ][: result.request.next]
 
 
-def page(result: MapResult, title: str, command: str) -> str:
-    """The page as HTML."""
+def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
+    """The page as HTML; a live one loads itself again."""
     field, interval = draw_map(result), draw_interval(result)
     answer = Answer(
         title=title,
@@ -137,6 +140,15 @@ def page(result: MapResult, title: str, command: str) -> str:
                 "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
                 f"{_GOALS[result.request.goal]}.",
             },
+            *(
+                {
+                    "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
+                    "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
+                    f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_display_unit(result, name)[1]}.",
+                }
+                for name, field in result.fields.items()
+            ),
         ],
         figures=[
             {
@@ -156,6 +168,7 @@ def page(result: MapResult, title: str, command: str) -> str:
         package="palpate.report.map",
         codes=(text_of("map.js", "palpate.report.map"),),
         readout=data(_readout(result, field)),
+        live=live,
     )
 
 
@@ -206,22 +219,24 @@ def _press_rows(result: MapResult) -> list[tuple[str, str, str]]:
     return [(name, place(where), f"{quantity(k, 'N/m')} ± {plain(half, 2)}") for name, where, k, half in told]
 
 
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
+    """Factor and symbol of the unit in which a field is shown."""
+    unit = result.presses.units[name]
+    return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+
+
 def draw_map(result: MapResult) -> Figure:
     """The stiffness over the surface, the presses, the contour of the threshold and its band."""
     from matplotlib.colors import LogNorm
 
-    seen, grid = result.prediction, result.grid
+    seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
     with style.inked(9.0):
-        figure, (axis,) = style.grid((5.0, 4.4))
-        values = np.where(grid.inside, seen.stiffness, np.nan).reshape(grid.shape)
-        image = axis.pcolormesh(
-            1e3 * grid.across, 1e3 * grid.along, values, cmap="Blues_r", norm=LogNorm(), rasterized=True
-        )
-        bar = figure.colorbar(
-            image, ax=axis, location="top", shrink=0.7, label="stiffness [N/m]", format="{x:g}"
-        )
+        figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
         bar.ax.xaxis.set_minor_formatter("{x:g}")
-        threshold = result.request.stiffer_than
         if threshold is not None:
             probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
             axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
@@ -230,32 +245,46 @@ def draw_map(result: MapResult) -> Figure:
         axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
         begin, end = (1e3 * point for point in _cut_ends(result))
         axis.plot(*zip(begin, end, strict=True), color="white", linewidth=0.9, linestyle=(0, (5, 4)))
-        _square(axis, result)
     return figure
 
 
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
-    grid = result.grid
+    half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
     with style.inked(9.0):
-        figure, (axis,) = style.grid((5.0, 4.4))
-        half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
-        values = np.where(grid.inside, half, np.nan).reshape(grid.shape)
-        image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, values, cmap="Greys_r", rasterized=True)
-        figure.colorbar(image, ax=axis, location="top", shrink=0.7, label="half-width, 95 % [%]")
+        figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
             box = {"boxstyle": "circle,pad=0.25", "fc": style.CARD, "ec": style.INK, "lw": 0.9}
             axis.text(x, y, str(k + 1), ha="center", va="center", fontsize=8, bbox=box, color=style.INK)
-        _square(axis, result)
     return figure
 
 
-def _square(axis: Axes, result: MapResult) -> None:
+def draw_field(result: MapResult, name: str) -> Figure:
+    """A further field over the surface, and the presses that show it."""
+    (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
+    with style.inked(9.0):
+        label = f"{_title(name).lower()} [{symbol}]"
+        figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
+        at = 1e3 * result.map.surface.coordinates(result.map.places[known])
+        axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
+    return figure
+
+
+def _picture(
+    result: MapResult, values: Array, label: str, colours: str, **norm: Any
+) -> tuple[Figure, Axes, Colorbar]:
+    """A quantity at the grid over the surface, with its bar of colours."""
+    grid = result.grid
+    figure, (axis,) = style.grid((5.0, 4.4))
+    shown = np.where(grid.inside, values, np.nan).reshape(grid.shape)
+    image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, shown, cmap=colours, rasterized=True, **norm)
+    bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
     axis.grid(visible=False)
     axis.set_aspect("equal")
     names = ("along the first axis", "along the second axis") if result.map.surface.is_curved else ("x", "y")
     axis.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]")
+    return figure, axis, bar
 
 
 def _cut_ends(result: MapResult) -> tuple[Any, Any]:
@@ -313,7 +342,7 @@ def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
     axis = figure.axes[0]
     box = axis.get_position()
     grid, seen = result.grid, result.prediction
-    columns = (seen.stiffness, *seen.ci95.T, *seen.next95.T)
+    columns = (*grid.places.T, seen.stiffness, *seen.ci95.T, *seen.next95.T)
     values = [
         [float(f"{column[i]:.4g}") for column in columns] if inside else None
         for i, inside in enumerate(grid.inside)
@@ -322,5 +351,38 @@ def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
         "box": [box.x0, 1.0 - box.y1, box.x1, 1.0 - box.y0],
         "x": list(axis.get_xlim()), "y": list(axis.get_ylim()),
         "columns": [float(1e3 * x) for x in grid.across], "rows": [float(1e3 * y) for y in grid.along],
-        "values": values,
+        "values": values, "axes": AXES[: grid.places.shape[1]],
+        "names": ["stiffness", "low", "high", "next_low", "next_high"], "film": _film(result),
     }  # fmt: skip
+
+
+def _film(result: MapResult) -> dict[str, Any]:
+    """The map as it grew, in levels of a ramp of colours."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    grid, levels = result.coarse, 64
+    means, stds = (np.array([getattr(frame, name) for _, frame in result.film]) for name in ("mean", "std"))
+    scaled = [
+        (levels - 1) * (each - low) / max(float(each[:, grid.inside].max()) - low, 1e-12)
+        for each in (means, stds) for low in (float(each[:, grid.inside].min()),)
+    ]  # fmt: skip
+    shown = [
+        [[int(v) if i else None for v, i in zip(frame, grid.inside, strict=True)] for frame in each]
+        for each in scaled
+    ]
+    at = result.map.surface.coordinates(result.map.places)
+    size = np.array([grid.across[-1] - grid.across[0], grid.along[-1] - grid.along[0]]) + np.sqrt(grid.cell)
+    corner = np.array([grid.across[0], grid.along[0]]) - 0.5 * np.sqrt(grid.cell)
+    return {
+        "shape": grid.shape,
+        "frames": [
+            {"count": count, "stiffness": k, "half": half}
+            for (count, _), k, half in zip(result.film, *shown, strict=True)
+        ],
+        "ramps": [
+            [to_hex(colormaps[name](i / (levels - 1))) for i in range(levels)]
+            for name in ("Blues_r", "Greys_r")
+        ],
+        "presses": np.round((at - corner) / size, 3).tolist(),
+    }
