@@ -12,9 +12,9 @@ from palpate.force import Gains, SlidingLoop, load_arm, load_gains
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_law as places
-from palpate.force.sliding.simulated_slide import directions, figures_of, ground_of, simulate
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
-from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, begin, correct, predict
+from palpate.force.sliding.slide_law import COVARIANCE, STATES, begin, correct, predict
+from palpate.force.sliding.slide_world import directions, figures_of, ground_of, simulate
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -32,10 +32,9 @@ def loop() -> SlidingLoop:
 def in_a_slide(loop: SlidingLoop, normal: np.ndarray) -> None:
     """The loop in a slide with this normal and F_d held, as `press_tick` leaves it."""
     loop.reset()
-    state = np.array(loop.state)
+    state = loop._state
     state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
     places.slide_from(loop.law, state, places.Vec3(*normal), loop.desired, 2e4, 0.1, 0.12)
-    loop.state = tuple(state)
 
 
 @pytest.mark.parametrize("arm", ["ur5e", "fr3"])

@@ -77,7 +77,7 @@ class SlideOptions:
 
     def ground(self) -> tuple[Ground, float]:
         """The surface, and its radius [m]."""
-        from palpate.force.sliding.simulated_slide import ground_of
+        from palpate.force.sliding.slide_world import ground_of
 
         name, _, size = self.shape.partition(":")
         radius = in_si("--shape", size, "length") if size else 0.2
@@ -135,8 +135,8 @@ def slide(
     json
         Print one JSON object and nothing else.
     """
-    from palpate.force.sliding.simulated_slide import GAP, directions, simulate
     from palpate.force.sliding.slide_domain import numbers_of
+    from palpate.force.sliding.slide_world import GAP, directions, simulate
     from palpate.report.slide import sentence, summarise, write_report
 
     asked = asked or SlideOptions()

@@ -10,10 +10,9 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.files import write_text
 from palpate.force.gains import Gains
-from palpate.force.sliding.simulated_slide import SETTLED, figures_of
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
 from palpate.force.sliding.slide_law import SLIDING_TROUBLES
-from palpate.force.sliding.slide_world import COLUMNS, Ground
+from palpate.force.sliding.slide_world import COLUMNS, SETTLED, Ground, figures_of
 from palpate.force.sliding.sliding_loop import CHI2_95
 from palpate.records import Record
 from palpate.report import style

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from math import exp, sqrt
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +18,20 @@ from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
 from palpate.force.sliding import slide_law as places
 from palpate.force.sliding.slide_domain import numbers_of
-from palpate.force.sliding.slide_law import SIZE, SLIDING_TROUBLES, Sliding, put_vector, slide_step, vector_at
-from palpate.force.sliding.tangent_filter import BASE, COVARIANCE, G1, LOG_K, MU, STATES
+from palpate.force.sliding.slide_law import (
+    BASE,
+    COVARIANCE,
+    G1,
+    LOG_K,
+    MU,
+    SIZE,
+    SLIDING_TROUBLES,
+    STATES,
+    Sliding,
+    put_vector,
+    slide_step,
+    vector_at,
+)  # fmt: skip
 from palpate.results import Readable
 
 CHI2_95 = sqrt(5.991)
@@ -203,22 +214,6 @@ class SlidingLoop(Readable):
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
-
-    @property
-    def state(self) -> tuple[float, ...]:
-        """Everything that it remembers, as plain numbers; to be given back by assignment."""
-        return tuple(self._state.tolist())
-
-    @state.setter
-    def state(self, numbers: Any) -> None:
-        given = np.array(numbers, dtype=np.float64)
-        if (
-            given.shape != (SIZE,)
-            or not np.isfinite(given).all()
-            or given[places.TROUBLE] not in SLIDING_TROUBLES
-        ):
-            raise InputError(f"a state is {SIZE} finite numbers from SlidingLoop.state; give those back")
-        self._state[:] = given
 
     def _variance(self, i: int) -> float:
         return float(self._state[COVARIANCE + i * (STATES + 1)])
