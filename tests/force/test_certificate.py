@@ -17,7 +17,8 @@ from palpate.force.boundary import radius
 from palpate.force.cells import Box, Prover, curved
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval, proved_claim
-from palpate.force.claims import adapting_claims, held_claim
+from palpate.force.claims import Claim, adapting_claims, held_claim
+from palpate.force.describe import bounds, sentence
 from palpate.force.gains import approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.lyapunov import common
@@ -121,7 +122,7 @@ def test_its_file_says_the_same(proof, tmp_path):
     assert Certificate.load(tmp_path / "c.json") == proof
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"form": "palpate force certificate 2"}', "\x00", "nan"])
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"form": "palpate force certificate 1"}', "\x00", "nan"])
 def test_what_is_no_certificate_is_refused(tmp_path, text):
     path = tmp_path / "c.json"
     path.write_text(text)
@@ -131,17 +132,17 @@ def test_what_is_no_certificate_is_refused(tmp_path, text):
 
 def test_a_gain_that_goes_anywhere_inside_makes_nothing_grow(proof):
     gains, claim = proof.gains, proof.claims[2]
-    loop, rng = SampledLoop(gains.arm).later(claim.jitter), np.random.default_rng(0)
+    loop, rng = claim.prover(gains).loop, np.random.default_rng(0)
+    losses = range(claim.ages[1] - claim.ages[0] + 1)
     unit = gains.alpha / gains.theta / gains.arm.series
     corners = [
-        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in range(claim.jitter + 1)]
-        for s in claim.shares
+        [loop.phi(gains.arm.series, 0.0, Law(s * unit), loss) for loss in losses] for s in claim.shares
     ]
     for _ in range(20):
         x = rng.normal(size=loop.size)
         before = np.linalg.norm(x)
         for _ in range(600):
-            s, loss = rng.uniform(), rng.integers(claim.jitter + 1)
+            s, loss = rng.uniform(), rng.integers(len(losses))
             x = (1.0 - s) * (corners[0][loss] @ x) + s * (corners[1][loss] @ x)
         assert np.linalg.norm(x) < before
 
@@ -247,7 +248,30 @@ def test_contact_lost_and_found_makes_nothing_grow(proof):
 def test_a_gain_of_next_to_nothing_is_proved_with_more_jitter(proof):
     claim = proof.claims[3]
     assert claim.shares[0] == 1e-4
-    assert claim.jitter == 2
+    assert claim.jitter(proof.gains) == 2
+
+
+def test_the_window_of_ages_holds_those_of_the_sensor(proof):
+    arm = proof.gains.arm
+    for claim in proof.claims[2:]:
+        assert claim.ages[0] == 0
+        assert claim.ages[1] >= arm.rate / arm.sensor.sampling
+
+
+def test_the_bounds_of_K_u_are_those_at_which_the_shares_are_left():
+    for name, least in (("ur5e", 0.5), ("fr3", 0.577)):
+        gains = gains_of(name)
+        high = gains.seen_cap
+        ages = (0, gains.arm.sensor_ticks)
+        claim = Claim(kind="adapting", low=1e3, high=high, least=0.0, most=0.0, shares=(0.05, 2.0), ages=ages)
+        low = bounds(claim, gains)[0]
+        assert low == pytest.approx(least, rel=2e-3)
+        shares = [
+            gains.theta * (gains.arm.seen(K) if name == "fr3" else K) * gains.gain_at(low * K) / gains.alpha
+            for K in np.geomspace(1e3, high, 50)
+        ]
+        assert 1.99 < max(shares) <= 2.0 + 1e-9
+        assert f"K_u is {low:.3g}" in sentence(claim, gains)
 
 
 def test_a_claim_for_one_sided_contact_is_of_one_norm(proof):

@@ -55,7 +55,7 @@ def proof(monkeypatch):
     """A claim of surfaces without damping: the proof itself takes ten seconds, and is `tests/force`'s."""
     kinds = ("held", "adapting")
     claims = tuple(
-        Claim(kind=kind, low=400.0, high=4e5, least=0.0, most=0.0, shares=(0.0, 1.0), jitter=0)
+        Claim(kind=kind, low=400.0, high=4e5, least=0.0, most=0.0, shares=(0.0, 1.0), ages=(2, 2))
         for kind in kinds
     )
     monkeypatch.setattr(stability, "_proof", lambda encoded, adapting: claims[: 1 + adapting])

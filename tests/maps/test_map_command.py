@@ -138,6 +138,11 @@ def test_further_columns_are_mapped_beside_the_stiffness(table, tmp_path, capsys
         assert row["depth"] == pytest.approx(2e-3 + 0.02 * row["x"], abs=1e-4)
     assert "depth_high" in polars.read_csv(tmp_path / "map.csv").columns
     assert "Depth. Half-width of its 95 % interval" in (tmp_path / "map.html").read_text(encoding="utf-8")
+    wide.write_text("\n".join([f"{rows[0]},loss", *(f"{row},0.3" for row in rows[1:])]), encoding="utf-8")
+    assert main(["map", "--table", str(wide), "--fields", "loss", "--json"]) == 0
+    assert (
+        "loss" not in json.loads(capsys.readouterr().out)["map"][0]
+    )  # the same everywhere: no scatter, no interval
     assert main(["map", "--table", str(wide), "--fields", "half_N/mm"]) == 2
     assert "has already" in capsys.readouterr().err
 

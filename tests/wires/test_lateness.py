@@ -29,11 +29,13 @@ def test_it_is_told_beyond_the_least_that_was_seen():
     assert "within the 2 ms of jitter" in found.sentences()[1]
 
 
-def test_a_jump_beyond_the_certificates_jitter_is_counted_and_said():
+def test_lateness_beyond_the_certificates_jitter_is_counted_and_said():
     late = np.zeros(1000)
-    late[500] = 0.0025
+    late[500:502] = 0.0025
     found = run(late)
-    assert found.jumps == 2  # there and back
+    assert found.jumps == 2
+    walk = np.minimum(np.arange(1000) * 1e-4, 0.016)  # no change is large, but the age leaves the window
+    assert run(walk).jumps == 1000 - 21
     assert "does not cover this run" in found.sentences()[1]
     assert run(late, allowed=None).sentences()[1].startswith("no certificate")
     assert run(np.zeros(100), missed={7}).missed == 1

@@ -32,7 +32,7 @@ class ProofOptions:
     damping_time
         Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
     jitter
-        Largest change of a reading's age from tick to tick while the law adapts, in ticks.
+        Ticks by which a reading may be older than the sensor's period while the law adapts.
     margin
         Factor by which the gains may grow.
     held_only

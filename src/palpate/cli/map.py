@@ -52,8 +52,8 @@ class PlaceOptions:
     place
         Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
     fields
-        Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss,
-        loss tangent and depth are mapped where presses show them.
+        Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss and
+        depth are mapped where presses show them.
     each_contact
         Each contact of a log is a press of its own, at its own place; else a log is one press.
     """

@@ -73,7 +73,7 @@ class Prover:
         loop: the sampled loop, of the oldest reading.
         theta: of the law [s].
         gains: g of a tick may be anything between these two [m/(s N)]; if `relative`, g theta K_eff(K + B/theta) may.
-        younger: ticks by which a reading may be younger, from tick to tick.
+        younger: ticks by which a reading may be younger than the oldest, from tick to tick.
         kept: of the command's low-pass.
         relative: see `gains`.
         fading: what may come near to nothing within a cell, "gain" or "surface"; empty if neither does.
@@ -202,7 +202,7 @@ class Prover:
         p = len(self.loop.rates(1.0, 0.0)[1])
         into = np.zeros(p)
         into[0] = 1.0
-        Phi = self.loop.assembled(np.zeros((p, p)), into, np.zeros(p), law, loss)
+        Phi = self.loop.assembled(np.zeros((p, p)), into, self.loop.force_gain(0.0, 0.0), law, loss)
         fed = np.vstack([np.eye(p, self.loop.size), Phi[:1]])
         if self.loop.arm.kind == "position":
             fed[0] -= fed[p]

@@ -17,7 +17,7 @@ from palpate.force.claims import Claim
 from palpate.force.cover import Cell
 from palpate.force.gains import Gains
 
-FORM: Literal["palpate force certificate 1"] = "palpate force certificate 1"
+FORM: Literal["palpate force certificate 2"] = "palpate force certificate 2"
 _LARGEST = 1 << 26
 
 
@@ -51,7 +51,7 @@ class Certificate(Table):
         written_by: the mark of the file.
     """
 
-    form: Literal["palpate force certificate 1"]
+    form: Literal["palpate force certificate 2"]
     gains: Gains
     claims: tuple[Claim, ...]
     measured: PositionLoop | None = None
@@ -109,7 +109,11 @@ class Certificate(Table):
         if not self.claims:
             return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
+            fault = claim.fault(self.proved_gains)
             prover = claim.prover(self.proved_gains)
+            if fault or (claim.state, claim.units) != (prover.loop.state, prover.loop.units):
+                why = fault or "the state is another"
+                return Verdict(False, np.inf, 0.0, count, f"{why}, in its {claim.kind} claim")
             if not all(claim.tiled(box) for box in claim.boxes(self.proved_gains)):
                 return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
             for proved in claim.cells:

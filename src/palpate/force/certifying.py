@@ -63,7 +63,7 @@ def certify(
         stiffness: of the surfaces, lowest and highest K + B/theta, their own [N/m]; by default from a thousandth of
             the cap to 99 % of what is stable at all.
         damping_time: longest B/K [s]; theta by default, 0 for the adapting law of a torque arm.
-        jitter: ticks by which the age of a reading may change from tick to tick while the law adapts.
+        jitter: ticks by which a reading may be older than the sensor's period while the law adapts.
         margin: factor that all gains may grow by.
         adapting: prove the adapting law too.
         measured: the inner loop as a log told it, instead of the arm's own.
@@ -76,7 +76,7 @@ def certify(
     position = gains.arm.kind == "position"
     most = gains.theta if damping_time is None else damping_time
     low, high = _felt(gains, stiffness, most, margin)
-    wanted = [[held_claim(gains, low, high, most, 0, margin)]]
+    wanted = [[held_claim(gains, low, high, most, margin)]]
     if position:
         wanted.append([one_sided_claim(gains, most, margin)])
     if adapting:
@@ -153,7 +153,8 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
         )
         for c in cells
     )  # fmt: skip
-    return msgspec.structs.replace(claim, cells=proved)
+    state, units = prover.loop.state, prover.loop.units
+    return msgspec.structs.replace(claim, cells=proved, state=state, units=units)
 
 
 def _starts(prover: Prover, box: Box, edge: float) -> list[Box]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 from msgspec import Meta
 
@@ -18,18 +19,19 @@ SHARES = {
     "position": ((0.05, (2.0, 1.5, 1.2), 0), (1e-4, (1.5, 1.2), 1)),
     "torque": ((0.05, (2.0, 1.5, 1.2), 0),),
 }
-"""g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; further jitter.
+"""g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; ticks by which its
+readings may be later than the jitter that is asked for.
 
 Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
 for the UR5e without jitter: hence two claims.
 """
-MOST_JITTER = 10
 FADED = 0.01
 """Share below which the gain of a claim counts as one that may fade."""
 GONE = 1e-4
 """Of the cap: what is left of a surface that the tip has left, see `one_sided_claim`."""
 Finite = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Number = Annotated[float, Meta(ge=0, le=1e300)]
+Age = Annotated[int, Meta(ge=0, le=200)]
 
 
 class ProvedCell(Table):
@@ -57,7 +59,8 @@ class Claim(Table):
     `held`: with g held, every surface whose K + B/theta is within low ... high [N/m] and whose B/K is within
     least ... most [s] is pressed on stably. K and B may change within a cell from tick to tick. `adapting`: the same
     for every constant surface while g theta K_eff/alpha goes anywhere within the shares, from tick to tick; for a
-    position arm that holds for every stiffness, since only the product counts. `one-sided`: as held, while K and B
+    position arm that holds for every stiffness, since only the product counts; the reading in use is of any age within
+    `ages`, from tick to tick. The others are of readings of one age, the oldest. `one-sided`: as held, while K and B
     together go anywhere within low ... high, from tick to tick, as where contact is lost and found again.
     """
 
@@ -67,9 +70,28 @@ class Claim(Table):
     least: Number
     most: Number
     shares: tuple[Number, Number]
-    jitter: Annotated[int, Meta(ge=0, le=MOST_JITTER)]
+    ages: tuple[Age, Age]
+    """Of the reading in use, youngest and oldest [ticks]; the sensor's own period counts, rounded up."""
+    state: tuple[str, ...] = ()
+    """Order of the numbers in which the norms are, see `SampledLoop.state`."""
+    units: dict[str, Number] = msgspec.field(default_factory=dict)
+    """Theirs, see `SampledLoop.units`."""
     parts: Annotated[int, Meta(ge=1, le=100)] = 1
     cells: tuple[ProvedCell, ...] = ()
+
+    def jitter(self, gains: Gains) -> int:
+        """Ticks by which a reading may be older than the sensor's period, rounded up."""
+        return self.ages[1] - gains.arm.sensor_ticks
+
+    def fault(self, gains: Gains) -> str:
+        """Why it says nothing of these gains, whatever its norms; empty otherwise."""
+        adapting, (low, high), (young, old) = self.kind == "adapting", self.shares, self.ages
+        if not (0.0 < low <= high if adapting else low == 1.0 <= high):
+            return "the shares are not of the law's gain"
+        fit = young <= old and self.jitter(gains) >= 0 and (adapting or young == old)
+        return (
+            "" if fit and (young or gains.arm.low_pass.sections) else "the ages are not those of the sensor"
+        )
 
     def boxes(self, gains: Gains) -> list[Box]:
         """Set that its cells have to cover: the surfaces, for each part of the inner loop and each possible delay."""
@@ -83,10 +105,10 @@ class Claim(Table):
     def prover(self, gains: Gains) -> Prover:
         """Prover of the claim: the loops that have to contract."""
         own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
-        loop = SampledLoop(gains.arm, self.jitter, own)
+        loop = SampledLoop(gains.arm, self.jitter(gains), own)
         unit = gains.alpha if self.kind == "adapting" else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
-        younger = self.jitter + gains.arm.unsure_ticks
+        younger = self.ages[1] - self.ages[0] + gains.arm.unsure_ticks
         fading: Literal["", "gain", "surface"] = "surface" if self.kind == "one-sided" else ""
         if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
             fading = "gain"
@@ -120,9 +142,7 @@ def _cuts(ends: np.ndarray, low: float, high: float) -> list[tuple[float, float]
     return [(a, b) for a, b in pairwise(all_of.tolist())]
 
 
-def held_claim(
-    gains: Gains, low: float, high: float, most: float, jitter: int = 0, margin: float = 1.0
-) -> Claim:
+def held_claim(gains: Gains, low: float, high: float, most: float, margin: float = 1.0) -> Claim:
     """That the loop with K_u = cap is stable on surfaces as the measured position feels them.
 
     Args:
@@ -130,10 +150,10 @@ def held_claim(
         low: K + B/theta from [N/m].
         high: to [N/m].
         most: longest B/K [s].
-        jitter: ticks.
         margin: factor that all gains may grow by.
     """
-    return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, margin), jitter=jitter)
+    ages = (gains.arm.sensor_ticks,) * 2
+    return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, margin), ages=ages)
 
 
 def adapting_claims(
@@ -145,18 +165,23 @@ def adapting_claims(
         gains: of the loop.
         low: for a torque arm, the softest surface [N/m]; a position arm's proof is of all.
         most: longest B/K [s].
-        jitter: ticks.
+        jitter: ticks by which a reading may be older than the sensor's period, rounded up; the highest gain comes
+            first, with fewer ticks where it has to.
         margin: factor that all gains may grow by.
     """
-    high = gains.seen_cap
+    high, oldest = gains.seen_cap, gains.arm.sensor_ticks
     low = high if gains.arm.kind == "position" else low
+    youngest = (
+        0 if gains.arm.low_pass.sections else 1
+    )  # without a low-pass a reading is of the surface itself
     return [
         [
             Claim(
                 kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
-                jitter=min(jitter + more, MOST_JITTER),
+                ages=(youngest, oldest + late),
             )
             for top in tops
+            for late in sorted({jitter + more, more if top == tops[0] else jitter + more}, reverse=True)
         ]
         for least, tops, more in SHARES[gains.arm.kind]
     ]  # fmt: skip
@@ -174,8 +199,8 @@ def one_sided_claim(gains: Gains, most: float, margin: float = 1.0) -> Claim:
         margin: factor that all gains may grow by.
     """
     cap = gains.seen_cap
-    ends = (1.0, margin)
-    return Claim(kind="one-sided", low=GONE * cap, high=cap, least=0.0, most=most, shares=ends, jitter=0)
+    ends, ages = (1.0, margin), (gains.arm.sensor_ticks,) * 2
+    return Claim(kind="one-sided", low=GONE * cap, high=cap, least=0.0, most=most, shares=ends, ages=ages)
 
 
 def _between(gains: Gains) -> float:

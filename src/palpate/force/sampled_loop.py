@@ -90,6 +90,24 @@ class SampledLoop:
         """Numbers of the state."""
         return 2 + len(self.low_pass[1]) + self.lines[0] + 1 + self.lines[1]
 
+    @cached_property
+    def state(self) -> tuple[str, ...]:
+        """Names of the state: position, rate, sensor, readings by age, filtered command, commands, torques."""
+        readings, commands = self.lines
+        sent = range(1, commands)
+        return (
+            "x", "v", *(f"f{i + 1}" for i in range(len(self.low_pass[1]))),
+            *(f"r{i + 1}" for i in range(readings)), "u", "c0",
+            *(f"c{i}" if self.arm.kind == "position" else f"t{i}" for i in sent),
+        )  # fmt: skip
+
+    @cached_property
+    def units(self) -> dict[str, float]:
+        """w0 of v [rad/s], k0 of f, r and t [N/m], and the sensor's rate in which f2, f3 are derivatives [rad/s]."""
+        rate = float(np.prod([(2.0 * pi * f) ** n for n, f in self.arm.low_pass.sections]))
+        order = max(self.arm.low_pass.roll_off, 1)
+        return {"w0": self.rate_unit, "k0": self.force_unit, "wf": rate ** (1.0 / order)}
+
     def rates(self, stiffness: float, damping: float) -> tuple[Array, Array]:
         """Between ticks: zdot = A z + b u of tip and sensor; u is the position or the torque that is held."""
         F, f, _ = self.low_pass
@@ -114,7 +132,7 @@ class SampledLoop:
             stiffness: K [N/m].
             damping: B [N s/m].
             law: its gain and low-pass.
-            loss: ticks of age by which the reading in use is younger than the oldest; jitter.
+            loss: ticks of age by which the reading in use is younger than the oldest; all of them for this tick's own.
         """
         A, b = self.rates(stiffness, damping)
         return self.assembled(*held(A, b, self.arm.tick), self.force_gain(stiffness, damping), law, loss)
@@ -147,7 +165,11 @@ class SampledLoop:
             Phi[p + i, p + i - 1] = 1.0
         # y = kept y + (1 - kept) g (0 - F), in rate of x_c.
         Phi[filtered, filtered] = law.kept
-        Phi[filtered, p + readings - 1 - loss] = -(1.0 - law.kept) * law.gain * self.force_unit
+        fed = -(1.0 - law.kept) * law.gain * self.force_unit
+        if loss < readings:
+            Phi[filtered, p + readings - 1 - loss] = fed
+        else:  # of this very tick
+            Phi[filtered, :p] = fed * reading
         # x_c = x_c + T y, the new y.
         Phi[command] = tick * Phi[filtered]
         Phi[command, command] += 1.0

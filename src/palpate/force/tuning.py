@@ -129,7 +129,8 @@ class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
             "proved": {
                 "stiffness": list(self.surface_stiffness("held") or ()) or None,
                 "damping_time": [held.least, held.most] if held else None,
-                "jitter_ticks": adapting.jitter if adapting else 0,
+                "jitter_ticks": adapting.jitter(self.gains) if adapting else 0,
+                "ages_ticks": list(adapting.ages) if adapting else None,
                 "adapting": None
                 if adapting is None
                 else {

@@ -202,12 +202,6 @@ def _loss(found: Identification) -> float | None:
     return found.press.hysteresis_loss if found.press else None
 
 
-def _tangent(found: Identification) -> float | None:
-    """Tangent of the loss angle in the lowest octave."""
-    octave = found.dynamic_stiffness[0] if found.dynamic_stiffness else None
-    return octave.loss / octave.storage if octave and octave.storage > 0.0 else None
-
-
 def _depth(found: Identification) -> float | None:
     """Mean depth in contact, from the surface [m]."""
     point = found.working_point
@@ -215,7 +209,7 @@ def _depth(found: Identification) -> float | None:
 
 
 FIELDS: dict[str, tuple[str, Callable[[Identification], float | None]]] = {
-    "relaxation": ("1", _relaxation), "loss": ("1", _loss), "loss_tangent": ("1", _tangent), "depth": ("m", _depth),
+    "relaxation": ("1", _relaxation), "loss": ("1", _loss), "depth": ("m", _depth),
 }  # fmt: skip
 """Further quantities of a press, by name: the unit, and the quantity of an identification."""
 LEAST = 5

@@ -104,7 +104,7 @@ class MapResult:
         found = {}
         for name, values in self.presses.fields.items():
             known = np.isfinite(values)
-            if known.sum() < LEAST or np.ptp(values[known]) == 0.0:
+            if known.sum() < LEAST or np.ptp(values[known]) <= 1e-9 * np.abs(values[known]).max():
                 continue
             field = FieldMap(name=name)
             field.update(self.presses.places[known], values[known])

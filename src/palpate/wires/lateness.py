@@ -20,8 +20,8 @@ class Lateness:
         ticks: how many there were.
         late: at 50, 99 and 99.9 % and the most [s].
         missed: readings that never came.
-        jumps: ticks in which the age changed by more than the certificate allows.
-        allowed: by which it may [s]; None without a certificate.
+        jumps: ticks whose reading was later than the certificate allows.
+        allowed: by which it may be [s]; None without a certificate.
     """
 
     ticks: int
@@ -44,7 +44,7 @@ class Lateness:
             )
         elif self.jumps or self.missed:
             lines.append(
-                f"the certificate does not cover this run: it allows the age of a reading to change by"
+                f"the certificate does not cover this run: it allows a reading to be late by"
                 f" {1e3 * self.allowed:.3g} ms; {self.jumps} ticks exceeded that, {self.missed} readings were missed"
             )
         else:
@@ -76,7 +76,7 @@ class Stopwatch:
         self._tick, self._allowed = tick, allowed
         self._ages = np.zeros(most)
         self._n, self._missed, self._jumps = 0, 0, 0
-        self._offset, self._at, self._last = np.inf, 0.0, np.nan
+        self._offset, self._at = np.inf, 0.0
 
     def age(self, stamp: float, now: float) -> float:
         """Of a reading of this stamp, beyond the least that was seen [s]."""
@@ -87,9 +87,8 @@ class Stopwatch:
     def done(self, stamp: float, now: float, missed: int) -> None:
         """The command of a reading has gone out."""
         age = self.age(stamp, now)
-        if self._allowed is not None and abs(age - self._last) > self._allowed:
+        if self._allowed is not None and age > self._allowed:
             self._jumps += 1
-        self._last = age
         self._missed += missed
         if self._n < len(self._ages):
             self._ages[self._n] = age

@@ -96,10 +96,12 @@ class Order:
 
     @property
     def jitter(self) -> float | None:
-        """By which the certificate lets a reading's age change [s]; None without one that covers the adapting law."""
+        """By which the certificate lets a reading be late [s]; None without one that covers the adapting law."""
         certificate = self.loop.certificate
-        claims = [] if certificate is None else [c for c in certificate.claims if c.kind == "adapting"]
-        ticks = max((claim.jitter for claim in claims), default=None)
+        if certificate is None:
+            return None
+        gains = certificate.proved_gains
+        ticks = max((c.jitter(gains) for c in certificate.claims if c.kind == "adapting"), default=None)
         return None if ticks is None else ticks * self.loop.gains.arm.tick
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from palpate.force.describe import UNCOVERED, sentence
+from palpate.force.describe import UNCOVERED, bounds, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning, surface_ends
 from palpate.report.numbers import quantity
@@ -50,7 +50,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         a, b = told.known.stiffness
         source = "given" if told.known.source == "told" else told.known.source
         found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({source})"))
-    found += [("proved", sentence(c, arm.kind)) for c in told.certificate.claims] or [("proved", "nothing")]
+    found += [("proved", sentence(c, gains)) for c in told.certificate.claims] or [("proved", "nothing")]
     return found
 
 
@@ -144,12 +144,13 @@ def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None
                 f"up to {quantity(high, 'N/m')}, over gaps of up to {quantity(gains.force / claim.low, 'm')}"
             )
         elif claim.kind == "adapting":
-            ticks = f"{claim.jitter} tick{'s' * (claim.jitter > 1)}"
+            least, most = bounds(claim, gains)
+            end = f" to {most:.3g}" if isfinite(most) else " and more"
             times = (
-                f", at {claim.shares[0]:g} to {claim.shares[1]:g} times the ideal gain, jitter up to {ticks}"
+                f", K_u {least:.3g}{end} times theirs, readings {claim.ages[0]} to {claim.ages[1]} ticks old"
             )
             span = "any stiffness" if gains.arm.kind == "position" else span
-        elif claim.shares[1] > 1.0:
+        if claim.kind != "adapting" and claim.shares[1] > 1.0:
             times = f", at up to {claim.shares[1]:g} times the gain"
         damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
         yield Text(f"  {_CLAIMS[claim.kind]:24}{span}{times}{damping}")
