@@ -35,6 +35,7 @@ COMMANDS = {
     "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
+    "slide": "Hold a force along an unknown curved surface while the tip moves, in simulation.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "live": "Show a pressing arm, or a log, in the browser.",
     "study": "Run an experiment many times: grids, random points, a search; resumable.",
@@ -46,7 +47,7 @@ COMMANDS = {
 
 GROUPS = {
     Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite", "map"),
-    Group("Force loop", sort_key=2): ("tune", "certify", "press"),
+    Group("Force loop", sort_key=2): ("tune", "certify", "press", "slide"),
     Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
     Group("Thesis and references", sort_key=4): ("thesis", "laboratory", "references"),
 }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palpate.cli._answer import print_answer
 from palpate.cli._one_log import read_found
@@ -13,6 +14,7 @@ from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,
     PressOptions,
+    SlideNumberOptions,
     SurfaceOptions,
     TuningOutputOptions,
 )
@@ -21,10 +23,13 @@ from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from palpate.force import Known, Tuning
     from palpate.force.inner_loop import InnerLoop
 
 
+# More than seven arguments: groups of options.
 def tune(
     found: Path | None = None,
     /,
@@ -33,6 +38,7 @@ def tune(
     press: PressOptions,
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,
+    slide: SlideNumberOptions | None = None,
     output: TuningOutputOptions | None = None,
     page: ReportOption | None = None,
 ) -> int:
@@ -49,6 +55,8 @@ def tune(
     The arm's inner loop and delay from a log of commanded and measured position, in free motion:
 
     palpate tune found.json --arm ur5e --force 20 --loop-from sweep.csv --time t --command target_x --position actual_x
+
+    With --slide --mu-max .9 the gains are for palpate slide and palpate.force.SlidingLoop too.
 
     The gains are for palpate.force.ForceLoop, which adapts to any surface below the cap. Exit code 1: nothing could be
     proved.
@@ -73,6 +81,8 @@ def tune(
         peak=press.highest,
         surface_speed=surface.surface_speed,
     )
+    if slide is not None and slide.slide:
+        told = replace(told, gains=slide.added_to(told.gains))
     written = _write(told, output.out, report)
     _print(told, inner, written, output)
     return 0 if told.proved else 1
@@ -109,14 +119,33 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
 
 def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], output: TuningOutputOptions) -> None:
     if output.json:
-        print_answer(told.to_json() | {"inner_loop": None if inner is None else inner.to_json()})
+        print_answer(
+            told.to_json() | {"inner_loop": None if inner is None else inner.to_json()} | _slide(told)
+        )
         return
     from palpate.report.tuning.table import show, show_all
 
     screen = console()
     if not output.verbose:
         show(told, screen, written)
+        _print_slide(told, screen)
         return
     show_all(told, screen)
+    _print_slide(told, screen)
     for path in written:
         place(screen, "written:", path)
+
+
+def _print_slide(told: Tuning, screen: Console) -> None:
+    if told.gains.slide is not None:
+        from palpate.force.sliding.slide_domain import slide_sentence
+
+        screen.print(f"Slide: {slide_sentence(told.gains)}.", soft_wrap=True)
+
+
+def _slide(told: Tuning) -> dict[str, Any]:
+    if told.gains.slide is None:
+        return {}
+    from palpate.force.sliding.slide_domain import slide_json
+
+    return {"slide": slide_json(told.gains)}

@@ -6,6 +6,7 @@ from palpate.force.certifying import certify
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
 from palpate.force.known_surface import Known, known_from
+from palpate.force.sliding.sliding_loop import SlidingLoop
 from palpate.force.tuning import Tuning, tune
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "ForceLoop",
     "Gains",
     "Known",
+    "SlidingLoop",
     "Tuning",
     "certify",
     "known_from",

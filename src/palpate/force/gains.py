@@ -20,6 +20,7 @@ from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
 from palpate.force.sensitivity import relief_of
+from palpate.force.slide_table import Slide
 
 ALPHA = 0.42
 """Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
@@ -102,6 +103,8 @@ class Gains(Table):
     relief: Annotated[float, Meta(ge=0, le=0.3)] = 0.0
     """rho: share of the lag that a torque arm does not have on a stiff surface, see `relief_of`."""
     law: str = LAW
+    slide: Slide | None = None
+    """Numbers of a slide; none in gains that only press. No certificate depends on them."""
 
     def __post_init__(self) -> None:
         if self.law != LAW:
@@ -187,7 +190,8 @@ class Gains(Table):
     @cached_property
     def digest(self) -> str:
         """Of everything that a proof rests on: arm, rate, lag, law and gain."""
-        return hashlib.sha256(msgspec.json.encode(self, order="deterministic")).hexdigest()
+        known = {key: value for key, value in msgspec.to_builtins(self).items() if key != "slide"}
+        return hashlib.sha256(msgspec.json.encode(known)).hexdigest()
 
     def to_toml(self) -> str:
         """The file's text."""
@@ -308,7 +312,7 @@ def _three(values: Array) -> Vec3:
 
 
 def _toml(table: dict[str, Any], path: str = "") -> str:
-    plain = {k: v for k, v in table.items() if not isinstance(v, dict)}
+    plain = {k: v for k, v in table.items() if not isinstance(v, dict) and v is not None}
     lines = [f"[{path}]"] if path and plain else []
     lines += [f"{key} = {_value(value)}" for key, value in plain.items()]
     text = "\n".join(lines) + "\n\n" if lines else ""

@@ -15,7 +15,7 @@ from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.force import Arm
+    from palpate.force import Arm, Gains
     from palpate.force.inner_loop import InnerLoop
     from palpate.identification.indenter import Indenter
 
@@ -112,6 +112,64 @@ class PressOptions:
     def highest(self) -> float | None:
         """Force at the touch [N]."""
         return in_si_if_given("--peak", self.peak, "force")
+
+
+@Parameter(name="*", group=Group("A slide along the surface", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class SlideNumberOptions:
+    """Numbers of a slide, for palpate slide and palpate.force.SlidingLoop.
+
+    Parameters
+    ----------
+    slide
+        Tune for a slide too, and print on which surfaces it obeys.
+    mu_max
+        Largest friction coefficient there may be.
+    speed
+        Speed along the surface, as 30:mm/s.
+    radius
+        Smallest radius of curvature of the surface, as 100:mm.
+    tilt
+        Standard deviation of the given normal, in degrees.
+    """
+
+    slide: Annotated[bool, FLAG] = False
+    mu_max: Annotated[float, SIGNED] = 0.9
+    speed: Annotated[str, SIGNED] = "30:mm/s"
+    radius: Annotated[str, SIGNED] = "100:mm"
+    tilt: Annotated[float, SIGNED] = 7.0
+
+    def added_to(self, gains: Gains) -> Gains:
+        """The gains with a table `slide`, if one is wanted."""
+        return with_slide(gains, self.mu_max, self.speed, self.radius, self.tilt) if self.slide else gains
+
+
+def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float) -> Gains:
+    """Gains with the numbers of a slide, as typed.
+
+    Raises:
+        InputError: a number out of range.
+    """
+    from math import radians
+
+    from msgspec.structs import replace
+
+    from palpate.force.slide_table import Slide
+
+    v, R = in_si("--speed", speed, "velocity"), in_si("--radius", radius, "length")
+    if not 0.0 < mu_max <= 2.0:
+        raise InputError(
+            f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {mu_max:g}"
+        )
+    if not 0.0 < v <= gains.arm.limits.speed:
+        raise InputError(
+            f"--speed must be above 0 and at most the arm's {gains.arm.limits.speed:g} m/s, got {v:g} m/s"
+        )
+    if not 1e-3 <= R < 1e4:
+        raise InputError(f"--radius must be from 1 mm to 10 km, got {R:g} m")
+    if not 0.1 <= tilt <= 25.0:
+        raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {tilt:g}")
+    return replace(gains, slide=Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt)))
 
 
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))

@@ -1,0 +1,168 @@
+"""`palpate slide`: a simulated arm holds a force while its tip moves along an unknown curved surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._answer import print_answer
+from palpate.cli._program import command
+from palpate.cli._terminal import console, place
+from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.force import with_slide
+from palpate.cli.options.names import QUIET, LoopArm
+from palpate.cli.options.values import vector
+from palpate.errors import InputError
+from palpate.files import RECORD, fresh_folder, signed, write_json
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from palpate.force import Gains
+    from palpate.force.sliding.slide_world import Ground
+
+_SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
+
+
+@Parameter(name="*", group=Group("The slide", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SlideOptions:
+    """Arm, force and path.
+
+    Parameters
+    ----------
+    arm
+        ur5e, fr3, panda, iiwa14, or a TOML file.
+    force
+        Desired force, as 20:N; that of the gains if left out, or 15 N.
+    speed
+        Along the surface, as 30:mm/s.
+    shape
+        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm.
+    surface
+        K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck).
+    path
+        line, back, raster or circle.
+    length
+        Of a line or a pass, radius of a circle, as 60:mm.
+    seconds
+        Duration of the slide.
+    normal
+        Direction into the surface as the law is told, x,y,z: the true one is 0,0,-1.
+    mu_max
+        Largest friction coefficient that there may be.
+    tilt
+        Standard deviation of --normal in degrees.
+    gains
+        Gains from palpate tune --slide; made for the arm if left out.
+    seed
+        Of the noise.
+    """
+
+    arm: Annotated[LoopArm, QUIET] = "ur5e"
+    force: Annotated[str | None, SIGNED] = None
+    speed: Annotated[str, SIGNED] = "30:mm/s"
+    shape: str = "sphere:200:mm"
+    surface: str = "K=20000,mu=0.3"
+    path: str = "circle"
+    length: Annotated[str, SIGNED] = "40:mm"
+    seconds: Annotated[float, SIGNED] = 8.0
+    normal: Annotated[str, SIGNED] = "0,0,-1"
+    mu_max: Annotated[float, SIGNED] = 0.9
+    tilt: Annotated[float, SIGNED] = 7.0
+    gains: Path | None = None
+    seed: Annotated[int, WHOLE] = 0
+
+    def ground(self) -> tuple[Ground, float]:
+        """The surface, and its radius [m]."""
+        from palpate.force.sliding.slide_world import ground_of
+
+        name, _, size = self.shape.partition(":")
+        radius = in_si("--shape", size, "length") if size else 0.2
+        numbers: dict[str, float] = {}
+        for part in self.surface.split(","):
+            key, _, text = (word.strip() for word in part.partition("="))
+            try:
+                numbers[_SURFACE[key]] = float(text)
+            except (KeyError, ValueError):
+                raise InputError(
+                    f"--surface needs K=..,B=..,mu=.. as numbers, as K=20000,mu=0.3; got {self.surface!r}"
+                ) from None
+        height = {"height": radius, "period": 0.02} if name == "step" else {}
+        return ground_of(
+            name, 0.2 if name == "step" else radius, numbers.pop("stiffness", 0.0), **numbers, **height
+        ), radius
+
+    def tuned(self, radius: float) -> Gains:
+        """Gains for the slide."""
+        from msgspec.structs import replace as msgspec_replace
+
+        from palpate.force import load_arm, load_gains
+        from palpate.force.gains import gains_for
+
+        wanted = in_si("--force", self.force or "15:N", "force")
+        if self.gains is not None:
+            gains = load_gains(self.gains)
+            return gains if self.force is None else msgspec_replace(gains, force=wanted)
+        if not wanted > 0.0:
+            raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
+        gains = gains_for(load_arm(self.arm), wanted)
+        return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt)
+
+
+def slide(
+    *,
+    asked: SlideOptions | None = None,
+    out: Path | None = None,
+    replace: Annotated[bool, FLAG] = False,
+    json: Annotated[bool, FLAG] = False,
+) -> int:
+    """Hold a force while the tip moves along an unknown curved surface, in simulation.
+
+    palpate slide --arm fr3 --force 15:N --speed 30:mm/s --shape bowl:150:mm --surface K=20000,mu=0.3 --path raster
+
+    The arm looks for the surface along --normal, presses, and slides. It estimates normal, friction and stiffness, each
+    with an interval. Exit code 1: the force was not held within 3 % rms and 10 %.
+
+    Parameters
+    ----------
+    out
+        Folder for record.parquet, summary.json, slide.png and report.html; runs/slide-ARM-SEED when left out.
+    replace
+        Replace the results at --out.
+    json
+        Print one JSON object and nothing else.
+    """
+    from palpate.force.sliding.slide_domain import numbers_of
+    from palpate.force.sliding.slide_world import GAP, directions, simulate
+    from palpate.report.slide import sentence, summarise, write_report
+
+    asked = asked or SlideOptions()
+    ground, radius = asked.ground()
+    gains = asked.tuned(abs(radius))
+    slide_numbers = numbers_of(gains)
+    if not 1.0 <= asked.seconds <= 600.0:
+        raise InputError(f"--seconds must be from 1 to 600, got {asked.seconds:g}")
+    length = in_si("--length", asked.length, "length")
+    if not length >= GAP:
+        raise InputError(f"--length must be at least {1e3 * GAP:g} mm, got {1e3 * length:g} mm")
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, length)
+    folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
+    into = vector("normal", asked.normal, "number")
+    with fresh_folder(folder, replace=replace) as fresh:
+        rows = simulate(gains, ground, ways, into=into or (0.0, 0.0, -1.0), seed=asked.seed)
+        head = {"command": printable(command()), "seed": asked.seed, "shape": asked.shape, "path": asked.path}
+        summary: dict[str, Any] = signed({**head, **summarise(rows, gains, ground)})
+        write_report(rows, gains, summary, fresh, RECORD)
+        write_json(fresh / "summary.json", summary)
+    if json:
+        print_answer(summary)
+    else:
+        screen = console()
+        screen.print(f"{gains.arm.title}: {sentence(summary)}", soft_wrap=True)
+        for note in summary["troubles"]:
+            screen.print(f"! {note}", soft_wrap=True)
+        place(screen, "report:", folder / "report.html")
+    return 0 if summary["end"] == "held" else 1

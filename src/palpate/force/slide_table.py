@@ -1,0 +1,30 @@
+"""The numbers of a slide in a gains file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from palpate.force.arm import Positive, Table
+
+
+class Slide(Table):
+    """Table `slide` of a gains file."""
+
+    speed: Positive
+    """Along the surface [m/s]."""
+    mu_max: Annotated[float, Meta(gt=0, le=2)]
+    """Largest friction that there may be; a larger one is refuted as a wrong normal."""
+    slope: Annotated[float, Meta(gt=0, le=0.5)] = 0.12
+    """Standard deviation of the given direction against the surface's normal, each way [rad]."""
+    radius: Positive = 0.1
+    """Smallest radius of curvature of the surface [m]."""
+    ratio: Annotated[float, Meta(gt=0, le=2)] = 0.85
+    """Tangential over normal stiffness of the contact; 2 (1 - nu)/(2 - nu) of two spheres (Mindlin, 1949)."""
+    turning: Positive = 1000.0
+    """Noise of the curvature along the path, 1/R^3 [1/m^3]."""
+    curvature: Positive = 10.0
+    """Standard deviation of the curvature before any was seen [1/m]."""
+    acceleration: Positive = 0.4
+    """Of the tip along the surface [m/s^2]."""

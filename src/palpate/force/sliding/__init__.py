@@ -1,0 +1,1 @@
+"""Force control while the tip moves along an unknown curved surface: normal, friction and stiffness estimated."""

@@ -1,0 +1,85 @@
+"""The domain of a slide in closed form: surfaces on which the force stays within 3 % rms and 10 %."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palpate.errors import InputError
+from palpate.force.gains import Gains
+from palpate.force.slide_table import Slide
+
+LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
+"""Largest terms of the domain; measured by benchmarks/force/sliding.py."""
+UNSURE, AHEAD = 5e-3, 0.01
+"""Lag that is not known, and age of the curvature where it is used [s]."""
+
+
+def slide_terms(gains: Gains, stiffness: float, friction: float, radius: float) -> dict[str, float]:
+    """Costs of a surface to a slide: terms that are to be below `LIMITS`.
+
+    Args:
+        gains: with a table `slide`.
+        stiffness: K of the surface [N/m].
+        friction: mu.
+        radius: of curvature [m].
+
+    Returns:
+        The force, as a share of F_d, that a lag not known costs (`lag`) and a curvature that changes (`turning`);
+        the path on which the contact sticks over the radius (`sticking`); the change of the normal force before it
+        slips (`tilt`).
+    """
+    slide, F = numbers_of(gains), gains.force
+    seen, v = gains.arm.seen(stiffness), slide.speed
+    share = seen * gains.theta * v / (gains.alpha * F)
+    return {
+        "lag": share * v * UNSURE / radius,
+        "turning": share * (v * (gains.theta + AHEAD) / radius) ** 2,
+        "sticking": friction * F / (slide.ratio * seen * radius),
+        "tilt": friction * slide.slope / slide.ratio,
+    }
+
+
+def obeys(terms: dict[str, float]) -> bool:
+    """Whether a surface with these terms is in the domain."""
+    return all(terms[name] < limit for name, limit in LIMITS.items())
+
+
+def slide_domain(gains: Gains) -> tuple[float, float] | None:
+    """Stiffnesses between which a slide with friction mu_max on the smallest radius is in the domain [N/m]."""
+    slide, points = numbers_of(gains), 400
+    low, high = 100.0, gains.cap
+    ladder = [low * (high / low) ** (i / points) for i in range(points + 1)] if high > low else []
+    inside = [K for K in ladder if obeys(slide_terms(gains, K, slide.mu_max, slide.radius))]
+    return (inside[0], inside[-1]) if inside else None
+
+
+def numbers_of(gains: Gains) -> Slide:
+    """The table `slide` of gains.
+
+    Raises:
+        InputError: gains without it.
+    """
+    if gains.slide is None:
+        raise InputError("these gains have no numbers for a slide; tune again with --slide --mu-max .9")
+    return gains.slide
+
+
+def slide_json(gains: Gains) -> dict[str, Any]:
+    """Numbers and domain as plain values."""
+    slide, domain = numbers_of(gains), slide_domain(gains)
+    return {
+        "speed_m_s": slide.speed, "mu_max": slide.mu_max, "slope_std_rad": slide.slope, "radius_m": slide.radius,
+        "floor_of_force": (1.0 + slide.mu_max**2) ** 0.5, "domain": {"stiffness": list(domain) if domain else None},
+    }  # fmt: skip
+
+
+def slide_sentence(gains: Gains) -> str:
+    """The domain in a sentence."""
+    slide, domain = numbers_of(gains), slide_domain(gains)
+    least = (
+        f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
+    )
+    floor = f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest"
+    if domain is None:
+        return f"a slide obeys on no surface {least}{slide.mu_max:g}: slow down, or give a better normal; {floor}"
+    return f"a slide obeys on {domain[0]:.3g} to {domain[1]:.3g} N/m {least}{slide.mu_max:g}; {floor}"

@@ -1,0 +1,437 @@
+"""Slides simulated and judged: an arm with lags, a curved surface with friction, a sensor, and a law, compiled.
+
+The surface's own axes are x and y along it at its first point and z out of it. Nothing of the filter is in here:
+friction is a bristle that sticks until mu N (Coulomb) and weakens with speed (Stribeck), shapes are distance functions.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate._jit import kernel, law, part
+from palpate._vector import ZERO3, Vec3, cos, exp, sin, sqrt
+from palpate.arrays import Array
+from palpate.errors import InputError, unknown
+from palpate.force.flat import flattened
+from palpate.force.gains import Gains
+from palpate.force.law import gain
+from palpate.force.simulated_press import world_of
+from palpate.force.sliding.slide_law import (
+    BOUND,
+    G1,
+    G2,
+    JERKS,
+    LOG_K,
+    MU,
+    NORMAL,
+    PHASE,
+    REFUTED,
+    SIZE,
+    SLIDE,
+    STATES,
+    STEPPED,
+    TROUBLE,
+    put_vector,
+    slide_step,
+    stiffness_of,
+    unit,
+    variance,
+    vector_at,
+)  # fmt: skip
+from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, numbers_in, sliding
+
+PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP = (float(i) for i in range(8))
+SHAPES = {
+    "plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES,
+    "eggs": EGGS, "step": STEP,
+}  # fmt: skip
+OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
+LAWS = {
+    "sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE,
+}  # fmt: skip
+COLUMNS = (
+    "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness", "log_std",
+    "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
+)  # fmt: skip
+"""Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
+speed commanded along the surface [m/s], reading [N], friction as it acts."""
+ELASTIC = 0.85
+"""Tangential over normal stiffness of the simulated contact if none is given."""
+
+
+@part
+class Ground(NamedTuple):
+    """A surface and its friction.
+
+    Args:
+        shape: one of `SHAPES`.
+        radius: of curvature; of waves at their crest [m].
+        period: of waves; place of a step [m].
+        height: of a step, downwards if negative [m].
+        stiffness: K [N/m].
+        damping: B [N s/m].
+        friction: mu at speed.
+        sticking: mu of a contact at rest, at least `friction`.
+        creep: speed over which one becomes the other [m/s].
+        ratio: tangential over normal stiffness.
+    """
+
+    shape: float
+    radius: float
+    period: float
+    height: float
+    stiffness: float
+    damping: float
+    friction: float
+    sticking: float
+    creep: float
+    ratio: float
+
+
+@law
+def outside(ground, p):
+    """Distance of a point from the surface [m], negative inside, and the direction out of it."""
+    R, shape = ground.radius, ground.shape
+    up = Vec3(0.0, 0.0, 1.0)
+    if shape == PLANE:
+        return p.z, up
+    if shape == SPHERE:
+        away = p + R * up
+        return sqrt(away @ away) - R, unit(away, up)
+    if shape == BOWL:
+        away = R * up - p
+        return R - sqrt(away @ away), unit(away, up)
+    if shape == CYLINDER:
+        away = Vec3(p.x, 0.0, p.z + R)
+        return sqrt(away @ away) - R, unit(away, up)
+    h, hx, hy = height_at(ground, p.x, p.y)
+    size = sqrt(1.0 + hx * hx + hy * hy)
+    return (p.z - h) / size, Vec3(-hx, -hy, 1.0) / size
+
+
+@law
+def height_at(ground, x, y):
+    """Height of a surface that is one over the plane [m], and its slopes."""
+    R, k = ground.radius, 6.283185307179586 / ground.period
+    if ground.shape == SADDLE:
+        return 0.5 * (x * x - y * y) / R, x / R, -y / R
+    if ground.shape == EGGS:
+        a = 1.0 / (R * k * k)
+        return (
+            a * (cos(k * x) * cos(k * y) - 1.0),
+            -a * k * sin(k * x) * cos(k * y),
+            -a * k * cos(k * x) * sin(k * y),
+        )
+    if ground.shape == WAVES:
+        return (cos(k * x) - 1.0) / (R * k * k), -sin(k * x) / (R * k), 0.0
+    u = min(max((x - ground.period) / 2e-3 + 0.5, 0.0), 1.0)  # the tip's radius rounds an edge over 2 mm
+    return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
+
+
+@part
+class Carried(NamedTuple):
+    """Tip and contact."""
+
+    x: Vec3  # of the arm [m]
+    v: Vec3  # of it [m/s]
+    stuck: Vec3  # place from which the bristle is bent [m]
+    depth: float  # the surface's own deflection [m]
+    touching: float
+    force: Vec3  # on the surface [N]
+    normal: float  # N [N]
+    friction: float  # of now
+
+
+@law
+def contact(world, ground, tip, x, v, h):
+    """The contact of a tip at x with a speed v: spring and damper along the normal, a bristle along the surface."""
+    series = world.stiffness if world.torque == 0.0 else 1e12
+    where = x - tip.force / series
+    distance, out = outside(ground, where)
+    n = -out
+    pen = -distance + n @ (x - where)
+    if pen <= 0.0:
+        return Carried(x, v, x, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    K, b = ground.stiffness, ground.damping
+    if world.torque == 0.0:
+        depth = (series * pen + b / h * tip.depth) / (series + K + b / h)
+        N = max(series * (pen - depth), 0.0)
+    else:
+        depth, N = pen, max(K * pen + b * (n @ v), 0.0)
+    stuck = tip.stuck if tip.touching > 0.0 else x
+    bent = x - stuck
+    bent = bent - (bent @ n) * n
+    k = ground.ratio * K / (1.0 + ground.ratio * K / series)
+    slip = v - (v @ n) * n
+    mu = ground.friction + (ground.sticking - ground.friction) * exp(
+        -slip @ slip / (ground.creep * ground.creep)
+    )
+    most, pull = mu * N / k, sqrt(bent @ bent)
+    if pull > most:
+        bent = bent * (most / pull)
+    return Carried(x, v, x - bent, depth, 1.0, N * n + k * bent, N, mu)
+
+
+# Long, and with more than seven arguments: a kernel that takes numbers, room and what it fills.
+@law
+def slide_run(world, ground, numbers, s, rival, start, directions, desired, noise, line, out):
+    """A run from free motion until the directions are used up; row k of `out` is `COLUMNS`; returns the rows.
+
+    Args:
+        world: arm and sensor, each axis alike.
+        ground: the surface.
+        numbers: of the sliding law, flat.
+        s: its state, as it starts, shape (SIZE,).
+        rival: one of `LAWS`, which takes over when the force is held for the first time.
+        start: of the tip [m], shape (3,).
+        directions: for each tick of the slide, shape (m, 3).
+        desired: F_d [N].
+        noise: standard normal numbers, shape (n, 3).
+        line: room for what is on its way, shape (delay + 1, 3).
+        out: shape (n, 20).
+    """
+    law = numbers_in(numbers)
+    work, h, ticks = directions[0:1, 0].repeat(STATES), world.tick / world.steps, 0
+    tip = Carried(vector_at(start, 0), ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    x = y = z = ZERO3
+    reading, command, samples = world.noise * vector_at(noise[0], 0), tip.x, 0.0
+    n_rival, v_rival, filtered = ZERO3, ZERO3, ZERO3
+    for i in range(world.delay + 1):
+        put_vector(line[i], 0, (1.0 - world.torque) * command)
+    for k in range(len(out)):
+        if ticks >= len(directions):
+            return k
+        seen = by_encoder(world, tip.x)
+        wanted = vector_at(directions[ticks], 0)
+        if rival == OWN or ticks == 0:
+            velocity = slide_step(law, s, work, desired, reading, seen, wanted, 0.0)
+            n_rival, filtered = vector_at(s, NORMAL), seen
+        if rival != OWN and ticks > 0:
+            n_rival, velocity = rival_step(
+                law, s, rival, n_rival, v_rival, filtered, seen, reading, wanted, desired
+            )
+            filtered = filtered + (0.05 * world.tick / 2e-3) * (seen - filtered)
+            v_rival = velocity
+        ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
+        command = command + world.tick * velocity
+        pulled = world.torque * (world.stiffness * (command - seen) - world.second * tip.v)
+        put_vector(line[world.delay], 0, (1.0 - world.torque) * command + pulled)
+        held = vector_at(line[0], 0)
+        for i in range(world.delay):
+            for j in range(3):
+                line[i, j] = line[i + 1, j]
+        mean = 0.0
+        for j in range(world.steps):
+            pull = held - tip.force
+            rate = (
+                world.first * (held - tip.x) - world.second * tip.v
+                if world.torque == 0.0
+                else pull / world.first
+            )
+            v = tip.v + h * rate
+            tip = contact(world, ground, tip, tip.x + h * v, v, h)
+            f = tip.force
+            x, y, z = world.E @ x + f.x * world.e, world.E @ y + f.y * world.e, world.E @ z + f.z * world.e
+            mean += tip.normal
+            if (k * world.steps + j + 1) * h >= world.phase + samples / world.sampling:
+                samples += 1.0
+                reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
+                reading = reading + world.noise * vector_at(noise[k], 0)
+        note(ground, s, tip, n_rival, velocity, reading, mean / world.steps, out[k])
+        out[k, 13] = (1.0 if s[PHASE] == SLIDE else 2.0) * min(ticks, 1)
+    return len(out)
+
+
+@law
+def by_encoder(world, x):
+    """A position in steps of the encoder [m]."""
+    step = world.step
+    return Vec3(step * round(x.x / step), step * round(x.y / step), step * round(x.z / step))
+
+
+# More than seven arguments: all that a row has.
+@law
+def note(ground, s, tip, n, velocity, reading, mean, row):
+    """Fills a row of `COLUMNS`."""
+    _, up = outside(ground, tip.x)
+    row[0] = mean
+    put_vector(row, 1, tip.x)
+    put_vector(row, 4, n)
+    row[7] = sqrt(max(2.0 + 2.0 * (n @ up), 0.0))
+    row[8] = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 0.0))
+    row[9], row[10] = s[MU], sqrt(max(variance(s, MU, MU), 0.0))
+    row[11], row[12] = stiffness_of(s), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
+    row[13], row[14] = 0.0, s[TROUBLE]
+    across = velocity - (velocity @ n) * n
+    row[15] = sqrt(across @ across)
+    put_vector(row, 16, reading)
+    row[19] = tip.friction
+
+
+@law
+def rival_step(law, s, rival, n, v, filtered, seen, force, direction, desired):
+    """A tick of another law from the held force on, with the K_u that the press found: normal and velocity [m/s]."""
+    c = law.press
+    if rival == VELOCITY:
+        moved = seen - filtered
+        size = sqrt(moved @ moved)
+        if size > 5e-4:
+            along = moved / size
+            n = unit(n - 0.05 * (n @ along) * along, n)
+    flat = direction - (direction @ n) * n
+    across = law.speed * flat / max(sqrt(flat @ flat), 0.1)
+    g = gain(c, s[BOUND])
+    if rival == FZI:  # the whole vector of force error moves the tip, and motion is superposed
+        return n, g * (desired * n - force) + across + g * (force - (force @ n) * n) * 0.5
+    if rival == ADMITTANCE:  # M dv/dt + B v = F_d - f.n with B = 1/g and M/B of three lags
+        press = v @ n
+        return n, (press + c.tick / (3.0 * c.theta) * (g * (desired - force @ n) - press)) * n + across
+    return n, g * (desired - force @ n) * n + across
+
+
+compiled_slide = kernel(slide_run)
+
+PATHS = ("line", "back", "circle", "raster")
+GAP = 3e-3
+"""Between tip and surface at the start [m]."""
+LONGEST = 30.0
+"""Time in which the surface is to be found and the force held [s]."""
+SETTLED = 0.5
+"""Time after which a slide is judged [s]."""
+
+
+def directions(
+    path: str, seconds: float, rate: float, speed: float, extent: float, heading: float = 0.0
+) -> Array:
+    """Unit vectors along the surface for each tick, shape (n, 3).
+
+    Args:
+        path: one of `PATHS`.
+        seconds: of the slide [s].
+        rate: ticks a second [Hz].
+        speed: along the surface [m/s].
+        extent: length of a line or a pass, radius of a circle [m].
+        heading: of the beginning [rad].
+
+    Raises:
+        InputError: no such path.
+    """
+    if path not in PATHS:
+        raise unknown("path", path, PATHS)
+    way = speed / rate * np.arange(round(seconds * rate))
+    if path == "circle":
+        angle = heading + way / extent
+    elif path == "raster":  # a pass, a tenth of it aside, and the pass back
+        turn = way % (2.2 * extent)
+        angle = heading + np.pi * ((turn >= 1.1 * extent) & (turn < 2.1 * extent))
+        aside = ((turn >= extent) & (turn < 1.1 * extent)) | (turn >= 2.1 * extent)
+        angle = np.where(aside, heading + 0.5 * np.pi, angle)
+    else:
+        angle = heading + np.pi * (np.floor(way / extent) % 2.0) * (path == "back")
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
+
+
+def simulate(
+    gains: Gains,
+    ground: Ground,
+    ways: Array,
+    *,
+    into: ArrayLike = DOWN,
+    seed: int = 0,
+    rival: str = "sliding",
+) -> Array:
+    """A slide from free motion on: rows of `COLUMNS`, shape (n, 20).
+
+    Args:
+        gains: with a table `slide`.
+        ground: the surface; the tip comes down on its origin.
+        ways: directions of the slide, tick by tick, shape (m, 3).
+        into: direction in which the law looks for the surface, shape (3,).
+        seed: of the noise.
+        rival: one of `LAWS`.
+    """
+    if rival not in LAWS:
+        raise unknown("law", rival, LAWS)
+    law, arm = sliding(gains, into), gains.arm
+    state = np.zeros(SIZE)
+    law.start(state)
+    world = world_of(arm, noise=arm.sensor.noise)
+    n = len(ways) + round(LONGEST * arm.rate)
+    out = np.zeros((n, len(COLUMNS)))
+    noise = np.random.default_rng(seed).standard_normal((n, 3))
+    start = -GAP * np.array(law.into) * (-1.0 if law.into.z > 0.0 else 1.0)  # outside, however wrong it is
+    line = np.zeros((world.delay + 1, 3))
+    rows = compiled_slide(
+        world, ground, flattened(law), state, LAWS[rival], start, ways, gains.force, noise, line, out
+    )
+    return out[:rows]
+
+
+@dataclass(frozen=True)
+class SlideFigures:
+    """How a slide went; errors are judged after `SETTLED`."""
+
+    touched: bool  # the force was held, and the tip slid
+    rms: float  # of the force error, share of F_d
+    most: float  # largest error, share of F_d
+    worst: float  # largest normal force of the whole slide in F_d
+    lost: bool  # the true force was 0
+    normal: float  # median error [rad]
+    cone: float  # share of the time in which the 95 % cone holds the normal
+    friction: float  # the same of mu
+    stiffness: float  # the same of K
+    steps: bool  # a step was said
+    jerks: bool  # stick-slip was said
+    refuted: bool  # a normal was refuted
+
+    @property
+    def obeys(self) -> bool:
+        """Within 3 % rms and 10 %, contact kept."""
+        return self.touched and self.rms <= 0.03 and self.most <= 0.1 and not self.lost
+
+
+def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
+    """How a slide went, from its rows."""
+    c = {name: out[:, i] for i, name in enumerate(COLUMNS)}
+    on = np.flatnonzero(c["sliding"])
+    judged = on[round(SETTLED * gains.arm.rate) :]
+    if not len(judged):
+        nan = float("nan")
+        return SlideFigures(False, nan, nan, nan, True, nan, 0.0, 0.0, 0.0, False, False, False)
+    error = c["normal_force"][judged] / gains.force - 1.0
+    true = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
+    said = set(c["trouble"][on])
+    return SlideFigures(
+        True, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()),
+        float(c["normal_force"][on].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
+        float(np.median(c["normal_error"][judged])),
+        float(np.mean(c["normal_error"][judged] < CHI2_95 * c["cone"][judged])),
+        float(np.mean(np.abs(c["mu"][judged] - ground.friction) < 1.96 * c["mu_std"][judged])),
+        float(np.mean(np.abs(np.log(c["stiffness"][judged] / true)) < 1.96 * c["log_std"][judged])),
+        STEPPED in said, JERKS in said, REFUTED in said,
+    )  # fmt: skip
+
+
+def ground_of(shape: str, radius: float, stiffness: float, **others: float) -> Ground:
+    """A surface; `others` as `Ground` has them.
+
+    Raises:
+        InputError: no such shape, or a number out of range.
+    """
+    if shape not in SHAPES:
+        raise unknown("shape", shape, SHAPES)
+    friction = others.get("friction", 0.0)
+    numbers = {
+        "radius": radius, "period": 2.0 * radius, "height": 0.0, "stiffness": stiffness, "damping": 0.0,
+        "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC, **others,
+    }  # fmt: skip
+    low = [f"{name} of {value:g}" for name, value in numbers.items() if value < 0.0 and name != "height"]
+    if low or not radius > 0.0 or not stiffness > 0.0:
+        raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
+    if numbers["sticking"] < numbers["friction"]:
+        raise InputError(
+            f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"
+        )
+    return Ground(SHAPES[shape], **{name: float(value) for name, value in numbers.items()})

@@ -1,0 +1,228 @@
+"""The sliding law in a user's own control loop: force, position and direction in, velocity out, a tick at a time."""
+
+from __future__ import annotations
+
+from math import exp, sqrt
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate._jit import kernel, law, reader
+from palpate._vector import Vec3
+from palpate.arrays import Array
+from palpate.errors import InputError
+from palpate.force.flat import flattened
+from palpate.force.gains import Gains, load_gains
+from palpate.force.guard import LEAST
+from palpate.force.lag import sum_of_lags
+from palpate.force.sliding import slide_law as places
+from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.slide_law import (
+    BASE,
+    COVARIANCE,
+    G1,
+    LOG_K,
+    MU,
+    SIZE,
+    SLIDING_TROUBLES,
+    STATES,
+    Sliding,
+    put_vector,
+    slide_step,
+    vector_at,
+)  # fmt: skip
+from palpate.results import Readable
+
+CHI2_95 = sqrt(5.991)
+"""Deviations within which two jointly normal numbers lie with 95 %."""
+DOWN = (0.0, 0.0, -1.0)
+ENCODER = 2e-6
+"""Standard deviation of a measured position from tick to tick [m]: encoders of many arms resolve a micrometre."""
+UNSURE_LAG = 2e-4
+"""Standard deviation of the lag between force and position [s]: a tenth of a sensor's period."""
+numbers_in = reader(Sliding)
+
+
+def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
+    """The law's numbers from gains that have a table `slide`.
+
+    Args:
+        gains: from `palpate tune --slide`.
+        into: direction into the surface in the base's axes, shape (3,).
+
+    Raises:
+        InputError: gains without that table, a direction without length.
+    """
+    slide = numbers_of(gains)
+    n = np.asarray(into, dtype=np.float64)
+    if n.shape != (3,) or not np.isfinite(n).all() or not np.linalg.norm(n) > 0.0:
+        raise InputError(
+            f"the direction into the surface needs three numbers that are not all 0, got {into!r}"
+        )
+    arm = gains.arm
+    return Sliding(
+        press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
+        ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
+        acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
+        encoder=ENCODER, doubt=UNSURE_LAG,
+    )  # fmt: skip
+
+
+@law
+def flat_slide(numbers, s, work, desired, force, position, direction, missed, velocity):
+    """`slide_step` on flat arrays: the velocity [m/s] and the state are changed in place."""
+    v = slide_step(
+        numbers_in(numbers), s, work, desired, vector_at(force, 0), vector_at(position, 0), vector_at(direction, 0),
+        missed,
+    )  # fmt: skip
+    put_vector(velocity, 0, v)
+
+
+_slide = kernel(flat_slide)
+
+
+class Uncertain(float):
+    """A number with its uncertainty.
+
+    Args:
+        value: the estimate.
+        std: its standard deviation.
+        ci95: the 95 % interval.
+    """
+
+    std: float
+    ci95: tuple[float, float]
+
+    def __new__(cls, value: float, std: float, ci95: tuple[float, float]) -> Uncertain:
+        one = super().__new__(cls, value)
+        one.std, one.ci95 = std, ci95
+        return one
+
+
+class SlidingLoop(Readable):
+    """Holds a force along an unknown curved surface while the tip moves; from free motion on.
+
+    In the user's own loop, once a tick::
+
+        loop = SlidingLoop.load("gains.toml", into=(0, 0, -1))
+        while True:
+            x_command += tick * loop.update(force, position, direction)
+
+    The tip looks for the surface along `into`, no faster than the approach of the gains, presses until the force is
+    held, and then slides. `trouble` names what is wrong, as of `ForceLoop`, and steps, stick-slip, a force outside the
+    friction cone, and lost contact.
+
+    Args:
+        gains: from `palpate tune --slide`.
+        into: direction into the surface in the base's axes, shape (3,); its error is `slope` of the gains.
+
+    Raises:
+        InputError: gains without numbers for a slide, a direction without length.
+    """
+
+    def __init__(self, gains: Gains, into: ArrayLike = DOWN):
+        self.gains = gains
+        self.law = sliding(gains, into)
+        self._desired = gains.force
+        self._numbers, self._state, self._work = flattened(self.law), np.zeros(SIZE), np.zeros(STATES)
+        self._velocity = np.zeros(3)
+        self.reset()
+        _slide(self._numbers, self._state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
+
+    @classmethod
+    def load(cls, path: str | Path, into: ArrayLike = DOWN) -> SlidingLoop:
+        """From the file that `palpate tune --slide` wrote.
+
+        Raises:
+            InputError: a file that is none, gains without numbers for a slide.
+        """
+        return cls(load_gains(Path(path)), into)
+
+    def reset(self) -> None:
+        """In free motion, knowing nothing."""
+        self.law.start(self._state)
+
+    @property
+    def desired(self) -> float:
+        """F_d [N]."""
+        return self._desired
+
+    @desired.setter
+    def desired(self, force: float) -> None:
+        least, most = LEAST * self.gains.arm.sensor.noise, self.gains.force_limit
+        if not least <= float(force) < most:
+            raise InputError(
+                f"the desired force must be from {least:g} N to below {most:g} N, got {force:g} N"
+            )
+        self._desired = float(force)
+
+    def update(
+        self, force: ArrayLike, position: ArrayLike, direction: ArrayLike, missed: float = 0.0
+    ) -> Array:
+        """The velocity of the commanded position for this tick [m/s], shape (3,), in the base's axes.
+
+        Args:
+            force: on the surface [N], shape (3,).
+            position: of the tip by the arm's encoders [m], shape (3,).
+            direction: in which to slide, shape (3,): a unit vector, or a shorter one for a slower slide. Its part along
+                the normal counts for nothing.
+            missed: ticks that were lost since the last call.
+        """
+        _slide.compiled(
+            self._numbers, self._state, self._work, self._desired, _three("force", force),
+            _three("position", position), _three("direction", direction), missed, self._velocity,
+        )  # fmt: skip
+        return self._velocity.copy()
+
+    @property
+    def sliding(self) -> bool:
+        """Whether the force was held and the tip slides."""
+        return bool(self._state[places.PHASE] == places.SLIDE)
+
+    @property
+    def normal(self) -> Array:
+        """Estimated normal, into the surface, shape (3,); before contact the direction that was given."""
+        return self._state[places.NORMAL : places.NORMAL + 3].copy()
+
+    @property
+    def normal_cone95(self) -> float:
+        """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
+        if not self.sliding:
+            return CHI2_95 * self.law.slope
+        at = COVARIANCE + G1 * (STATES + 1)
+        a, b, c = self._state[at], self._state[at + 1], self._state[at + STATES + 1]
+        return CHI2_95 * sqrt(max(0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b)), 0.0))
+
+    @property
+    def friction(self) -> Uncertain | None:
+        """Coefficient of friction; None before a slide."""
+        if not self.sliding:
+            return None
+        value, std = float(self._state[MU]), sqrt(max(self._variance(MU), 0.0))
+        return Uncertain(value, std, (max(value - 1.96 * std, 0.0), value + 1.96 * std))
+
+    @property
+    def stiffness(self) -> Uncertain | None:
+        """Stiffness as the measured position feels it [N/m]; None before a slide."""
+        if not self.sliding:
+            return None
+        value, std = float(self._state[BASE] * exp(self._state[LOG_K])), sqrt(max(self._variance(LOG_K), 0.0))
+        return Uncertain(value, std * value, (value * exp(-1.96 * std), value * exp(1.96 * std)))
+
+    @property
+    def trouble(self) -> str:
+        """Fault of the last tick, in words; empty if there was none."""
+        return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
+
+    def _variance(self, i: int) -> float:
+        return float(self._state[COVARIANCE + i * (STATES + 1)])
+
+
+def _three(name: str, values: ArrayLike) -> Array:
+    given = np.ascontiguousarray(values, dtype=np.float64)
+    if given.shape != (3,):
+        raise InputError(
+            f"{name} needs three numbers, in the base's axes, got an array of shape {given.shape}"
+        )
+    return given
