@@ -225,14 +225,16 @@ def is_true(made, rng):
 
 @pytest.mark.long
 def test_forgeries_by_the_hundred_are_refused_or_true(file):
-    """Both decide the same, and what both pass is so."""
+    """What the first check passes the second passes, and that is so."""
     rng = np.random.default_rng(0)
     passed = 0
     for _ in range(300):
         made = changes(rng, file)
         own, other = verdicts(made)
-        assert own == other, made["claims"][0]["kind"]
-        if own:
+        assert other or not own, made["claims"][0][
+            "kind"
+        ]  # the first also refuses units that are not its own
+        if other:
             passed += 1
             assert is_true(made, rng)
     assert 20 < passed < 200  # a narrower claim is as true as before
