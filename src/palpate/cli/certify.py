@@ -82,10 +82,32 @@ class ProofOptions:
         return high
 
 
+@Parameter(name="*", group=Group("Another controller", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class OthersOptions:
+    """A controller of others, by its parameter file.
+
+    Parameters
+    ----------
+    controller
+        ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the corrected
+        numbers are for, --out a file with these.
+    delay
+        Everything that is late between contact and motion, such as 24:ms.
+    mass
+        Mass of the tip along the normal, for crisp and franka, such as 3:kg.
+    """
+
+    controller: str | None = None
+    delay: str | None = None
+    mass: str | None = None
+
+
 def certify(
     gains: Path | None = None,
     /,
     *,
+    others: OthersOptions | None = None,
     proof: ProofOptions | None = None,
     columns: ColumnOptions | None = None,
     output: TuningOutputOptions | None = None,
@@ -99,6 +121,8 @@ def certify(
 
     palpate certify force_loop/palpate_force.h --check certificate.json
 
+    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml
+
     A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
     has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
     part could not be proved, or the certificate does not hold.
@@ -106,7 +130,7 @@ def certify(
     Parameters
     ----------
     gains
-        The file of palpate tune; for a check also the header of its law in C.
+        The file of palpate tune, or the parameter file of --controller; for a check also the header of a law in C.
     check
         A certificate to check.
     """
@@ -115,6 +139,8 @@ def certify(
         return _check(check, gains, output)
     if gains is None:
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
+    if others is not None and others.controller is not None:
+        return _others(gains, others, proof, output)
     output.check_new(output.out, ending=".json")
     proof.check()
     return _prove(gains, proof, columns or ColumnOptions(), output)
@@ -148,6 +174,33 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
     kinds = {claim.kind for claim in made.claims}
     wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
     return 0 if wanted <= kinds else 1
+
+
+def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
+    from palpate.analysis.others_controllers import STIFFEST, certify_controller
+    from palpate.excitation.quantities import quantity
+    from palpate.files import MADE, write_text
+
+    output.check_new(output.out, ending=".yaml")
+    if others.delay is None:
+        raise InputError(
+            "--controller needs --delay, everything late between contact and motion, such as 24:ms"
+        )
+    mass = None if others.mass is None else quantity("--mass", others.mass, "mass")
+    delay = quantity("--delay", others.delay, "time")
+    stiffest = STIFFEST if asked.surfaces is None else asked.surfaces[1]
+    answer, text = certify_controller(path, str(others.controller), delay, mass, stiffest)
+    if output.out is not None and answer["corrected"] is not None:
+        write_text(output.out, text if text.startswith(MADE) else f"{MADE} certify.\n{text}")
+    if output.json:
+        print_answer(answer)
+    else:
+        from palpate.report.tuning.table import controller_lines
+
+        print_lines(*controller_lines(answer, output.out))
+    return (
+        0 if answer["proved"]["stiffness"] is not None and answer["proved"]["stiffness"][1] >= stiffest else 1
+    )
 
 
 def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
