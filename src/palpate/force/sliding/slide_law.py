@@ -90,7 +90,7 @@ def spread(s, i, more):
 
 @law
 def stiffness_of(s):
-    """K [N/m]."""
+    """Stiffness K of the surface [N/m]."""
     return s[BASE] * exp(s[LOG_K])
 
 
@@ -192,7 +192,7 @@ def unit(a, otherwise):
 
 @law
 def cross(a, b):
-    """The vector product."""
+    """Vector product of two vectors."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 

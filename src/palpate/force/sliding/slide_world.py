@@ -132,7 +132,7 @@ def height_at(ground, x, y):
 
 @part
 class Carried(NamedTuple):
-    """Tip and contact."""
+    """State of the tip and of the contact."""
 
     x: Vec3  # of the arm [m]
     v: Vec3  # of it [m/s]

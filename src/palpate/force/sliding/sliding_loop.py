@@ -145,7 +145,7 @@ class SlidingLoop(Readable):
 
     @property
     def desired(self) -> float:
-        """F_d [N]."""
+        """Desired force F_d [N]."""
         return self._desired
 
     @desired.setter
