@@ -1,6 +1,5 @@
 """What every test may lean on: the project's folder, the measured logs, the program."""
 
-import copy
 import gc
 import os
 import signal
@@ -10,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from cyclopts import App
 from hypothesis import settings
 
 from palpate._jit import registry
@@ -32,27 +30,6 @@ sys.path.insert(0, str(ROOT / "benchmarks" / "live"))
 
 # A shell that starts the tests in the background has Ctrl-C ignored, and whatever they start would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-_assemble = App.assemble_argument_collection
-_known: dict[object, object] = {}
-
-
-def _assembled(app: App, **words: object) -> object:
-    """Arguments of a command, whose signature Cyclopts reads once: it takes 20 ms, and tests give a thousand commands.
-
-    A process of palpate reads one once. All that a command line fills is a copy; a help is read as it ever was.
-    """
-    if words or app.default_command is None:
-        return _assemble(app, **words)
-    if app.default_command not in _known:
-        _known[app.default_command] = _assemble(app)
-    known = _known[app.default_command]
-    fixed = {id(part): part for one in known for part in (one.parameter, one.field_info, one.hint)}
-    return copy.deepcopy(known, fixed)
-
-
-App.assemble_argument_collection = _assembled
 
 
 # Thousands of tests are collected, each some objects, and nothing of them is garbage before the end.

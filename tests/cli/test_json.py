@@ -19,7 +19,7 @@ from studies.small import SMALL
 
 HEAD = {"command", "version", "options", "files"}
 PRESS = "press.csv --time time_s --position position_mm:mm --force force_N:N --no-figure"
-SEEDED = {"run", "press"}
+SEEDED = {"run", "press", "slide"}
 """Commands that draw random numbers."""
 WITHOUT = {
     "live": "shows a page",
@@ -39,13 +39,14 @@ CASES = {
     "certify": ["certify gains.toml --held-only --out certificate.json"],
     "export": ["export found.json --to newton --geom foam"],
     "press": ["press --arm fr3 --force 20 --surface K=5000,B=50 --seconds 1 --out pressed"],
+    "slide": ["slide --arm ur5e --seconds 1 --out slid"],
     "run": ["run mine.toml --seed 3 --out ran"],
     "study": ["study small.toml --out studied"],
     "checks": ["checks my_parts:Push"],
     "references": ["references check"],
     "speed": ["speed"],
 }
-LONG = {"certify", "checks", "press", "references", "run", "speed", "study", "tune"}
+LONG = {"certify", "checks", "press", "references", "run", "slide", "speed", "study", "tune"}
 
 
 @pytest.fixture(scope="module")

@@ -141,13 +141,14 @@ def test_the_header_names_law_and_gains(force, gains):
 
 def test_a_certificate_knows_the_header_of_its_gains(force, gains, tmp_path, capsys):
     from palpate.force import Certificate, load_gains
+    from palpate.force.certificate import FORM
 
     header, proof = tmp_path / "palpate_force.h", tmp_path / "proof.json"
     header.write_text(force.sources.header)
     own = load_gains(gains)
 
     def answer(of):
-        Certificate("palpate force certificate 1", of, ()).save(proof)
+        Certificate(FORM, of, ()).save(proof)
         code = main(["certify", str(header), "--check", str(proof)])
         return code, capsys.readouterr().err
 
