@@ -96,11 +96,15 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
     if summary["end"] != "held":
         alerts.insert(0, {"tone": "fail", "title": "", "text": f"The force: {summary['end']}."})
     caption = "Against the path. Grey: 95 % intervals; dashed: desired, or the truth of the simulation."
+    figures = [
+        {"panels": panels[:-1], "caption": caption},
+        {"panels": panels[-1:], "caption": "Speed along the path."},
+    ]
     answer = Answer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",
-        alerts=alerts, cards={"": _cards(summary)}, figures=[{"panels": panels, "caption": caption}],
+        alerts=alerts, cards={"": _cards(summary)}, figures=figures,
         source=("The gains", gains.to_toml()),
     )  # fmt: skip
     write_text(folder / "report.html", answer_page(answer, room="slide", command=summary["command"]))

@@ -122,7 +122,7 @@ class SlideNumberOptions:
     Parameters
     ----------
     slide
-        Tune for a slide too, and print on which surfaces it obeys.
+        Tune for a slide too, and print on which surfaces it holds the force within 3 % rms.
     mu_max
         Largest friction coefficient there may be.
     speed

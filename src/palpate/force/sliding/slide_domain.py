@@ -81,5 +81,6 @@ def slide_sentence(gains: Gains) -> str:
     )
     floor = f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest"
     if domain is None:
-        return f"a slide obeys on no surface {least}{slide.mu_max:g}: slow down, or give a better normal; {floor}"
-    return f"a slide obeys on {domain[0]:.3g} to {domain[1]:.3g} N/m {least}{slide.mu_max:g}; {floor}"
+        better = "slow down, or give a better normal"
+        return f"no surface lies in the domain of a slide {least}{slide.mu_max:g}: {better}; {floor}"
+    return f"the domain of a slide is {domain[0]:.3g} to {domain[1]:.3g} N/m {least}{slide.mu_max:g}; {floor}"
