@@ -34,9 +34,8 @@ def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
     for name, shape in set(re.findall(r'<clipPath id="(\w+)">(.*?)</clipPath>', text, flags=re.DOTALL)):
-        text = text.replace(
-            name, f"p{sha256(shape.encode()).hexdigest()[:10]}"
-        )  # matplotlib's has the last bit in it
+        # matplotlib's own name is a hash of the unrounded shape
+        text = text.replace(name, f"p{sha256(shape.encode()).hexdigest()[:10]}")
     names = {colour: f"--c{i}" for i, colour in enumerate(_BY_DARK)}
     for colour, name in names.items():
         text = text.replace(colour, f"var({name})")

@@ -13,7 +13,7 @@ from palpate.arrays import Array
 from palpate.identification.estimators.descent import Descent
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, NonlinearParameter
-from palpate_references.models import FLOATS
+from palpate_references.models import FLOATS, SineMotion
 from palpate_references.problem import Problem, motion_and_force
 
 MOST = 11.0
@@ -80,7 +80,7 @@ def palpate_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
             break
     found = {name.strip(): value for name, value in point.nonlinear.items()}
     values = dict(zip(law.linear, point.theta.tolist(), strict=True)) | found
-    return SolverResult(values, _deviations(problem, values))
+    return SolverResult(values, _deviations(problem, path, force, values))
 
 
 def scipy_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
@@ -100,54 +100,50 @@ def scipy_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
     with np.errstate(all="ignore"):  # a step out of the model's domain has no digits
         done = least_squares(residual, first, method="lm", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
         values = dict(zip(names, done.x.tolist(), strict=True))
-        return SolverResult(values, _deviations(problem, values))
+        return SolverResult(values, _deviations(problem, path, force, values))
 
 
-def lstsq_solver(problem: Problem, start: dict[str, float]) -> SolverResult | None:
-    """`numpy.linalg.lstsq`; None of a model that is not linear."""
-    if start:
-        return None
+def lstsq_solver(problem: Problem, _start: dict[str, float]) -> SolverResult:
+    """`numpy.linalg.lstsq`, of a linear model."""
     path, force = motion_and_force(problem)
-    law = problem.law
-    theta = np.linalg.lstsq(np.column_stack(law.columns(path, {}, FLOATS)), force, rcond=None)[0]
-    values = dict(zip(law.linear, theta.tolist(), strict=True))
-    return SolverResult(values, _deviations(problem, values))
+    theta = np.linalg.lstsq(_regressors(problem, path), force, rcond=None)[0]
+    values = dict(zip(problem.law.linear, theta.tolist(), strict=True))
+    return SolverResult(values, _deviations(problem, path, force, values))
 
 
-def recursive_solver(problem: Problem, start: dict[str, float]) -> SolverResult | None:
-    """`palpate.identifiers.RecursiveLeastSquares`, a row at a time, from zero; None of a model that is not linear."""
+def recursive_solver(problem: Problem, _start: dict[str, float]) -> SolverResult:
+    """`palpate.identifiers.RecursiveLeastSquares` of a linear model, a row at a time, from zero."""
     from palpate.identifiers import RecursiveLeastSquares
 
-    if start:
-        return None
     path, force = motion_and_force(problem)
-    law = problem.law
-    columns = np.column_stack(law.columns(path, {}, FLOATS))
+    columns = _regressors(problem, path)
     size = np.sqrt((columns**2).mean(axis=0))
-    p = len(law.linear)
+    p = columns.shape[1]
     estimator = RecursiveLeastSquares(np.zeros(p), 1e16 * np.eye(p))
     for row, value in zip(columns / size, force, strict=True):
         estimator.update(row, value)
-    values = dict(zip(law.linear, (estimator.theta / size).tolist(), strict=True))
+    values = dict(zip(problem.law.linear, (estimator.theta / size).tolist(), strict=True))
     return SolverResult(values, {})
 
 
-Solver = Callable[[Problem, dict[str, float]], SolverResult | None]
+Solver = Callable[[Problem, dict[str, float]], SolverResult]
 SOLVERS: dict[str, Solver] = {
     "palpate": palpate_solver,
     "scipy least_squares": scipy_solver,
     "numpy lstsq": lstsq_solver,
     "palpate recursive": recursive_solver,
 }
+LINEAR = {"numpy lstsq", "palpate recursive"}
+"""Solvers of linear models alone."""
 
 
 def scores(problem: Problem, solver: str) -> Iterator[Score]:
     """Digits of a solver from each start; none where it does not take the model."""
+    if problem.starts and solver in LINEAR:
+        return
     for number in range(2 if problem.starts else 1):
         start = {name: float(both[number]) for name, both in problem.starts.items()}
         solution = SOLVERS[solver](problem, start)
-        if solution is None:
-            return
         certified = problem.certified
         worst = min(digits_of(solution.values[k], float(c.value)) for k, c in certified.items())
         std = [digits_of(v, float(certified[k].std)) for k, v in solution.std.items()]
@@ -165,9 +161,15 @@ def _range(problem: Problem, name: str) -> tuple[float, float]:
     return 2.0 * low - high, 2.0 * high - low
 
 
-def _deviations(problem: Problem, values: dict[str, float]) -> dict[str, float]:
+def _regressors(problem: Problem, path: SineMotion) -> Array:
+    """Columns of a linear model, shape (n, p)."""
+    return np.column_stack(problem.law.columns(path, {}, FLOATS))
+
+
+def _deviations(
+    problem: Problem, path: SineMotion, force: Array, values: dict[str, float]
+) -> dict[str, float]:
     """Standard deviations by the Jacobian, of central differences in the nonlinear parameters."""
-    path, force = motion_and_force(problem)
     law = problem.law
     columns = law.columns(path, values, FLOATS)
 
