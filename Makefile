@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack soak trust leaderboard force-figures laboratory claims docs pictures lock clean
+.PHONY: help demo test test-long lint format check bench live attack soak figures figures-fast trust laboratory claims docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -59,23 +59,20 @@ live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a se
 
 attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an hour of each experiment, faults in mid-press; into docs/reliability.md, docs/wires.md
 	$(BIN)/python benchmarks/attack/run.py --write
-	$(BIN)/python benchmarks/arms/faults.py --page docs/wires.md
+	$(BIN)/python benchmarks/figures.py --only wires-faults
 
 soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples and 2e7 hostile ones, for docs/reliability.md; hours
-	$(BIN)/python benchmarks/online/soak.py --write
+	$(BIN)/python benchmarks/figures.py --only soak hostile
 	$(BIN)/python benchmarks/force/hostile.py
-	$(BIN)/python benchmarks/online/soak.py --hostile 2e7 --write
+
+figures: .venv/dev.stamp ## make every figure of the documents whose sources have changed; hours, resumable
+	$(BIN)/python benchmarks/figures.py
+
+figures-fast: .venv/dev.stamp ## run the small run of every figure, and compare it with what it printed when the figure was made
+	$(BIN)/python benchmarks/figures.py --smoke
 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
-	$(BIN)/python benchmarks/identification/foreign/judge.py --trials 4 --markdown docs/trust.md
-	$(BIN)/python benchmarks/identification/foreign/cases.py --markdown docs/trust.md || true
-	$(BIN)/python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --markdown docs/trust.md
-
-leaderboard: .venv/dev.stamp ## put force controllers to the same touches again, and write the page of it
-	$(BIN)/python benchmarks/force/leaderboard.py --touches 100 --seconds 600 --out docs/force-leaderboard.md
-
-force-figures: .venv/dev.stamp ## make every figure of the force law that is missing, and the page of them; an hour, resumable
-	$(BIN)/python benchmarks/force/figures.py
+	$(BIN)/python benchmarks/figures.py --only trust plain-presses cases
 
 laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory

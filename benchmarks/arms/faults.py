@@ -5,7 +5,7 @@ way, sensors and clocks that lie. The simulated arm keeps a trace of what it is 
 must not change any more, and never was one faster than the limit.
 
     python benchmarks/arms/faults.py --wire sim --wire rtde        # into build/wire-faults.json, resumable
-    python benchmarks/arms/faults.py --page docs/wires.md    # all that is missing, and the tables of the page
+    python benchmarks/arms/faults.py                            # all that is missing, and the tables
 
 A slow arm, of a lag of some 0.2 s, so that a busy machine is in time. Exit code 1 if an arm still moves.
 """
@@ -29,7 +29,6 @@ from pathlib import Path
 import numpy as np
 from faulty_arm import CLOCKS, LIES
 from faulty_press import FAULTS as OF_THE_LAW
-from pages import put
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -370,7 +369,7 @@ def tried(kind: str, fault: Fault) -> Result | None:
     try:
         return Stand(kind, fault, cells()).run()
     except AssertionError as error:
-        print(f"{kind}: {fault.name}: not begun: {str(error)[-60:]}", flush=True)
+        print(f"{kind}: {fault.name}: not begun: {str(error)[-60:]}", file=sys.stderr)
         return None
 
 
@@ -445,7 +444,6 @@ def main() -> int:
     asked.add_argument("--only", help="kinds whose name contains this")
     asked.add_argument("--again", action="store_true", help="make those that were made, too")
     asked.add_argument("--state", type=Path, default=STATE, help="where results are kept")
-    asked.add_argument("--page", type=Path, help="put the tables between the marks of this page")
     words = asked.parse_args()
     os.environ["CYCLONEDDS_URI"] = ALONE
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, and each press would inherit that
@@ -459,16 +457,17 @@ def main() -> int:
     for kind, fault in wanted:
         result = next(filter(None, (tried(kind, fault) for _ in range(TRIES))), None)
         if result is None:
-            print(f"{kind}: {fault.name}: the arm did not move before its fault, three times", flush=True)
+            print(
+                f"{kind}: {fault.name}: the arm did not move before its fault, three times", file=sys.stderr
+            )
             continue
         found[f"{kind}: {fault.name}"] = asdict(result)
         kept = (made(words.state) if not words.again else {}) | found
         words.state.write_text(json.dumps(kept, indent=1))
-        print(f"{kind}: {fault.name}: {result}", flush=True)
+        print(f"{kind}: {fault.name}: {result}", file=sys.stderr)
     found = made(words.state)
     lines = [*summary(found), "", *kinds(found)]
     print("\n".join(lines))
-    put(words.page, "faults", lines)
     return int(any(r["moves"] for r in found.values()))
 
 

@@ -1,14 +1,11 @@
 """What identification finds on each arm's press, torques and positions, on a soft and on a stiff surface.
 
 K, B and the force are of the first press; verdicts and intervals are counted, and the overshoot is the largest, over
-all seeds. `--markdown docs/arms.md` puts the table between the marks of that page.
+all seeds.
 """
 
 import argparse
 from itertools import product
-from pathlib import Path
-
-from pages import put
 
 from palpate.press.engines import MODES
 from palpate.press.prepare import Question, prepared, surface_of
@@ -64,14 +61,11 @@ def told(parameter: dict) -> str:
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--seeds", type=int, default=4)
-    asked.add_argument("--markdown", type=Path)
+    asked.add_argument("--arms", nargs="+", default=names(), choices=names())
     words = asked.parse_args()
-    lines = [HEAD, "|" + "---|" * (HEAD.count("|") - 1)]
-    print(HEAD)
-    for mode, arm, stiffness in product(MODES, names(), STIFFNESSES):
-        lines.append(row(arm, mode, stiffness, words.seeds))
-        print(lines[-1], flush=True)
-    put(words.markdown, "identify", lines)
+    print(HEAD, "|" + "---|" * (HEAD.count("|") - 1), sep="\n")
+    for mode, arm, stiffness in product(MODES, words.arms, STIFFNESSES):
+        print(row(arm, mode, stiffness, words.seeds), flush=True)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,12 @@
 
 MuJoCo's step is called by its address from a Numba loop, so that nothing of Python is in it. It is measured with the
 arm alone, without shapes or contact, and with a small ball at the tip that rests on a plane, which a press needs.
-Palpate's step has the surface, its contact and the force sensor in it. `--markdown docs/arms.md` puts the table there.
+Palpate's step has the surface, its contact and the force sensor in it.
 """
 
 import argparse
 import ctypes
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,6 @@ from pathlib import Path
 import mujoco
 import numba
 import numpy as np
-from pages import put
 
 from palpate._vector import ZERO3
 from palpate.environments.kelvin_voigt import KelvinVoigt
@@ -25,7 +25,7 @@ from palpate.press.setting import cell_of, place_of
 from palpate.robots import SerialArm
 from palpate.robots.serial.serial_arm import mjcf, scene_of
 
-STEPS, REPEATS, WANTED = 1000, 400, 3.0
+STEPS, WANTED = 1000, 3.0
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")
 HEAD = (
     "| | own step, touching [us] | `mj_step`, touching [us] | times (90 % of the turns) | `mj_step`, in the air [us] |"
@@ -101,7 +101,7 @@ def theirs(name: str, touching: bool) -> Callable[[], float]:
     return once
 
 
-def row(name: str) -> tuple[str, bool]:
+def row(name: str, turns: int) -> tuple[str, bool]:
     """A row of the table, and whether the ratio is what is wanted.
 
     The three take turns, so that what else the machine does falls on all of them alike.
@@ -109,7 +109,7 @@ def row(name: str) -> tuple[str, bool]:
     ways = own(name), theirs(name, True), theirs(name, False)
     for way in ways:
         way()
-    took = 1e6 * np.array([[way() for way in ways] for _ in range(REPEATS)])
+    took = 1e6 * np.array([[way() for way in ways] for _ in range(turns)])
     a, touching, free = np.median(took, axis=0)
     ratios = [np.percentile(took[:, i] / took[:, 0], (5, 50, 95)) for i in (1, 2)]
     cells = [f"{r[1]:.1f} ({r[0]:.1f} to {r[2]:.1f})" for r in ratios]
@@ -120,15 +120,15 @@ def row(name: str) -> tuple[str, bool]:
 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--markdown", type=Path)
+    asked.add_argument("--arms", nargs="+", default=NAMES, choices=NAMES)
+    asked.add_argument("--turns", type=int, default=400, help="of the engines, by turns")
     words = asked.parse_args()
-    lines = [HEAD, "|" + "---|" * HEAD.count(" | ") + "---|"]
-    print(HEAD)
-    for name in NAMES:
-        line, enough = row(name)
-        lines.append(line)
-        print(line + ("" if enough else f"  (wanted: {WANTED:g} of both)"), flush=True)
-    put(words.markdown, "tick", lines)
+    print(HEAD, "|" + "---|" * HEAD.count(" | ") + "---|", sep="\n")
+    for name in words.arms:
+        line, enough = row(name, words.turns)
+        print(line, flush=True)
+        if not enough:
+            print(f"{name}: {WANTED:g} of both is wanted", file=sys.stderr)
 
 
 if __name__ == "__main__":

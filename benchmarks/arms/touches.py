@@ -1,14 +1,11 @@
 """How far the first force goes over at a touch by arms of positions, whose tip swings on the arm's own stiffness.
 
-`--markdown docs/arms.md` puts the table between the marks of that page; `--swing 0` tries another share of a swing for
-which nothing is learned.
+`--swing 0` tries another share of a swing for which nothing is learned.
 """
 
 import argparse
-from pathlib import Path
 
 import numpy as np
-from pages import put
 
 from palpate.bench.force_input import CONTACT
 from palpate.force import gains
@@ -34,16 +31,12 @@ def main() -> None:
     asked.add_argument("--seeds", type=int, default=20)
     asked.add_argument("--arms", nargs="*", default=names())
     asked.add_argument("--swing", type=float, default=gains.SWING)
-    asked.add_argument("--markdown", type=Path)
     words = asked.parse_args()
     gains.SWING = words.swing
-    lines = ["| arm | " + " | ".join(f"{k:g} N/m" for k in STIFFNESSES) + " |", "|---" * 7 + "|"]
-    print(lines[0])
+    print("| arm | " + " | ".join(f"{k:g} N/m" for k in STIFFNESSES) + " |", "|---" * 7 + "|", sep="\n")
     for arm in words.arms:
         worst = [max(overshoot(arm, k, seed) for seed in range(words.seeds)) for k in STIFFNESSES]
-        lines.append(f"| {arm} | " + " | ".join(f"{w:.2f}" for w in worst) + " |")
-        print(lines[-1], flush=True)
-    put(words.markdown, "touches", lines)
+        print(f"| {arm} | " + " | ".join(f"{w:.2f}" for w in worst) + " |", flush=True)
 
 
 if __name__ == "__main__":

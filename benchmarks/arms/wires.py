@@ -1,7 +1,7 @@
 """What each wire costs: a press with a simulated arm that speaks the maker's protocol in another process, at real time.
 
 For each wire a press of some seconds at 125 Hz (libfranka: 1 kHz), its lateness, its force, and the K that
-`palpate identify` finds in its record. `--markdown docs/wires.md` puts the table between the marks of that page.
+`palpate identify` finds in its record.
 """
 
 import argparse
@@ -14,8 +14,6 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-
-from pages import put
 
 from palpate.cli import main as palpate
 from palpate.force import load_arm
@@ -91,16 +89,13 @@ def row(name: str, seconds: float, folder: Path) -> str:
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--seconds", type=float, default=6.0)
-    asked.add_argument("--markdown", type=Path)
+    asked.add_argument("--wires", nargs="+", default=list(WIRES), choices=WIRES)
     words = asked.parse_args()
     os.environ.setdefault("CYCLONEDDS_URI", ALONE)
-    lines = [HEAD, "|" + "---|" * HEAD.count(" | ") + "---|"]
-    print(HEAD)
+    print(HEAD, "|" + "---|" * HEAD.count(" | ") + "---|", sep="\n")
     with tempfile.TemporaryDirectory() as folder:
-        for name in WIRES:
-            lines.append(row(name, words.seconds, Path(folder)))
-            print(lines[-1], flush=True)
-    put(words.markdown, "wires", lines)
+        for name in words.wires:
+            print(row(name, words.seconds, Path(folder)), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,4 @@
-"""Press exported contacts in the engines, and put the errors in K and B into docs/export.md.
-
-python benchmarks/export/table.py --markdown docs/export.md
-"""
+"""Errors in K and B of exported contacts that are pressed in the engines."""
 
 from __future__ import annotations
 
@@ -18,14 +15,11 @@ from export import scenes
 from palpate.export import Request, contact_from, prepare
 
 ENGINES = {"mujoco": "MuJoCo", "mjcf-spring": "MuJoCo", "drake": "Drake", "newton": "Newton"}
-MARKS = "<!-- table: made by benchmarks/export/table.py -->", "<!-- end of table -->"
 
 
 def main() -> None:
-    """Print the table, or write it between its marks."""
-    asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("--markdown", type=Path)
-    path = asked.parse_args().markdown
+    """Print the table."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         rows = list(measured(Path(folder)))
     lines = [
@@ -34,11 +28,7 @@ def main() -> None:
     ]
     table = "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
     note = f"MuJoCo {engine_version('mujoco')}, Drake {version('drake')}, Newton {engine_version('newton')}."
-    if path is None:
-        print(f"{table}\n\n{note}")
-        return
-    head, rest = path.read_text().split(MARKS[0])
-    path.write_text(f"{head}{MARKS[0]}\n\n{table}\n\n{note}\n\n{MARKS[1]}{rest.split(MARKS[1])[1]}")
+    print(f"{table}\n\n{note}")
 
 
 def engine_version(name: str) -> str:

@@ -135,20 +135,21 @@ def wandering(gains, claim, rng, told) -> int:
 
 def adapting(gains, claim, rng, told) -> int:
     """Runs whose state is larger after so many ticks, gain and age of the reading being anything at each."""
-    grown, loop, unit = 0, claim.prover(gains).loop, gains.arm.series
+    prover, unit = claim.prover(gains), gains.arm.series
+    grown, loop = 0, prover.loop
     for _ in track(range(told.runs), "adapting", transient=True):
         time_of = rng.uniform(claim.least, claim.most)
         K = unit / (1.0 + time_of / gains.theta)
         ends = [s * gains.alpha / gains.theta / unit for s in claim.shares]
         corner = {
             (g, loss): loop.phi(K, time_of * K, Law(ends[g]), loss)
-            for g in range(2) for loss in range(claim.jitter + 1)
+            for g in range(2) for loss in range(prover.younger + 1)
         }  # fmt: skip
         x = rng.standard_normal(loop.size)
         before = np.linalg.norm(x)
         share = rng.choice([0.0, 1.0, -1.0], told.ticks)  # either end, or anything between
         share = np.where(share < 0.0, rng.uniform(size=told.ticks), share)
-        losses = rng.integers(claim.jitter + 1, size=told.ticks)
+        losses = rng.integers(prover.younger + 1, size=told.ticks)
         for s, loss in zip(share, losses, strict=True):
             x = (1.0 - s) * (corner[0, loss] @ x) + s * (corner[1, loss] @ x)
         grown += np.linalg.norm(x) >= before

@@ -1,6 +1,6 @@
 """The same first touches under every law: share unsettled, p99 of settling, overshoot, contacts lost, an hour's error.
 
-    python benchmarks/force/leaderboard.py [--touches 300] [--arms ur5e fr3] [--seed 0] [--out PAGE.md]
+    python benchmarks/force/leaderboard.py [--touches 300] [--arms ur5e fr3] [--seed 0]
         [--minutes 3.5] [--runs runs/leaderboard.jsonl]
 
 Every run is kept as it ends: the same command goes on where it stopped, and shows the laws that have all of theirs.
@@ -18,13 +18,6 @@ import numpy as np
 from rivals import rivals
 from touches import Draw, Key, Rig, resumed
 
-ABOUT = """First touches on unknown surfaces, 1e2 ... 1e6 N/m, damping ratio 0.01 ... 1, 10 ... 40 N, noise up to 0.6 N;
-{touches} for each law, the same for all; seed {seed}. Made by `make leaderboard`; what each law is stands in
-`benchmarks/force/rivals.py`, a re-telling of its idea for one direction, not its authors' code.
-
-Fixed gains are tuned for 7 kN/m and not retuned: a law may do better where its gains are tuned for the surface at hand,
-which is what this asks it to do without. Failed: not settled within 6 s, or more than 10 % over, or contact lost.
-Judge by the tails; by medians the point estimate looks as good as any."""
 SECONDS = 6.0
 OVER = 0.1
 HEAD = "| law | failed | unsettled | settling p99 [s] | overshoot p99 | most | contacts lost | error in {seconds:g} s |"
@@ -36,21 +29,13 @@ def main() -> None:
     parser.add_argument("--arms", nargs="+", default=["ur5e", "fr3"])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=3600.0)
-    parser.add_argument("--out", type=Path)
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--runs", type=Path, default=Path("runs/leaderboard.jsonl"))
     told = parser.parse_args()
     until = time.monotonic() + 60.0 * told.minutes
     told.left = lambda: (until - time.monotonic()) / 60.0
-    about = ABOUT.format(touches=told.touches, seed=told.seed)
-    lines = ["# Leaderboard of force controllers", "", about]
     for name in told.arms:
-        lines += ["", f"## {Rig(name).arm.title}", "", *table(name, told)]
-    text = "\n".join(lines) + "\n"
-    if told.out is None:
-        print(text)
-    else:
-        told.out.write_text(text, encoding="utf-8")
+        print("", f"## {Rig(name).arm.title}", "", *table(name, told), sep="\n", flush=True)
 
 
 def table(name: str, told: argparse.Namespace) -> list[str]:

@@ -1,6 +1,6 @@
 """Presses at constant speed as testing machines and arms make them: whether the tangent at the named force holds.
 
-    python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --seed 0 --markdown docs/trust.md
+    python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --seed 0
     python benchmarks/identification/plain_presses.py --show 17
 
 A world is a material (spring, Hertz, power law, exponential; elastic, or relaxing as a standard linear solid, a Prony
@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from foreign.tables import between
 
 from palpate.errors import InputError
 from palpate.identification import Identification, identify
@@ -41,7 +40,6 @@ Rng = np.random.Generator
 LAWS = ("spring", "hertz", "power", "exponential")
 TIMES = ("elastic", "solid", "prony", "power-law")
 MOTIONS = ("loading", "loading-unloading", "unloading", "ramp-hold", "cycles", "tension")
-BEGIN, END = "<!-- presses: begin -->", "<!-- presses: end -->"
 _FEWEST = 300
 _MOST = 60_000
 
@@ -321,7 +319,6 @@ def main() -> None:
     parser.add_argument(
         "--misses", action="store_true", help="name the worlds that are missed or not answered"
     )
-    parser.add_argument("--markdown", type=Path, help="write the table into that page, between its two marks")
     parser.add_argument("--show", help="SEED: one world and its answer")
     asked = parser.parse_args()
     if asked.show:
@@ -338,14 +335,7 @@ def main() -> None:
                 j = bad[0]
                 kind = f"{world.motion}/{world.law}/{world.times}{' free' if world.free else ''}"
                 print(f"{seed:5} {kind:44} {len(bad)}: {j.what}, {j.value:.5g} ± {j.half:.2g}, {j.truth:.5g}")
-    rows = table(every)
-    print(*rows, sep="\n")
-    if asked.markdown:
-        size = f"--worlds {asked.worlds} --repeats {asked.repeats} --seed {asked.seed}"
-        command = f"    python benchmarks/identification/plain_presses.py {size}\n"
-        page = asked.markdown.read_text(encoding="utf-8")
-        text = "\n".join([command, "```", *rows, "```"])
-        asked.markdown.write_text(between(page, (BEGIN, END), text), encoding="utf-8")
+    print(*table(every), sep="\n")
 
 
 def show(seed: int) -> None:

@@ -1,6 +1,6 @@
 """Judge stiffness maps on surfaces that share nothing with the Gaussian process, and print the tables of docs/maps.md.
 
-    benchmarks/maps/coverage.py [--worlds 40] [--seed 1] [--parts coverage presses time] [--markdown docs/maps.md]
+    benchmarks/maps/coverage.py [--worlds 40] [--seed 1] [--parts coverage presses time]
 
 Surfaces: lumps with edges of a probe's width at random places, sizes and depths; smooth lumps; stripes; a random field.
 Each press errs by what it states, times an unknown factor of .7 to 1.5, and by friction of 1 to 6 % that it does not
@@ -16,14 +16,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from palpate.maps import StiffnessMap
 
-MARKS = "<!-- {}: made by benchmarks/maps/coverage.py -->", "<!-- end of {} -->"
 SIDE, PIXELS = 0.1, 100
 CENTRES = (np.arange(PIXELS) + 0.5) / PIXELS * SIDE
 PLACES = np.stack(np.meshgrid(CENTRES, CENTRES), axis=-1).reshape(-1, 2)
@@ -183,7 +181,6 @@ def table(worlds: int, seed: int, counts: Sequence[int]) -> list[str]:
                     f"| {kind} | {goal} | {count} | {100 * row[0]:.1f} % | {100 * row[1]:.1f} % | {row[2]:.3f} | "
                     f"{row[3]:.3f} | {calibration(scores):.3f} |"
                 )
-                print(rows[-1], flush=True)
     return rows
 
 
@@ -208,7 +205,6 @@ def presses_for_random(worlds: int, seed: int) -> list[str]:
                 random, *chosen = np.mean(list(found), axis=0)
                 count = np.interp(-random, -np.minimum.accumulate(chosen), np.arange(35, 101, 5))
                 rows.append(f"| {kind} | {goal} | {count:.0f} |")
-                print(rows[-1], flush=True)
     return rows
 
 
@@ -224,19 +220,16 @@ def cost() -> str:
         result.predict(PLACES)
         result.next(1)
         times.append(time.perf_counter() - start)
-    text = f"10,000 places and the next press, 100 presses: {1e3 * np.median(times[1:]):.0f} ms (median of 8)"
-    print(text)
-    return text
+    return f"10,000 places and the next press, 100 presses: {1e3 * np.median(times[1:]):.0f} ms (median of 8)"
 
 
 def main() -> None:
-    """Print the table, and write it where asked."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--counts", type=int, nargs="+", default=(30, 100))
     parser.add_argument("--parts", nargs="+", default=("coverage", "presses", "time"))
-    parser.add_argument("--markdown", type=Path)
     asked = parser.parse_args()
     parts = {
         "coverage": lambda: table(asked.worlds, asked.seed, asked.counts),
@@ -244,12 +237,7 @@ def main() -> None:
         "time": lambda: [f"{cost()}."],
     }
     for name in asked.parts:
-        rows = parts[name]()
-        if asked.markdown:
-            begin, end = (mark.format(name) for mark in MARKS)
-            before, _, after = asked.markdown.read_text(encoding="utf-8").partition(begin)
-            text = "\n".join([begin, *rows, end]) + after.partition(end)[2]
-            asked.markdown.write_text(before + text, encoding="utf-8")
+        print(*parts[name](), sep="\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Judge the intervals of stiffness maps on surfaces and presses that break what the Gaussian process assumes.
 
-    benchmarks/maps/foreign.py [--worlds 20] [--seed 5] [--counts 40 150] [--markdown docs/maps.md]
+    benchmarks/maps/foreign.py [--worlds 20] [--seed 5] [--counts 40 150]
 
 Each kind is one way to differ: of the field (jumps, sparse bumps, a gradient, two length scales that differ by the
 direction, one small lump), of the presses' errors (heavy tails, one side, some presses ten times worse, an interval
@@ -14,7 +14,6 @@ import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -22,7 +21,6 @@ from scipy.spatial.distance import cdist
 
 from palpate.maps import StiffnessMap
 
-MARKS = "<!-- foreign: made by benchmarks/maps/foreign.py -->", "<!-- end of foreign -->"
 SIDE, PIXELS, FOLDS = 0.1, 200, 5
 Draw = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 LEAST = 1e-4
@@ -185,17 +183,15 @@ def judge(kind: str, count: int, seed: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Print the table, and write it where asked."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=20)
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--counts", type=int, nargs="+", default=(40, 150))
     parser.add_argument("--kinds", nargs="+", default=list(KINDS))
-    parser.add_argument("--markdown", type=Path)
     asked = parser.parse_args()
-    rows = ["| kind | " + " | ".join(f"{c}: surface | next press" for c in asked.counts) + " |"]
-    rows += ["|---" * (1 + 2 * len(asked.counts)) + "|"]
-    print("\n".join(rows), flush=True)
+    print("| kind | " + " | ".join(f"{c}: surface | next press" for c in asked.counts) + " |")
+    print("|---" * (1 + 2 * len(asked.counts)) + "|", flush=True)
     with ProcessPoolExecutor(2) as pool:
         for kind in asked.kinds:
             cells = []
@@ -203,12 +199,7 @@ def main() -> None:
                 seeds = [asked.seed * 1000 + k for k in range(asked.worlds)]
                 found = np.mean(list(pool.map(partial(judge, kind, count), seeds)), axis=0)
                 cells += [f"{100 * found[0]:.1f} %", f"{100 * found[1]:.1f} %"]
-            rows.append(f"| {kind} | " + " | ".join(cells) + " |")
-            print(rows[-1], flush=True)
-    if asked.markdown:
-        before, _, after = asked.markdown.read_text(encoding="utf-8").partition(MARKS[0])
-        text = "\n".join([MARKS[0], *rows, MARKS[1]])
-        asked.markdown.write_text(before + text + after.partition(MARKS[1])[2], encoding="utf-8")
+            print(f"| {kind} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ Every compiler that is there is asked: gcc and clang on this machine, and Debian
 for aarch64 and for a Cortex-M7. Python's ticks are recorded once for each law, with every fault; each build repeats
 them. What was measured is kept in `--out` beside a hash of its C, and is not measured again while that stays.
 
-    python benchmarks/native/equality.py --write          # 1e7 ticks by gcc and clang, 1e6 for aarch64, 1e5 on the M7
+    python benchmarks/native/equality.py                  # 1e7 ticks by gcc and clang, 1e6 for aarch64, 1e5 on the M7
     python benchmarks/native/equality.py --ticks 1e6 --emulated 1e5 --m7 1e4
 """
 
@@ -27,7 +27,6 @@ from palpate.force.gains import gains_for
 from palpate.native.exporting import ExportedLaw, LawRequest, exported_law
 from palpate.native.replay import MARK, program, write_rows
 
-MARKS = "<!-- table: made by benchmarks/native/equality.py -->", "<!-- end of table -->"
 LAWS = {"force loop": "force", "contact identifier": "identifier", "least squares of 3": "squares"}
 PLAIN = "-std=c99 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror -I."
 LEVELS = ("-O0", "-O1", "-O2", "-O3")
@@ -301,18 +300,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--laws", nargs="+", default=list(LAWS.values()))
     parser.add_argument("--out", type=Path, default=Path("runs/native"))
-    parser.add_argument("--write", action="store_true", help="put the table into docs/native.md")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=given.out if given.out.is_dir() else None) as place:
         bench = Bench(given.out, Path(place))
         columns = {title: of_law(bench, name, given) for title, name in LAWS.items() if name in given.laws}
-    text = table(columns, given)
-    print(text)
-    if given.write:
-        page = Path("docs/native.md")
-        before, rest = page.read_text(encoding="utf-8").split(MARKS[0])
-        after = rest.split(MARKS[1])[1]
-        page.write_text(f"{before}{MARKS[0]}\n\n{text}\n\n{MARKS[1]}{after}", encoding="utf-8")
+    print(table(columns, given))
     bad = [
         cell
         for cells in columns.values()

@@ -1,7 +1,7 @@
 """Fifty million samples to each on-line estimator: does anything stop being finite, grow, or become slow?
 
     python benchmarks/online/soak.py                       # 5e7 samples each
-    python benchmarks/online/soak.py --samples 5e6 --write # into docs/reliability.md
+    python benchmarks/online/soak.py --samples 5e6
 
 At 1 kHz, 5e7 samples are 14 hours. Every million of them is a press, a rest, and a press on a surface as stiff again.
 `ContactIdentifier` takes its ticks one by one: some minutes.
@@ -21,7 +21,6 @@ import resource
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +52,6 @@ HOSTILE_HEAD = (
     "| estimates not finite | with a variance below 0 | identified beyond a contact |"
 )
 SURFACES = (7e3, 14e3)  # [N/m], in turn
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "reliability.md"
 MAKERS: dict[str, Callable[[], Any]] = {
     "no forgetting": lambda: RecursiveLeastSquares(START, VAGUE),
     "exponential 0.998": lambda: RecursiveLeastSquares(START, VAGUE, Exponential(0.998)),
@@ -265,22 +263,16 @@ def memory() -> float:
     return pages * resource.getpagesize() / 2**20
 
 
-def hostilities(rows: list[str], count: int) -> int:
-    """The table of hostile streams; how many faults there were."""
-    for line in (HOSTILE_HEAD, "|" + "---|" * (HOSTILE_HEAD.count("|") - 1)):
-        _tell(rows, line)
+def hostilities(count: int) -> int:
+    """Prints the table of hostile streams; how many faults there were."""
+    print(HOSTILE_HEAD, "|" + "---|" * (HOSTILE_HEAD.count("|") - 1), sep="\n")
     bad = 0
     for name in (*MAKERS, "ContactIdentifier"):
         h = attacked(name, count)
         cells = (h.exceptions, h.stuck, h.not_finite, h.below_zero, h.beyond)
-        _tell(rows, f"| {name} | {h.samples:.1e} | " + " | ".join(map(str, cells)) + " |")
+        print(f"| {name} | {h.samples:.1e} | " + " | ".join(map(str, cells)) + " |", flush=True)
         bad += h.bad
     return bad
-
-
-def _tell(rows: list[str], row: str) -> None:
-    rows.append(row)
-    print(row, flush=True)
 
 
 def main() -> int:
@@ -288,64 +280,34 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=float, default=5e7)
     parser.add_argument("--hostile", type=float, help="so many hostile samples to each, and nothing else")
-    parser.add_argument("--write", action="store_true", help="put the result into docs/reliability.md")
     asked = parser.parse_args()
     if asked.hostile:
-        return hostile(asked)
+        return int(hostilities(int(asked.hostile)) > 0)
     count = int(asked.samples)
     estimators = {name: make() for name, make in MAKERS.items()}
-    soaked(estimators, CHUNK)
-    soaked(estimators, CHUNK)
+    for _ in range(2):
+        soaked(estimators, min(CHUNK, count))
     before = memory()
     found = soaked(estimators, count)
     grown = memory() - before
-    rows: list[str] = []
-    for line in (HEAD, "|" + "---|" * (HEAD.count("|") - 1)):
-        _tell(rows, line)
+    print(HEAD, "|" + "---|" * (HEAD.count("|") - 1), sep="\n")
     phi, force = samples(0)
     f = force.tolist()
     for name, estimator in estimators.items():
         took = Took()
         copies = [copy.deepcopy(estimator) for _ in range(COPIES)]
-        took.time([lambda k, e=e: e.update(phi[k], f[k]) for e in copies], range(TIMED))
+        took.time([lambda k, e=e: e.update(phi[k], f[k]) for e in copies], range(min(TIMED, count)))
         good, share = found[name]
-        _tell(rows, f"| {name} | {count:.1e} | {'yes' if good else 'no'} | {share:.2g} | {took.cells} |")
+        print(f"| {name} | {count:.1e} | {'yes' if good else 'no'} | {share:.2g} | {took.cells} |")
     contact = Contact.soaked(count)
     grown += contact.grown
     finite = "yes" if contact.good else "no"
-    _tell(rows, f"| ContactIdentifier | {count:.1e} | {finite} | | {contact.took.cells} |")
+    print(f"| ContactIdentifier | {count:.1e} | {finite} | | {contact.took.cells} |")
     took = Took()
-    took.time([_nothing] * COPIES, range(TIMED))
-    _tell(rows, f"| an empty loop | | | | {took.cells} |")
-    _tell(rows, "")
-    _tell(
-        rows,
-        f"`benchmarks/online/soak.py --samples {count:g}`, {datetime.now(UTC):%Y-%m-%d}; memory grew by"
-        f" {grown:.1f} MB.",
-    )
-    if asked.write:
-        write(rows, "soak")
+    took.time([_nothing] * COPIES, range(min(TIMED, count)))
+    print(f"| an empty loop | | | | {took.cells} |")
+    print(f"\nMemory grew by {grown:.1f} MB.")
     return 0 if contact.good and all(good for good, _ in found.values()) and grown < 50.0 else 1
-
-
-def hostile(asked: argparse.Namespace) -> int:
-    """Prints the table of hostile streams; 1 if there was a fault."""
-    rows: list[str] = []
-    bad = hostilities(rows, int(asked.hostile))
-    _tell(rows, "")
-    _tell(rows, f"`benchmarks/online/soak.py --hostile {asked.hostile:g}`, {datetime.now(UTC):%Y-%m-%d}.")
-    if asked.write:
-        write(rows, "hostile")
-    return 1 if bad else 0
-
-
-def write(rows: list[str], name: str) -> None:
-    """Puts a table into docs/reliability.md, between the marks of its name."""
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    head, _, rest = PAGE.read_text(encoding="utf-8").partition(begin)
-    PAGE.write_text(
-        f"{head}{begin}\n\n" + "\n".join(rows) + f"\n\n{end}{rest.partition(end)[2]}", encoding="utf-8"
-    )
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from foreign.logs import CELLS, Cell, make_log
 from foreign.motions import tracked
 from foreign.scoring import judged, score
 from foreign.surfaces import SURFACES, Surface, random_surface, touch
-from foreign.tables import BEGIN, END, in_page, tables
+from foreign.tables import markdown, tables
 from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
 
 physics = pytest.mark.long
@@ -148,15 +148,12 @@ def test_every_log_has_one_outcome_and_counts_once(scores):
 
 
 @physics
-def test_the_tables_stand_between_the_marks_of_the_page(scores):
-    page = f"before {BEGIN} stale {END} after"
-    written = in_page(page, scores, "judge.py")
-    assert written.startswith("before ")
-    assert written.endswith(" after")
-    assert "stale" not in written
-    assert in_page(written, scores, "judge.py") == written
-    with pytest.raises(ValueError, match="marks"):
-        in_page("no marks", scores, "judge.py")
+def test_the_document_has_the_summary_and_a_table_by_each_side(scores):
+    text = markdown(scores)
+    assert text.startswith("```\nci95 of everything identified")
+    for name in ("nuisance", "surface", "motion"):
+        assert f"| {name} | logs |" in text
+    assert "friction" in text
 
 
 @physics

@@ -2,12 +2,12 @@
 
     python benchmarks/identification/foreign/cases.py
     python benchmarks/identification/foreign/cases.py 1 7b --data FOLDER
-    python benchmarks/identification/foreign/cases.py --markdown docs/trust.md
+    python benchmarks/identification/foreign/cases.py --markdown
 
 Each trial prints what is answered and OK or WRONG. WRONG is an identified number whose interval misses the truth, a
-lag beyond its own bound, a crash, or what the case says besides. With --markdown the table goes into a page. With
---data the cases that want measured logs read `mr_damper/ensaio3.mat` and `ensaio10.mat` there. The exit code is 1 if
-anything is wrong.
+lag beyond its own bound, a crash, or what the case says besides. With --data the cases
+that want measured logs read `mr_damper/ensaio3.mat` and `ensaio10.mat` there. The exit code is 1 if anything is wrong.
+With --markdown a table is printed, and the exit code is 0.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from foreign.on_line import streamed
 from foreign.recording import Recording
 from foreign.scoring import judge_found, record_of
 from foreign.surfaces import Surface, touch
-from foreign.tables import between
 from palpate.contact_frame import ContactFrame, identify_contact
 from palpate.errors import InputError
 from palpate.identification import identify
@@ -492,9 +491,6 @@ def said(found: Any) -> str:
     return f"{found.model}: {', '.join(sure) or 'nothing identified'}{lag}; {len(found.contacts)} contacts"
 
 
-BEGIN, END = "<!-- cases: begin -->", "<!-- cases: end -->"
-
-
 def told_of(case: Case, data: Path | None) -> Iterator[tuple[str, str, list[str]]]:
     """Label, answer and faults of each trial of a case."""
     for trial in case.trials(data):
@@ -502,37 +498,35 @@ def told_of(case: Case, data: Path | None) -> Iterator[tuple[str, str, list[str]
         yield trial.label, answer, faults
 
 
-def in_page(page: str, rows: list[str], command: str) -> str:
-    """A page with the table between its two marks."""
-    table = ["| case | log | said | right |", "|---|---|---|---|", *rows]
-    return between(page, (BEGIN, END), "\n".join([f"    python {command}\n", *table]))
-
-
 def main() -> None:
     """Print the cases asked for."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(case.number for case in CASES))
     parser.add_argument("--data", type=Path, help="folder of measured logs")
-    parser.add_argument("--markdown", type=Path, help="write the table into that page, between its two marks")
+    parser.add_argument("--markdown", action="store_true", help="print a table as a document has it")
     asked = parser.parse_args()
     if unknown := set(asked.cases) - {case.number for case in CASES}:
         parser.error(f"no case {', '.join(sorted(unknown))}; there are: {', '.join(c.number for c in CASES)}")
-    wrong, rows = [], []
+    wrong = []
+    if asked.markdown:
+        print("| case | log | answer | right |", "|---|---|---|---|", sep="\n")
     for case in CASES:
         if asked.cases and case.number not in asked.cases:
             continue
-        print(f"\n{case.number}  {case.title}")
+        if not asked.markdown:
+            print(f"\n{case.number}  {case.title}")
         bad = 0
         for label, answer, faults in told_of(case, asked.data):
             bad += bool(faults)
-            said_of = "; ".join([answer, *faults])
-            print(f"  {'WRONG' if faults else 'OK   '} {label}: {said_of}", flush=True)
-            right = f"no: {'; '.join(faults)}" if faults else "yes"
-            rows.append(f"| {case.number} {case.title} | {label} | {answer} | {right} |")
+            if asked.markdown:
+                right = f"no: {'; '.join(faults)}" if faults else "yes"
+                print(f"| {case.number} {case.title} | {label} | {answer} | {right} |", flush=True)
+            else:
+                said_of = "; ".join([answer, *faults])
+                print(f"  {'WRONG' if faults else 'OK   '} {label}: {said_of}", flush=True)
         wrong += [case.number] if bad else []
     if asked.markdown:
-        page = in_page(asked.markdown.read_text("utf-8"), rows, "benchmarks/identification/foreign/cases.py")
-        asked.markdown.write_text(page, "utf-8")
+        return
     print(f"\n{len(asked.cases or CASES) - len(wrong)} cases right; wrong: {', '.join(wrong) or 'none'}")
     sys.exit(1 if wrong else 0)
 

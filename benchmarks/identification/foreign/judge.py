@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from foreign.logs import CELLS, Cell, make_log
 from foreign.scoring import Score, record_of, score
-from foreign.tables import HEAD, in_page, line, summary, tables
+from foreign.tables import HEAD, line, markdown, summary, tables
 from palpate.identification import identify
 
 
@@ -45,9 +45,7 @@ def main() -> None:
     parser.add_argument("--cells", default="", help="regular expression: SURFACE/NUISANCE/any")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--json", type=Path, help="write every score and every table there")
-    parser.add_argument(
-        "--markdown", type=Path, help="write the tables into that page, between its two marks"
-    )
+    parser.add_argument("--markdown", action="store_true", help="print the tables as a document has them")
     parser.add_argument(
         "--show", help="SEED/SURFACE/NUISANCE[/MOTION]: one log, its truth, options and answer"
     )
@@ -65,16 +63,17 @@ def main() -> None:
     command = f"benchmarks/identification/foreign/judge.py --trials {asked.trials} --seed {asked.seed}"
     command += f" --cells '{asked.cells}'" if asked.cells else ""
     every = tables(scores)
-    for name, rows in every.items():
-        print(f"\n{name}\n{HEAD}", *(line(figures) for figures in rows), sep="\n")
-    print(f"\n{len(scores)} of {len(cells) * asked.trials} logs, {command}", *summary(scores), sep="\n")
+    if asked.markdown:
+        print(markdown(scores))
+    else:
+        for name, rows in every.items():
+            print(f"\n{name}\n{HEAD}", *(line(figures) for figures in rows), sep="\n")
+        print(f"\n{len(scores)} of {len(cells) * asked.trials} logs, {command}", *summary(scores), sep="\n")
     if asked.json:
         found = {"command": command, "scores": [s.to_json() for s in scores], "tables": every}
         asked.json.write_text(json.dumps(found, indent=1))
     if len(scores) < len(cells) * asked.trials:
         sys.exit(130)
-    if asked.markdown:
-        asked.markdown.write_text(in_page(asked.markdown.read_text("utf-8"), scores, command), "utf-8")
 
 
 def judged(cells: list[Cell], seeds: range, workers: int) -> list[Score]:

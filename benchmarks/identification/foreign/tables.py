@@ -156,47 +156,21 @@ def flagged(figures: Iterable[dict[str, Any]]) -> list[str]:
     return [f["name"] for f in figures if f["flag"]]
 
 
-BEGIN, END = "<!-- trust: begin -->", "<!-- trust: end -->"
-
-
-def in_page(page: str, scores: list[Score], command: str) -> str:
-    """A page with the tables of the scores between its two marks.
+def markdown(scores: list[Score]) -> str:
+    """The tables of the scores as a document has them.
 
     Args:
-        page: text with BEGIN and END in it.
         scores: of at least one log.
-        command: that made them.
-
-    Raises:
-        ValueError: a mark is missing.
     """
     every = tables(scores)
-    parts = [f"    python {command}", "```\n" + "\n".join(summary(scores)) + "\n```"]
+    parts = ["```\n" + "\n".join(summary(scores)) + "\n```"]
     parts += [_markdown(name, every[name]) for name in ("nuisance", "surface", "motion")]
     low = flagged(every["surface x nuisance"])
     parts.append(
         f"Cells of surface and nuisance with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: "
         f"{', '.join(low) or 'none'}."
     )
-    return between(page, (BEGIN, END), "\n\n".join(parts))
-
-
-def between(page: str, marks: tuple[str, str], text: str) -> str:
-    """A page with a text between its two marks.
-
-    Args:
-        page: with both marks in it.
-        marks: where the text begins and ends.
-        text: that goes between them.
-
-    Raises:
-        ValueError: a mark is missing.
-    """
-    head, begin, rest = page.partition(marks[0])
-    _, end, tail = rest.partition(marks[1])
-    if not end:
-        raise ValueError(f"the page needs the marks {marks[0]} and {marks[1]}, in this order")
-    return f"{head}{begin}\n\n{text}\n\n{end}{tail}"
+    return "\n\n".join(parts)
 
 
 def _markdown(name: str, rows: list[dict[str, Any]]) -> str:

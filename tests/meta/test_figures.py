@@ -1,0 +1,116 @@
+"""Figures of the documents: each between its marks, from a command, and of today's sources."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import figures  # noqa: E402 -- beside the scripts that it runs
+
+FIGURES = figures.figures()
+PAGES = sorted(path.relative_to(ROOT).as_posix() for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")])
+OWN_MARKS = {"docs/laboratory.md", "docs/reliability.md"}
+"""Pages of campaigns that put their own result there, with its day: no digest tells when an attack is of the past."""
+UNMARKED = {
+    "docs/analysis.md": 1,
+    "docs/excite.md": 2,
+    "docs/force.md": 7,
+    "docs/identify.md": 2,
+    "docs/moving.md": 3,
+    "docs/online.md": 3,
+    "docs/speed.md": 3,
+}
+"""Tables with measured numbers outside of marks, by page: copied by hand from what a command printed. They may only
+become fewer."""
+
+
+def test_a_mark_is_of_a_figure_that_a_command_makes():
+    for page in PAGES:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        for name in re.findall(r"<!-- figure (\S+): begin -->", text):
+            assert name in FIGURES, f"{page}: {name} is not in benchmarks/figures.toml"
+            assert FIGURES[name].page == page
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_of_today_s_sources(name):
+    figure = FIGURES[name]
+    assert (ROOT / figure.script).is_file()
+    assert all((ROOT / source).exists() for source in figure.sources), figure.sources
+    assert figures.body_of(figure).strip(), f"{name} has never been made"
+    assert figures.kept(figure), f"the small run of {name} has never been kept"
+    assert figures.is_fresh(figure), f"its sources have changed: python benchmarks/figures.py --only {name}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_table_more_is_copied_by_hand(page):
+    found = len(copied(ROOT / page))
+    assert found <= UNMARKED.get(page, 0), f"{page}: put it between marks (benchmarks/figures.toml)"
+
+
+def copied(page):
+    """Tables outside of marks most of whose cells are numbers with a point or a unit: measured, not settings."""
+    text = re.sub(
+        r"<!-- figure (\S+): begin -->.*?<!-- figure \1: end -->",
+        "",
+        page.read_text(encoding="utf-8"),
+        flags=re.DOTALL,
+    )
+    if page.relative_to(ROOT).as_posix() in OWN_MARKS:
+        text = re.sub(r"<!-- ([\w, ]+): begin -->.*?<!-- \1: end -->", "", text, flags=re.DOTALL)
+    tables = re.findall(r"^\|.*(?:\n\|.*)+", text, flags=re.MULTILINE)
+    return [table for table in tables if is_measured(table)]
+
+
+def is_measured(table):
+    """Whether half of a table's cells beside its first column are numbers with decimals, a share or a unit."""
+    rows = [row.strip("|").split("|")[1:] for row in table.splitlines()[2:]]
+    cells = [cell.strip() for row in rows for cell in row if cell.strip()]
+    numbers = [
+        cell
+        for cell in cells
+        if re.match(r"[-+<*~]*\d[\d ,]*(\.\d+)?", cell)
+        and re.search(r"\d\.\d|%|\d ?(ms|us|ns|s|N|x|times)\b|;", cell)
+    ]
+    return len(numbers) >= 0.5 * max(len(cells), 1)
+
+
+def test_what_is_measured_is_told_from_what_is_set():
+    assert is_measured("| a | b |\n|---|---|\n| one | 0.23 s |\n| two | 5 % |")
+    assert not is_measured("| key | what |\n|---|---|\n| rate | of the loop, 500 Hz |\n| force | desired |")
+
+
+def test_comments_and_docstrings_change_no_digest(tmp_path):
+    texts = ('"""One."""\nx = 1\n', '"""Two."""\n# a word\nx = (1)\n', "x = 2\n")
+    contents = []
+    for k, text in enumerate(texts):
+        path = tmp_path / f"{k}.py"
+        path.write_text(text)
+        contents.append(figures.content(path))
+    assert contents[0] == contents[1] != contents[2]
+
+
+def test_a_stale_figure_is_known(monkeypatch, tmp_path):
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    (tmp_path / "law.py").write_text("x = 1\n")
+    (tmp_path / "script.py").write_text("print('| a | 1.0 |')\n")
+    (tmp_path / "page.md").write_text("before\n<!-- figure f: begin --><!-- figure f: end -->\nafter\n")
+    figure = figures.Figure("f", "page.md", "script.py", "", ("law.py",))
+    figures.put(figure, figures.output(figure.command))
+    text = (tmp_path / "page.md").read_text()
+    assert text.startswith("before\n")
+    assert text.endswith("after\n")
+    assert "| a | 1.0 |\n\n`python script.py`, palpate " in text
+    assert figures.is_fresh(figure)
+    (tmp_path / "law.py").write_text("x = 2\n")
+    assert not figures.is_fresh(figure)
+
+
+def test_a_script_that_fails_is_named_with_its_last_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    (tmp_path / "script.py").write_text("raise SystemExit('no arm')\n")
+    with pytest.raises(RuntimeError, match=r"script\.py.*exit code 1: no arm"):
+        figures.output("script.py")
