@@ -16,6 +16,7 @@ def test_the_studies_that_come_with_palpate_make_plans(name):
     for run in range(0, len(plan), 97):
         assert not plan.setting(run).refused
     assert plan.study.maps or plan.study.curves or plan.study.samples
+    assert not plan.plugins
 
 
 def planned_named(name):

@@ -197,8 +197,8 @@ class Plan:
         own = [(study.fixed, study.parameters), *((a.fixed, a.parameters) for a in study.against.values())]
         set_to = [[fixed, *((p.values, p.cases) for p in parameters.values())] for fixed, parameters in own]
         bases = [msgspec.to_builtins(e) for part in self.parts for e in part.bases.values()]
-        tables = [base[key] for base in bases for key in ROLES if base[key] is not None]
-        named = {*study.metrics, *_texts(set_to), *(table["kind"] for table in tables)}
+        tables = [base[key] for base in bases for key in ROLES if base.get(key) is not None]
+        named = {*study.metrics, *_texts(set_to), *(table.get("kind") for table in tables)}
         return tuple(plugin(name) for name in sorted(filter(is_plugin, named)))
 
     @property
