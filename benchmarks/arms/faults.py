@@ -315,13 +315,15 @@ class Stand:
             np.diff(times, prepend=times[0]) > 0.5
         )  # between an arm that was killed and another in its place
         steps = np.abs(np.diff(command, prepend=command[0])) * (times > begun) * ~gaps
-        last = times > times[-1] - LAST
+        own = np.cumsum(gaps) == np.count_nonzero(gaps)  # of the arm that is there at the end
+        last = (times > times[-1] - LAST) & after & own
         moved = np.flatnonzero(steps > 1e-3 * STILL)
         tick = 0.001 if self.kind == "franka" else 0.01
         return Result(
             code=code,
             ended=re.sub(r"127\.[\d.]+(:\d+)?", "ADDRESS", ended),
-            moves=bool(np.ptp(command[last]) > STILL) and self.fault.what not in {"silent", "dies"},
+            moves=bool(last.any() and np.ptp(command[last]) > STILL)
+            and self.fault.what not in {"silent", "dies"},
             rest=float(times[moved[-1]] - begun) if len(moved) else None,
             fastest=float(steps.max() / tick),
             force=float(force[after].max()) if after.any() else 0.0,
