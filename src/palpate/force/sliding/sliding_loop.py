@@ -16,9 +16,10 @@ from palpate.force.flat import flattened
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
-from palpate.force.sliding import slide_law as places
+from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import numbers_of
-from palpate.force.sliding.slide_law import SIZE, SLIDING_TROUBLES, Sliding, put_vector, slide_step, vector_at
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, COVARIANCE, G1, MU, STATES, STIFF
 from palpate.results import Readable
 
@@ -55,7 +56,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
         acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
-        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step,
+        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 
 
@@ -182,7 +183,7 @@ class SlidingLoop(Readable):
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
         if not self.sliding:
-            return CHI2_95 * self.law.slope
+            return CHI2_95 * float(self._state[places.SLOPE])
         at = COVARIANCE + G1 * (STATES + 1)
         a, b, c = self._state[at], self._state[at + 1], self._state[at + STATES + 1]
         larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
