@@ -37,7 +37,6 @@ COMMANDS = {
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "slide": "Hold a force along an unknown curved surface while the tip moves, in simulation.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "live": "Show a pressing arm, or a log, in the browser.",
     "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
@@ -55,6 +54,7 @@ GROUPS = {
 """Commands by what a user begins with, in the order of the help."""
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
+    "live": "palpate-live",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",

@@ -233,7 +233,7 @@ class RowSource(Protocol):
 
     @property
     def loop_asked(self) -> Any:
-        """Question to `palpate.live.stability`; None without a loop."""
+        """Question to `palpate_live.stability`; None without a loop."""
         ...
 
     def bones(self, row: Array) -> Array:

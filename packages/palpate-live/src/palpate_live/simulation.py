@@ -14,8 +14,10 @@ from palpate.bench.force_input import CONTACT, LOST, StopCondition
 from palpate.bench.given_motion import rest_for
 from palpate.bench.tables import Experiment, changed
 from palpate.environments import SurfaceState
-from palpate.live.stability import OfBench
-from palpate.live.view import (
+from palpate.signals.types import NORMAL
+from palpate.text import printable
+from palpate_live.stability import OfBench
+from palpate_live.view import (
     AT,
     COLUMNS,
     LEAD,
@@ -29,8 +31,6 @@ from palpate.live.view import (
     check_ahead,
     planar_bones,
 )
-from palpate.signals.types import NORMAL
-from palpate.text import printable
 
 _FROM = {name: i for i, name in enumerate(ROW)}
 _TAKEN = {
@@ -155,7 +155,7 @@ class Simulation:
 
     @property
     def loop_asked(self) -> OfBench:
-        """The loop as it now is, for `palpate.live.stability`."""
+        """The loop as it now is, for `palpate_live.stability`."""
         return OfBench(self._experiment)
 
     def bones(self, row: Array) -> Array:

@@ -10,8 +10,8 @@ import pytest
 from live.conftest import near
 from palpate.bench import build
 from palpate.errors import InputError
-from palpate.live.simulation import Simulation
-from palpate.live.view import AT, STRIDE
+from palpate_live.simulation import Simulation
+from palpate_live.view import AT, STRIDE
 
 
 def pressed(simulation, seconds):
@@ -119,13 +119,13 @@ def test_controllers_without_a_force_gain_say_so():
 
 
 @pytest.mark.long
-def test_the_first_change_of_a_surface_waits_for_no_import():
+def test_the_first_change_of_a_surface_waits_for_no_import(root):
     """In a process that has loaded nothing else; a slider's picture would be late by a third of a second."""
     code = (
-        "import sys; sys.path.insert(0, '../benchmarks/live')\n"
+        f"import sys; sys.path[:0] = [{str(root / 'benchmarks' / 'live')!r}, {str(root / 'tests')!r}]\n"
         "from live.conftest import near\n"
-        "from palpate.live.player import made_ready\n"
-        "from palpate.live.simulation import Simulation\n"
+        "from palpate_live.player import made_ready\n"
+        "from palpate_live.simulation import Simulation\n"
         "shown = Simulation(near(), seed=1)\n"
         "made_ready()\n"
         "for _ in range(300): shown.advance(0.01)\n"

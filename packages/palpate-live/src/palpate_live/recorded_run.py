@@ -14,7 +14,6 @@ from palpate.bench.force_input import COLUMNS as ROW
 from palpate.bench.force_input import CONTACT, LOST
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter
-from palpate.live.view import LEAD, Happened, Replay, ReplayedSignals, View
 from palpate.logs.read import read_log
 from palpate.records import Record
 from palpate.report.identification.page import TONES
@@ -22,6 +21,7 @@ from palpate.report.identification.words import CALLED, formatted
 from palpate.robots.arm3 import Arm3
 from palpate.signals.types import NORMAL
 from palpate.text import printable
+from palpate_live.view import LEAD, Happened, Replay, ReplayedSignals, View
 
 _MOST_MARKS = 200
 

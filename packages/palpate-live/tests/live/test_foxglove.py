@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from live.conftest import PATIENCE, playing
 from live.test_server import Clock
 from palpate.errors import InputError
-from palpate.live.player import Feed, Player
+from palpate_live.player import Feed, Player
 
 foxglove = pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 PROTOCOL = "foxglove.sdk.v1"
@@ -21,7 +21,7 @@ PROTOCOL = "foxglove.sdk.v1"
 
 @pytest.fixture
 def address():
-    from palpate.live.foxglove import viewers
+    from palpate_live.foxglove import viewers
 
     with Player(Clock(), Feed()) as player, viewers(player, 0, "https://app.foxglove.dev") as (line,):
         yield line.removeprefix("viewers: ")
@@ -87,8 +87,8 @@ def test_a_viewer_with_the_address_is_served(address, origin):
 def test_an_arm_is_a_scene_of_lines():
     """As Foxglove's own library encodes it: an arm and a surface, in SI."""
     from palpate.bench.tables import load
-    from palpate.live.foxglove import viewers
-    from palpate.live.simulation import Simulation
+    from palpate_live.foxglove import viewers
+    from palpate_live.simulation import Simulation
 
     with (
         Player(Simulation(load("foam-hybrid")), Feed()) as player,
@@ -125,7 +125,7 @@ def test_readers_that_die_are_silent_and_others_are_served(address, caplog):
 
 
 def test_an_origin_that_is_none_is_a_line():
-    from palpate.live.foxglove import viewers
+    from palpate_live.foxglove import viewers
 
     with (
         pytest.raises(InputError, match="--foxglove-origin"),

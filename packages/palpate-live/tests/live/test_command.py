@@ -11,8 +11,8 @@ import pytest
 from cli import asked
 from live.conftest import PATIENCE, Stream, headless, near
 from palpate.bench import build
-from palpate.live.view import AT
 from palpate.logs import write_record
+from palpate_live.view import AT
 
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
 

@@ -14,8 +14,16 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
-from palpate.live.stability import OfArm
-from palpate.live.view import (
+from palpate.press.engines import series_of
+from palpate.press.pilots import Cautious
+from palpate.press.prepare import Question, prepared
+from palpate.press.pressing import JOINT_LIMIT
+from palpate.press.setting import cell_of
+from palpate.press.simulated_arm import SimulatedArm
+from palpate.signals.types import NORMAL
+from palpate.text import printable
+from palpate_live.stability import OfArm
+from palpate_live.view import (
     AT,
     COLUMNS,
     JOINTS,
@@ -29,14 +37,6 @@ from palpate.live.view import (
     ViewScene,
     check_ahead,
 )
-from palpate.press.engines import series_of
-from palpate.press.pilots import Cautious
-from palpate.press.prepare import Question, prepared
-from palpate.press.pressing import JOINT_LIMIT
-from palpate.press.setting import cell_of
-from palpate.press.simulated_arm import SimulatedArm
-from palpate.signals.types import NORMAL
-from palpate.text import printable
 
 FORCE, STIFFNESS, DAMPING = 20.0, 5000.0, 50.0
 """Where the sliders stand at first [N, N/m, N s/m]."""
@@ -88,7 +88,7 @@ class PressingArm:
 
     @property
     def loop_asked(self) -> OfArm:
-        """The loop as it now is, for `palpate.live.stability`."""
+        """The loop as it now is, for `palpate_live.stability`."""
         values = self.state.values
         return OfArm(self._gains, values["surface.stiffness"], values["surface.damping"])
 

@@ -4,7 +4,7 @@ import pytest
 
 from palpate.bench import load
 from palpate.bench.tables import changed
-from palpate.live.simulation import sliders_of
+from palpate_live.simulation import sliders_of
 
 pytestmark = pytest.mark.usefixtures("permitted")
 

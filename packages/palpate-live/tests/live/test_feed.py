@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from palpate.live.player import Feed
-from palpate.live.view import COLUMNS
+from palpate_live.player import Feed
+from palpate_live.view import COLUMNS
 
 
 def rows(first, last):

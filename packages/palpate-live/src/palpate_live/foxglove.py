@@ -15,9 +15,9 @@ import msgspec
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.live.player import Player
-from palpate.live.server import GuardedServer
-from palpate.live.view import AT, COLUMNS, JOINTS, View
+from palpate_live.player import Player
+from palpate_live.server import GuardedServer
+from palpate_live.view import AT, COLUMNS, JOINTS, View
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -71,7 +71,7 @@ def viewers(player: Player, port: int, origin: str = "") -> Iterator[tuple[str, 
     try:
         import foxglove  # noqa: F401
     except ImportError:
-        raise InputError('viewers need foxglove-sdk: pip install "palpate[foxglove]"') from None
+        raise InputError('viewers need foxglove-sdk: pip install "palpate-live[foxglove]"') from None
     with _Viewers(player, port, "--foxglove-port", origin) as address:
         yield (f"viewers: {address}",)
 

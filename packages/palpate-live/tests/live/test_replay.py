@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.live.recorded_run import clear_at_restarts
-from palpate.live.view import AT, STRIDE, Replay, ReplayedSignals, View
+from palpate_live.recorded_run import clear_at_restarts
+from palpate_live.view import AT, STRIDE, Replay, ReplayedSignals, View
 
 VIEW = View(title="log", about="", kind="replay", rate=0.0)
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.live.view import COLUMNS, STRIDE, RowSource, View
 from palpate.report.look.assets import ARM, ARM_IN_SPACE, CHARTS, data, policy, scripts
 from palpate.report.page import render
 from palpate.text import printable
+from palpate_live.view import COLUMNS, STRIDE, RowSource, View
 
 SECONDS = 12.0
 """That are kept [s]."""
@@ -345,7 +345,7 @@ def page(view: View) -> str:
     )
     return render(
         "live.html",
-        "palpate.live",
+        "palpate_live",
         view=shown_view,
         data=data(shown_view.to_json()),
         title=f"{shown_view.title} – palpate live",
@@ -357,4 +357,4 @@ def page(view: View) -> str:
 
 
 def _own(name: str) -> str:
-    return (resources.files("palpate.live") / name).read_text(encoding="utf-8")
+    return (resources.files("palpate_live") / name).read_text(encoding="utf-8")

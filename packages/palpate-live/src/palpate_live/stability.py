@@ -1,6 +1,6 @@
 """Where the loop that runs is stable: by proof where its law has one, else by its linear model.
 
-It takes seconds, so it is worked out by a process of its own (`python -m palpate.live.stability`): a loop as JSON on
+It takes seconds, so it is worked out by a process of its own (`python -m palpate_live.stability`): a loop as JSON on
 each line in, answers as JSON lines out, the last of each with `"more": false`.
 """
 
@@ -97,7 +97,7 @@ class Stability:
     def _answer(self, asked: bytes) -> None:
         if self._process is None:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "palpate.live.stability"],
+                [sys.executable, "-m", "palpate_live.stability"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

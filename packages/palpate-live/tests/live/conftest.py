@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from palpate.bench.tables import changed, load
-from palpate.live.player import Feed, Player
-from palpate.live.server import serve
-from palpate.live.simulation import Simulation
-from palpate.live.view import AT, COLUMNS
+from palpate_live.player import Feed, Player
+from palpate_live.server import serve
+from palpate_live.simulation import Simulation
+from palpate_live.view import AT, COLUMNS
 
 PATIENCE = headless.PATIENCE
 """Within which what has to happen does [s]."""

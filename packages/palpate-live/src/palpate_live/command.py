@@ -20,8 +20,8 @@ from palpate.cli.options.plugins import PluginOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.live.player import Player
-    from palpate.live.view import RowSource
+    from palpate_live.player import Player
+    from palpate_live.view import RowSource
 
 _DEFAULT = "foam-hybrid"
 
@@ -141,7 +141,7 @@ def live(
 
 def _simulation(name: str, seed: int, whole: bool) -> RowSource:
     from palpate.bench.tables import load
-    from palpate.live.simulation import Simulation
+    from palpate_live.simulation import Simulation
 
     experiment = load(name)
     try:
@@ -151,14 +151,14 @@ def _simulation(name: str, seed: int, whole: bool) -> RowSource:
 
 
 def _pressing(name: str, seed: int) -> RowSource:
-    from palpate.live.pressing import PressingArm
+    from palpate_live.pressing import PressingArm
 
     return PressingArm(name, seed, waiting=lambda: say(COMPILING))
 
 
 def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
-    from palpate.live.recorded_run import of_log, of_run
     from palpate.logs.read import is_run
+    from palpate_live.recorded_run import of_log, of_run
 
     found, along, source = asked.identified_along(path)
     if asked.source.plain and is_run(path):
@@ -167,12 +167,11 @@ def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
 
 
 def _serve(shown: RowSource, at: ServedOptions) -> int:
-    from palpate.live.player import Feed, Player, made_ready
-    from palpate.live.server import HOST, WARNING, network_address, qr_code, serve
+    from palpate_live.player import Feed, Player, made_ready
+    from palpate_live.server import HOST, WARNING, network_address, qr_code, serve
 
     host = network_address() if at.share else HOST
     if at.share:
-        qr_code(host)  # what it needs is there before anything starts
         say(WARNING)
     made_ready()
     with _stability(shown) as (changed, latest, tell):
@@ -192,7 +191,7 @@ def _serve(shown: RowSource, at: ServedOptions) -> int:
 @contextmanager
 def _stability(shown: RowSource) -> Iterator[tuple[Any, Any, list[Any]]]:
     """Stability of the loop of a simulation; a log has no loop."""
-    from palpate.live.stability import Stability
+    from palpate_live.stability import Stability
 
     tell: list[Any] = []
     if shown.loop_asked is None:
@@ -213,6 +212,6 @@ def _stability(shown: RowSource) -> Iterator[tuple[Any, Any, list[Any]]]:
 def _viewers(player: Player, at: ServedOptions) -> Any:
     if not at.foxglove:
         return nullcontext(())
-    from palpate.live.foxglove import viewers
+    from palpate_live.foxglove import viewers
 
     return viewers(player, at.foxglove_port, at.foxglove_origin)

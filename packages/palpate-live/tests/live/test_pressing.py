@@ -7,9 +7,9 @@ import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
-from palpate.live.pressing import DAMPING, FORCE, STIFFNESS, PressingArm
-from palpate.live.view import AT
 from palpate.press.prepare import Question, prepared
+from palpate_live.pressing import DAMPING, FORCE, STIFFNESS, PressingArm
+from palpate_live.view import AT
 
 
 def pressed(arm, seconds):

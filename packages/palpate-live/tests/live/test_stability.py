@@ -8,10 +8,10 @@ from live.conftest import PATIENCE, near
 from palpate.analysis import linearise, margins
 from palpate.force.certificate import Claim
 from palpate.force.steps import margins as margins_on
-from palpate.live import stability
-from palpate.live.stability import OfArm, OfBench, Stability, answers
 from palpate.press.engines import gains_for, loop_of
 from palpate.report.numbers import plain
+from palpate_live import stability
+from palpate_live.stability import OfArm, OfBench, Stability, answers
 
 
 @pytest.mark.long

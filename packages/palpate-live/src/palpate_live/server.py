@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from palpate.errors import InputError
-from palpate.live.player import PAGE_HEADERS, Player, Request, page
+from palpate_live.player import PAGE_HEADERS, Player, Request, page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -34,7 +34,7 @@ _LARGEST = 4096
 """Of what a page may send in one message [bytes]."""
 _OWN_HOST = re.compile(r"(127\.0\.0\.1|localhost|\[::1\])(:\d{1,5})?\Z")
 _STARTING = 30.0
-_LOG = logging.getLogger("palpate.live")
+_LOG = logging.getLogger("palpate_live")
 _LOG.setLevel(logging.CRITICAL + 1)  # of websockets: a reader that goes without a word is no news
 
 
@@ -68,7 +68,7 @@ def serve(player: Player, port: int = 0, host: str = HOST) -> Iterator[Address]:
         host: this machine's address on its network to share the page there: the first page steers, others only watch.
 
     Raises:
-        InputError: the port is in use, or may not be taken; `websockets` is not installed.
+        InputError: the port is in use, or may not be taken.
     """
     with _PageServer(player, port, "--port", host) as address:
         yield address
@@ -86,7 +86,7 @@ class GuardedServer(ABC):
         origin: of other pages that may read; "" for none.
 
     Raises:
-        InputError: the port is in use, or may not be taken; `websockets` is not installed.
+        InputError: the port is in use, or may not be taken.
     """
 
     scheme = "http"
@@ -97,10 +97,6 @@ class GuardedServer(ABC):
     def __init__(self, player: Player, port: int, option: str, origin: str = ""):
         if not 0 <= port <= 65535:
             raise InputError(f"{option} must be from 0 to 65535, got {port}")
-        try:
-            import websockets  # noqa: F401
-        except ImportError:
-            raise InputError('the live page needs websockets: pip install "palpate[live]"') from None
         self._player, self._port, self._option, self._origin = player, port, option, origin
         self._token = secrets.token_urlsafe(18)
         self._ready = threading.Event()
@@ -331,15 +327,9 @@ def network_address() -> str:
 
 
 def qr_code(text: str) -> str:
-    """A text as a QR code of half-height blocks, for a terminal.
+    """A text as a QR code of half-height blocks, for a terminal."""
+    import segno
 
-    Raises:
-        InputError: segno is not installed.
-    """
-    try:
-        import segno
-    except ImportError:
-        raise InputError('--share draws a QR code, which needs segno: pip install "palpate[live]"') from None
     drawn = StringIO()
     segno.make(text, error="l").terminal(drawn, compact=True)
     return drawn.getvalue()

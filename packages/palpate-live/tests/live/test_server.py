@@ -11,9 +11,9 @@ import pytest
 
 from live.conftest import PATIENCE, Stream, playing
 from palpate.errors import InputError
-from palpate.live.player import Feed, Player
-from palpate.live.server import READERS, serve
-from palpate.live.view import AT, COLUMNS, State, View
+from palpate_live.player import Feed, Player
+from palpate_live.server import READERS, serve
+from palpate_live.view import AT, COLUMNS, State, View
 
 
 class Clock:
@@ -310,7 +310,7 @@ def test_a_shared_page_is_steered_by_the_first_alone():
 
 
 def test_the_qr_code_is_that_of_the_address():
-    from palpate.live.server import qr_code
+    from palpate_live.server import qr_code
 
     drawn = qr_code("http://192.168.0.10:8080/token/").splitlines()
     assert len(drawn) > 10

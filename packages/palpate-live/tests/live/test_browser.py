@@ -10,10 +10,10 @@ import pytest
 
 from live.conftest import PATIENCE, near, playing
 from live.test_server import Clock
-from palpate.live.pressing import PressingArm
-from palpate.live.recorded_run import clear_at_restarts
-from palpate.live.simulation import Simulation
-from palpate.live.view import Replay, ReplayedSignals, View
+from palpate_live.pressing import PressingArm
+from palpate_live.recorded_run import clear_at_restarts
+from palpate_live.simulation import Simulation
+from palpate_live.view import Replay, ReplayedSignals, View
 
 MS = 1000 * PATIENCE
 by_the_clock = pytest.mark.flaky(reruns=2, reruns_delay=2)
