@@ -21,7 +21,6 @@ The rooms, each `palpate.ROOM`:
     excitation      design of a desired force that identifies a surface
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
-    export          an identified surface as a contact of MuJoCo, Drake or Newton
     robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
     press           any serial arm presses on a surface, in simulation
     bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
@@ -66,7 +65,6 @@ _ROOMS = (
     "controllers",
     "environments",
     "excitation",
-    "export",
     "force",
     "identification",
     "identifiers",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from palpate.export.contact import Contact, Quantity, contact_from
-from palpate.export.exporting import TARGETS, TOLERANCE, Checked, Exported, Request, check, prepare
+from palpate_export.contact import Contact, Quantity, contact_from
+from palpate_export.exporting import TARGETS, TOLERANCE, Checked, Exported, Request, check, prepare
 
 __all__ = [
     "TARGETS",

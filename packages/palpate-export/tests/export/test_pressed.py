@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from export import scenes
-from palpate.export import TOLERANCE, Request, contact_from, prepare
+from palpate_export import TOLERANCE, Request, contact_from, prepare
 
 FORCE = 12.0
 

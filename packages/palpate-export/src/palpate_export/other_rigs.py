@@ -16,8 +16,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.export.drake_scene import properties
-from palpate.export.rig import across
+from palpate_export.drake_scene import properties
+from palpate_export.rig import across
 
 TIME_STEP = 1e-3
 """Of the plant in a check [s]."""
@@ -66,7 +66,7 @@ def _add(parser: Any, path: Path) -> None:
 
 
 class DrakeRig:
-    """See `palpate.export.rig.Rig`.
+    """See `palpate_export.rig.Rig`.
 
     Args:
         path: SDF or URDF file.
@@ -184,7 +184,7 @@ _MASS = 1.0
 
 
 class NewtonRig:
-    """See `palpate.export.rig.Rig`: one velocity, the sphere's, upward.
+    """See `palpate_export.rig.Rig`: one velocity, the sphere's, upward.
 
     Args:
         path: the exported module.

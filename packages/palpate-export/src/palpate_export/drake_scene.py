@@ -19,8 +19,8 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from palpate.errors import InputError, unknown
-from palpate.export.contact import Contact
 from palpate.files import read_bytes
+from palpate_export.contact import Contact
 
 RIGID = 1e12
 """Point stiffness of what presses [N/m]: K / RIGID is lost of K."""

@@ -234,7 +234,7 @@ def alone(model: Any, surface: int, probe: int) -> Any:
 
 
 class MuJoCoRig:
-    """See `palpate.export.rig.Rig`.
+    """See `palpate_export.rig.Rig`.
 
     Args:
         model: `mujoco.MjModel`.

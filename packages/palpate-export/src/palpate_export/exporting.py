@@ -14,10 +14,10 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from palpate.errors import InputError, unknown
-from palpate.export.contact import Contact
-from palpate.export.rig import MuJoCoRig, RigPress, press, touch
 from palpate.robots.serial.loading import mujoco, refusals
 from palpate.text import printable
+from palpate_export.contact import Contact
+from palpate_export.rig import MuJoCoRig, RigPress, press, touch
 
 TARGETS = ("mujoco", "drake", "newton", "mjcf-spring")
 TOLERANCE = 1e-3
@@ -219,7 +219,7 @@ def _force(contact: Contact) -> float:
 
 
 def _mujoco(contact: Contact, request: Request, out: Path) -> Exported:
-    from palpate.export import mujoco_scene as scenes
+    from palpate_export import mujoco_scene as scenes
 
     assert request.model is not None
     assert request.surface is not None
@@ -255,8 +255,8 @@ def _pair_numbers(pair: Any, contact: Contact) -> dict[str, Any]:
 
 
 def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checked:
-    from palpate.export.mujoco_scene import bring_to_touch
-    from palpate.export.rig import MuJoCoRig
+    from palpate_export.mujoco_scene import bring_to_touch
+    from palpate_export.rig import MuJoCoRig
 
     rig = MuJoCoRig(model, scene.geom(scene.surface), scene.geom(pair.probe))
     if bring_to_touch(rig) is None:
@@ -265,7 +265,7 @@ def _pressed_pair(model: Any, scene: Any, pair: Any, contact: Contact) -> Checke
 
 
 def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
-    from palpate.export import drake_scene as scenes
+    from palpate_export import drake_scene as scenes
 
     surface: tuple[str, ...]
     probe: tuple[str, ...] | None
@@ -282,7 +282,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         named = other.path[-1] if other else "palpate's sphere"
 
     def pressed(path: Path) -> list[Checked]:
-        from palpate.export.other_rigs import DrakeRig
+        from palpate_export.other_rigs import DrakeRig
 
         rig = DrakeRig(path, surface, probe, scenes.RIGID)
         if touch(rig) is None:
@@ -295,10 +295,10 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
 
 
 def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
-    from palpate.export import drake_scene as shapes
+    from palpate_export import drake_scene as shapes
 
     def pressed(path: Path) -> list[Checked]:
-        from palpate.export.other_rigs import NewtonRig
+        from palpate_export.other_rigs import NewtonRig
 
         rig = NewtonRig(path)
         touch(rig)

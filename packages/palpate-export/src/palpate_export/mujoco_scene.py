@@ -20,10 +20,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.export.contact import Contact
-from palpate.export.rig import MuJoCoRig, touch
 from palpate.files import open_file
 from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
+from palpate_export.contact import Contact
+from palpate_export.rig import MuJoCoRig, touch
 
 IMPEDANCE = 1e-4
 """d, the least that MuJoCo takes (mjMINIMP)."""

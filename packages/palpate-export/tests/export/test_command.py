@@ -6,7 +6,7 @@ import pytest
 
 from export import scenes
 from palpate.cli import main
-from palpate.export import Request, contact_from
+from palpate_export import Request, contact_from
 
 
 @pytest.fixture(autouse=True)
