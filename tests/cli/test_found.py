@@ -2,7 +2,7 @@
 
 import pytest
 
-from palpate.cli._one_log import read_found
+from palpate.cli.one_log import read_found
 from palpate.errors import InputError
 from palpate_export.contact import contact_from
 

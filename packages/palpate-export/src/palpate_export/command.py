@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli._answer import print_answer
-from palpate.cli._one_log import read_found
-from palpate.cli._program import command
-from palpate.cli._terminal import STYLE, console, head, place, show_table
+from palpate.cli.one_log import read_found
+from palpate.cli.toolkit import STYLE, command, console, head, place, print_answer, show_table
 from palpate.errors import InputError
 from palpate.files import MADE, signed, whole, write_json
 from palpate_export.contact import contact_from

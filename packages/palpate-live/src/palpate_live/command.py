@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._terminal import COMPILING, print_lines, say
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.names import QUIET, Experiment, SerialArm
 from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ def live(
     if path is None:
         with (own or PluginOptions()).consent():
             return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
-    from palpate.cli._one_log import OneLog
+    from palpate.cli.one_log import OneLog
 
     asked = OneLog(
         fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
