@@ -291,7 +291,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
 
 
 def _write(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
-    from palpate.report.map import page
+    from palpate.report import map as page
 
     if output.figure is not None:
         from palpate.report.style import save
@@ -310,7 +310,7 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
-    from palpate.report.map import page
+    from palpate.report import map as page
 
     more = page.further(result)
     answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")

@@ -1,4 +1,4 @@
-"""A weighed tool, on a terminal and on a page."""
+"""A weighed tool: on a terminal, in Python, in a notebook, and on a page."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import numpy as np
 from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
+from palpate.report.numbers import as_html, as_text
 from palpate.report.page import Table, embedded, render
 from palpate.report.svg import svg
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,8 +46,24 @@ def sentence(found: Weighed) -> str:
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
 
 
-def page(found: Weighed, title: str) -> str:
-    """The page as HTML."""
+def line(found: Weighed) -> str:
+    """The answer in one line."""
+    return printable(sentence(found))
+
+
+def text(found: Weighed) -> str:
+    """The sentence and the table of `palpate payload`."""
+    return as_text(sentence(found), [table(found).head, *table(found).rows])
+
+
+def html(found: Weighed) -> str:
+    """The same for a notebook."""
+    rows = [table(found).head, *table(found).rows]
+    return as_html(sentence(found), rows, [note["text"] for note in found.notes])
+
+
+def page(found: Weighed, title: str = "a record") -> str:
+    """The page of `palpate payload --report`."""
     return render(
         "page.html",
         title=f"Payload of the sensor, from {title}",

@@ -165,8 +165,8 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         answer,
         room="map",
         command=command,
-        package="palpate.report.map",
-        codes=(text_of("map.js", "palpate.report.map"),),
+        package="palpate.report",
+        codes=(text_of("map.js", "palpate.report"),),
         readout=data(_readout(result, field)),
         live=live,
     )
