@@ -1,4 +1,4 @@
-"""A simulated arm in a process of its own, at real time: `python -m palpate.wires.sim_arm --stiffness 5000`.
+"""A simulated arm in a process of its own, at real time: `python -m palpate_rehearsal.sim_arm --stiffness 5000`.
 
 It moves in one direction and listens on the loopback alone. Readings go to one master; without a command for ten ticks
 it rests.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.wires import sim as protocol
-from palpate.wires.rehearsal import OneDirection, arm_of, paced, ready, words_of
+from palpate_rehearsal.rehearsal import OneDirection, arm_of, paced, ready, words_of
 
 _REST = 10
 """Ticks without a command after which it rests."""

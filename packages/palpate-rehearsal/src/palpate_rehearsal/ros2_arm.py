@@ -1,4 +1,4 @@
-"""A simulated arm under ROS 2, to rehearse with, without ROS: `python -m palpate.wires.ros2_arm --domain 42`.
+"""A simulated arm under ROS 2, to rehearse with, without ROS: `python -m palpate_rehearsal.ros2_arm --domain 42`.
 
 It publishes the wrench at /ft/wrench (the reaction, in the tool's axes), the tool's pose at /tcp/pose and, with
 --joints, the joints of a UR5e at /joint_states. It moves as /command says, and rests after ten ticks of silence, as a
@@ -14,8 +14,8 @@ import numpy as np
 
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
-from palpate.wires.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
 from palpate.wires.ros2 import SENT
+from palpate_rehearsal.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
 
 _REST = 10
 _DOWN = (1.0, 0.0, 0.0, 0.0)

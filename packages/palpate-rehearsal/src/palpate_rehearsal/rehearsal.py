@@ -64,7 +64,7 @@ class OneDirection:
 
 def words_of(module: str, about: str | None) -> argparse.ArgumentParser:
     """The words that each of them takes."""
-    words = argparse.ArgumentParser(prog=f"python -m palpate.wires.{module}", description=about)
+    words = argparse.ArgumentParser(prog=f"python -m palpate_rehearsal.{module}", description=about)
     words.add_argument(
         "--arm", default="ur5e", help="ur5e, fr3, panda, iiwa14 or a TOML file of palpate tune"
     )

@@ -1,7 +1,7 @@
 """A simulated arm that speaks as a Franka does, to rehearse with: libfranka's protocol, on a loopback address.
 
-`python -m palpate.wires.franka_arm --address 127.0.0.10`. The protocol is franky-sim's (`pip install franky-sim`), by
-which libfranka cannot tell it from a controller; behind it stands an arm of one direction, moved by Cartesian
+`python -m palpate_rehearsal.franka_arm --address 127.0.0.10`. The protocol is franky-sim's (`pip install franky-sim`),
+by which libfranka cannot tell it from a controller; behind it stands an arm of one direction, moved by Cartesian
 velocities. Every other kind of motion is refused, and named on standard error. As a controller does, it ends the motion
 where 20 commands in a row are missing.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.wires.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
+from palpate_rehearsal.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
 
 _Q = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
 _RATE = 1000.0
