@@ -114,7 +114,7 @@ def export(
 def _scene_writer() -> Callable[[Path | None, SceneOptions, GivenOptions, OutputOptions], int]:
     """The command of the distribution that writes scenes."""
     for entry in entry_points(group="palpate.exports", name="scene"):
-        return entry.load()  # type: ignore[no-any-return]
+        return entry.load()
     raise InputError(
         "export to a simulator is of palpate-export, which is not installed: pip install palpate-export"
     )
