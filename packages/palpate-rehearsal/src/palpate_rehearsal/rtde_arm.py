@@ -2,8 +2,8 @@
 
 `python -m palpate_rehearsal.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs:
 speedL, servoL and their stops, zeroFtSensor, the watchdog, the end. Every other command ends the script, and is named
-on standard error. Of the variables of RTDE, time, pose, force, status and the registers of ur-rtde are simulated; others
-are 0, and an unknown one is refused.
+on standard error. Of the variables of RTDE, time, pose, force, status and the registers of ur-rtde are simulated;
+others are 0, and an unknown one is refused.
 """
 
 from __future__ import annotations
