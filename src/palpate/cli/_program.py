@@ -29,7 +29,6 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "excite": "Design a force that identifies a surface, and predict the uncertainty.",
     "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
@@ -54,6 +53,7 @@ GROUPS = {
 """Commands by what a user begins with, in the order of the help."""
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
+    "excite": "palpate-excitation",
     "live": "palpate-live",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError
-from palpate.excitation.force_loops import Made, Prediction
-from palpate.excitation.problem import Problem, used_up
-from palpate.excitation.spectra import optimal
 from palpate.references import Multisine
+from palpate_excitation.force_loops import Made, Prediction
+from palpate_excitation.problem import Problem, used_up
+from palpate_excitation.spectra import optimal
 
 _POINTS_A_CYCLE = 8  # of the period a cycle of the highest harmonic
 _STARTS = 5

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.excitation.multisine import low_peak, schroeder, sum_of_sines
 from palpate.references import Multisine
+from palpate_excitation.multisine import low_peak, schroeder, sum_of_sines
 
 
 def crest(amplitudes, harmonics, phases):

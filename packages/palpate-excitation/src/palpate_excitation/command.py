@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._terminal import console, place
 from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate.excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
+    from palpate_excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
 
 
 _FASTEST = 200_000
@@ -46,8 +45,8 @@ class SurfaceOptions:
 
     def range(self) -> SurfaceRange:
         """Range of stiffness, damping and mass."""
-        from palpate.excitation import SurfaceRange
-        from palpate.excitation.quantities import spread
+        from palpate.cli.options.quantities import spread
+        from palpate_excitation import SurfaceRange
 
         return SurfaceRange(
             spread("--stiffness", self.stiffness, "stiffness"),
@@ -89,7 +88,7 @@ class BudgetOptions:
 
     def budget(self) -> Budget:
         """Limits of force, frequency and speed."""
-        from palpate.excitation import Budget
+        from palpate_excitation import Budget
 
         return Budget(
             in_si("--force", self.force, "force"),
@@ -161,9 +160,9 @@ class SensorOptions:
 
     def sensors(self) -> Sensors:
         """Sensors of force and position."""
-        from palpate.excitation import Sensors
-        from palpate.excitation.spectra import ForceChain, phase_std
         from palpate.signals.low_pass import LowPass
+        from palpate_excitation import Sensors
+        from palpate_excitation.spectra import ForceChain, phase_std
 
         for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):
             if not 1 <= value <= _FASTEST:
@@ -207,7 +206,7 @@ class LoopOptions:
 
     def loop(self) -> ForceLoop:
         """Force loop that follows the desired force."""
-        from palpate.excitation import HybridLoop, KnownBandwidth
+        from palpate_excitation import HybridLoop, KnownBandwidth
 
         given = {
             "tip_mass": in_si_if_given("--tip-mass", self.tip_mass, "mass"),
@@ -250,7 +249,7 @@ class OutputOptions(PictureOptions, FileOptions):
 
     def check_all(self) -> None:
         """Check every path before any work is done."""
-        from palpate.report.excitation.table import check_ending
+        from palpate_excitation.report.table import check_ending
 
         if self.out is not None:
             check_ending(self.out)
@@ -268,7 +267,7 @@ def excite(
     robot: LoopOptions | None = None,
     output: OutputOptions | None = None,
 ) -> int:
-    """Design a force that identifies a surface, and predict the uncertainty before the robot moves.
+    """Design a force that identifies a surface, and predict the uncertainty.
 
     Numbers are SI, or carry their unit after a colon; a range is LOW:HIGH or LOW:HIGH:UNIT:
 
@@ -276,8 +275,8 @@ def excite(
 
     Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
     """
-    from palpate.excitation import Problem
-    from palpate.excitation.quantities import shares
+    from palpate.cli.options.quantities import shares
+    from palpate_excitation import Problem
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
     robot, output = robot or LoopOptions(), output or OutputOptions()
@@ -300,19 +299,18 @@ def excite(
 
 
 def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
-    from palpate.excitation import design, remedies
+    from palpate_excitation import design, remedies
 
     found = design(problem)
     helps = [] if found.feasible else remedies(found)
     if found.feasible:
         _write(found, rate, output.out, output.experiment)
     if picture is not None:
-        from palpate.report.excitation.page import write_figure
+        from palpate_excitation.report.page import write_figure
 
         write_figure(found, picture)
     if output.report is not None:
-        from palpate.cli._program import command
-        from palpate.report.excitation.page import page
+        from palpate_excitation.report.page import page
 
         write_text(output.report, page(found, helps, printable(command())))
     written = [*([output.out, output.experiment] if found.feasible else []), output.report]
@@ -321,7 +319,7 @@ def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | 
 
 
 def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
-    from palpate.report.excitation import table
+    from palpate_excitation.report import table
 
     if out is not None:
         table.write_force(found, out, float(rate))
@@ -333,11 +331,11 @@ def _print(
     found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
 ) -> None:
     if json:
-        from palpate.report.excitation.table import summary
+        from palpate_excitation.report.table import summary
 
         print_answer(summary(found, helps))
         return
-    from palpate.report.excitation.table import show
+    from palpate_excitation.report.table import show
 
     screen = console()
     screen.soft_wrap = True

@@ -11,14 +11,14 @@ from rich.table import Table
 from rich.text import Text
 
 from palpate.errors import InputError
-from palpate.excitation import Design, HybridLoop, Remedy
-from palpate.excitation.force_loops import Prediction
-from palpate.excitation.problem import LONGEST
 from palpate.files import FORCE, MADE, write_text
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.references import Multisine
 from palpate.report.terminal import bare_table
+from palpate_excitation import Design, HybridLoop, Remedy
+from palpate_excitation.force_loops import Prediction
+from palpate_excitation.problem import LONGEST
 
 
 def show(found: Design, remedies: list[Remedy], console: Console) -> None:

@@ -8,10 +8,10 @@ import pytest
 import palpate
 from palpate.bench import build
 from palpate.bench.tables import changed, parse
-from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
-from palpate.report.excitation.table import experiment
 from palpate.signals.low_pass import LowPass
+from palpate_excitation import Budget, Problem, SurfaceRange, design
+from palpate_excitation.report.table import experiment
 
 FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}
 RUNS = 8

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.excitation import Design, Remedy
 from palpate.references import Multisine
 from palpate.report import style
-from palpate.report.excitation.table import describe_remedy, describe_wave, percent, reached
 from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import CHARTS, TABLES, data, packed, scripts, text_of, thinned
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import embedded, render
 from palpate.report.svg import svg
+from palpate_excitation import Design, Remedy
+from palpate_excitation.report.table import describe_remedy, describe_wave, percent, reached
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,7 +120,7 @@ def _precision(axis: Axes, found: Design) -> None:
     style.legend(axis, title="worst surface; dashed: requested", title_fontsize=8.5)
 
 
-_PACKAGE = "palpate.report.excitation"
+_PACKAGE = "palpate_excitation.report"
 _ROWS = 6000
 """Of the desired force that lie in the page, its peaks among them."""
 _SHOWN = 4.0

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation import (
+from palpate.references import Chirp, Multisine
+from palpate_excitation import (
     Budget,
     HybridLoop,
     KnownBandwidth,
@@ -18,9 +19,8 @@ from palpate.excitation import (
     design,
     remedies,
 )
-from palpate.excitation.multisine import PERIOD
-from palpate.excitation.spectra import ForceChain
-from palpate.references import Chirp, Multisine
+from palpate_excitation.multisine import PERIOD
+from palpate_excitation.spectra import ForceChain
 
 RANGE = SurfaceRange((3000.0, 8000.0), (50.0, 300.0), (0.1, 0.3))
 KNOWN = SurfaceRange((5200.0, 5200.0), (200.0, 200.0), (0.1, 0.1))

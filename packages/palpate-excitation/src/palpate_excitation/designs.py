@@ -13,11 +13,11 @@ from math import ceil
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.excitation import multisine
-from palpate.excitation.force_loops import Made, Prediction, Wave
-from palpate.excitation.multisine import error_of_sweep
-from palpate.excitation.problem import LONGEST, Problem, used_up
 from palpate.references import Chirp, Multisine
+from palpate_excitation import multisine
+from palpate_excitation.force_loops import Made, Prediction, Wave
+from palpate_excitation.multisine import error_of_sweep
+from palpate_excitation.problem import LONGEST, Problem, used_up
 
 _ENDS = 6  # places for each end of the sweep
 _FINE = 64  # frequencies of a sweep that are looked at

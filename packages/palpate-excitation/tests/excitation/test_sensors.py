@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation import Sensors, Surface
-from palpate.excitation.problem import LAG_UNIT
-from palpate.excitation.spectra import ForceChain, covariance, cramer_rao_bound
+from palpate_excitation import Sensors, Surface
+from palpate_excitation.problem import LAG_UNIT
+from palpate_excitation.spectra import ForceChain, covariance, cramer_rao_bound
 
 FOAM = Surface(5200.0, 200.0, 0.1)
 

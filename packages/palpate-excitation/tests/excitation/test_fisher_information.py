@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation.spectra import (
+from palpate.signals.low_pass import LowPass
+from palpate_excitation.spectra import (
     NAMES,
     ForceChain,
     cramer_rao_bound,
@@ -15,7 +16,6 @@ from palpate.excitation.spectra import (
     phase_std,
     sensitivities,
 )
-from palpate.signals.low_pass import LowPass
 
 FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}
 

@@ -7,9 +7,9 @@ import pytest
 
 from palpate.bench import build, changed, load
 from palpate.errors import InputError
-from palpate.excitation import HybridLoop, KnownBandwidth, Surface
-from palpate.excitation.force_loops import contact_force
-from palpate.excitation.multisine import low_peak
+from palpate_excitation import HybridLoop, KnownBandwidth, Surface
+from palpate_excitation.force_loops import contact_force
+from palpate_excitation.multisine import low_peak
 
 RUBBER = Surface(34500.0, 480.0, 0.05)
 OMEGA = 2 * np.pi * np.array([0.5, 5.0, 40.0])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from palpate.cli.options.quantities import quantity, shares, spread
 from palpate.errors import InputError
-from palpate.excitation.quantities import quantity, shares, spread
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError
-from palpate.excitation.spectra import covariance
 from palpate.references import Chirp, Multisine
 from palpate.signals.low_pass import LowPass
 from palpate.signals.types import NORMAL
+from palpate_excitation.spectra import covariance
 
 Range = tuple[float, float]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError, unknown
-from palpate.excitation.force_loops import ALL, ForceLoop, HybridLoop, Surface, SurfaceRange, contact_force
-from palpate.excitation.spectra import CRITERIA, ForceChain, covariance, phase_std
 from palpate.identifiers.octave_system import SEEN
+from palpate_excitation.force_loops import ALL, ForceLoop, HybridLoop, Surface, SurfaceRange, contact_force
+from palpate_excitation.spectra import CRITERIA, ForceChain, covariance, phase_std
 
 LAG_UNIT = 1e-4
 """The lag is counted in tenths of a millisecond, so that it is of the size of the relative parameters."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.excitation.spectra import CRITERIA, covariance, optimal, sensitivity_of
+from palpate_excitation.spectra import CRITERIA, covariance, optimal, sensitivity_of
 
 NOTHING = np.zeros((2, 2))
 UNIT = np.full(2, 1.96)  # so that the criteria are those of the plain covariance

@@ -12,12 +12,19 @@ from cli import asked
 from palpate.bench.tables import parse
 from palpate.cli import main
 from palpate.logs.store import read_record
-from palpate.report.excitation.table import percent
+from palpate_excitation.report.table import percent
 
 SURFACES = ("--stiffness", "3:8:N/mm", "--damping", "100:300", "--mass", "0.1:0.3")
 ONE = ("--stiffness", "5000", "--damping", "200", "--mass", "0.2", "--force", "15", "--peak", "20")
 """One surface, where nine are not what is tested."""
 ASKED = (*SURFACES, "--force", "15", "--peak", "20:N", "--precision", "K=10%,B=10%")
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """An empty folder, which is the working one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def ask(capsys, *words):
