@@ -22,9 +22,9 @@ def references(
 ) -> int:
     """Check solvers against 44 contact logs whose parameters are certified to 11 digits; list the logs, or write them.
 
-    Examples:
-        palpate references check
-        palpate references export certified/
+    palpate references check
+
+    palpate references export certified/
 
     Args:
         action: `check` fits every log by palpate, SciPy and NumPy; `list` names the logs; `export` writes them.
