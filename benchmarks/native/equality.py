@@ -21,14 +21,19 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from palpate.files import write_json
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
+from palpate.force.slide_table import Slide
 from palpate.native.exporting import ExportedLaw, LawRequest, exported_law
 from palpate.native.replay import MARK, program, write_rows
 
 MARKS = "<!-- table: made by benchmarks/native/equality.py -->", "<!-- end of table -->"
-LAWS = {"force loop": "force", "contact identifier": "identifier", "least squares of 3": "squares"}
+LAWS = {
+    "force loop": "force", "sliding loop": "slide", "contact identifier": "identifier", "least squares of 3": "squares",
+}  # fmt: skip
 PLAIN = "-std=c99 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror -I."
 LEVELS = ("-O0", "-O1", "-O2", "-O3")
 M7 = "-mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16"
@@ -165,6 +170,10 @@ def exported(name: str, folder: Path) -> ExportedLaw:
         path = folder / "gains.toml"
         path.write_text(gains_for(load_arm("ur5e"), 20.0, limit=60.0).to_toml(), encoding="utf-8")
         return exported_law(LawRequest(gains=path))
+    if name == "slide":
+        path, gains = folder / "slide.toml", gains_for(load_arm("ur5e"), 15.0, cap=4e4)
+        path.write_text(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)).to_toml(), encoding="utf-8")
+        return exported_law(LawRequest("sliding-loop", gains=path))
     if name == "squares":
         return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))
     return exported_law(LawRequest("contact-identifier", sampling=480.0))
@@ -273,7 +282,10 @@ def timer(law: ExportedLaw) -> str:
     out = "".join(
         f"{line}\n" for line in lines if line.startswith("    static double ") and "row" not in line
     )
-    filled = TIMER.replace("NAME", law.module.name).replace("CALL", text.split("value = ")[1].split(";")[0])
+    call = text.split("value = ")[1].split(";")[0]
+    if law.module.entries[0].writes:
+        call = re.sub(r"number_of\(digest_of\((\w+),.*", r"\1[0])", call)
+    filled = TIMER.replace("NAME", law.module.name).replace("CALL", call)
     size = f"enum {{ ROW = {law.recording.inputs + 3} }};\nstatic double row[ROW];\n{out}"
     return filled.replace("static double row[ROW];", size)
 

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate._jit.registry import parts
+from palpate._jit.registry import parts, stored
+from palpate._jit.stored import kind_of
 from palpate.native.source import refuse, syntax_of
 from palpate.native.structs import by_pointer, c_name, is_struct, members, plain
 
@@ -330,9 +331,22 @@ class Expressions:
             kinds = tuple(value.type for value in values)
             made = self.whole.typing.resolve_function_type(types.NamedTupleClass(callee), kinds, {})
             return self.struct(values, plain(made.return_type), node)
+        if callee in stored:
+            return self._stored(*stored[callee], node)
         if inspect.isfunction(callee):
             return self._calling_overload(callee, self._arguments(callee, node, 0), node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
+
+    def _stored(self, part: type, reads: bool, node: ast.Call) -> Value:
+        """A part read from the beginning of an array; or the array's beginning as the part that is written there."""
+        array, *others = [self.expression(one) for one in node.args]
+        kind = plain(kind_of(part))
+        place = f"{self.whole.structs.name(kind)} *){array.at(UNARY)}.at"
+        if reads:
+            return Value(f"*(const {place}", kind, UNARY)
+        self.need(id(node) in self._alone, node, "writing a part in an expression", "write it in a statement")
+        self.writes |= array.text not in self.scratch
+        return Value(f"*({place} = {others[0].at(CHOICE)}", self.whole.none, CHOICE)
 
     def _arguments(self, callee: Any, node: ast.Call, known: int) -> list[Value]:
         """Values of a call in the order of the function's parameters, defaults where none is given."""

@@ -48,7 +48,12 @@ class Translation:
 
         self.rules = TypingRules()
         self.typing = self.rules.context
-        self.real, self.integer, self.boolean = types.float64, types.int64, types.boolean
+        self.real, self.integer, self.boolean, self.none = (
+            types.float64,
+            types.int64,
+            types.boolean,
+            types.none,
+        )
         self.structs = Structs(prefix)
         self._claimed: set[str] = set()
         self.constants = Constants(self.structs, self._claim)

@@ -22,7 +22,8 @@ f_t/f.n = g + phi. The frame turns by g after each, so that g is zero again.
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import ZERO3, Vec3, exp, sqrt
+from palpate._jit.elementary import exp
+from palpate._vector import ZERO3, Vec3, sqrt
 from palpate.force.flat import GUARD, STATE, guard_in, put_guard, put_state, state_in
 from palpate.force.guard import (
     BLIND,
@@ -421,7 +422,8 @@ def learn(law, s, work, late, desired, force):
     # the product of two uncertain states is noise here: before slip no reading shows the normal
     slope, friction = variance(s, G1, G1) + variance(s, G2, G2), variance(s, F1, F1) + variance(s, F2, F2)
     curved = N * N * slope * (friction + slope)
-    if abs(correct(s, FORCE, 1.0, G1, -N * s[F1], G2, -N * s[F2], f - N, noise + curved, GATE, work)) > GATE:
+    jump = correct(s, FORCE, 1.0, G1, -N * s[F1], G2, -N * s[F2], f - N, noise + curved, GATE, work)
+    if abs(jump) > GATE:
         s[FORCE], s[SLOW], s[TROUBLE] = f, 0.5, STEPPED
         spread(s, FORCE, noise)
         spread(s, G1, 0.1 * law.slope * law.slope)
@@ -512,10 +514,10 @@ def followed_tip(c, s, position):
     origin, q = vector_at(s, ORIGIN), vector_at(s, POSITION)
     p = position - origin
     put_vector(s, POSITION, p)
-    return (
-        Vec3(axis(c, s, AXIS, q.x, p.x), axis(c, s, AXIS + 3, q.y, p.y), axis(c, s, AXIS + 6, q.z, p.z))
-        + origin
-    )
+    x = axis(c, s, AXIS, q.x, p.x)
+    y = axis(c, s, AXIS + 3, q.y, p.y)
+    z = axis(c, s, AXIS + 6, q.z, p.z)
+    return Vec3(x, y, z) + origin
 
 
 @law

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import sqrt
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import kernel, law, reader
+from palpate._jit import kernel, law, part, reader
+from palpate._jit.elementary import exp
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -19,9 +21,8 @@ from palpate.force.lag import sum_of_lags
 from palpate.force.sliding import slide_law as places
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_law import (
-    BASE,
-    COVARIANCE,
     G1,
+    G2,
     LOG_K,
     MU,
     SIZE,
@@ -30,6 +31,8 @@ from palpate.force.sliding.slide_law import (
     Sliding,
     put_vector,
     slide_step,
+    stiffness_of,
+    variance,
     vector_at,
 )  # fmt: skip
 from palpate.results import Readable
@@ -80,6 +83,41 @@ def flat_slide(numbers, s, work, desired, force, position, direction, missed, ve
 
 
 _slide = kernel(flat_slide)
+
+
+@part
+class SlideEstimate(NamedTuple):
+    """The surface as a slide knows it.
+
+    Args:
+        normal: into the surface; before contact the direction that was given.
+        cone: half-angle of the cone about it that holds the true one with 95 % [rad].
+        friction: its coefficient; 0 before a slide.
+        friction_std: its standard deviation.
+        stiffness: as the measured position feels it [N/m]; 0 before a slide.
+        stiffness_std: its standard deviation [N/m].
+    """
+
+    normal: Vec3
+    cone: float
+    friction: float
+    friction_std: float
+    stiffness: float
+    stiffness_std: float
+
+
+@law
+def slide_estimate(law, s):
+    """The surface as it is known."""
+    if s[places.PHASE] != places.SLIDE:
+        return SlideEstimate(vector_at(s, places.NORMAL), CHI2_95 * law.slope, 0.0, 0.0, 0.0, 0.0)
+    a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
+    across = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
+    friction, stiffness = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
+    return SlideEstimate(
+        vector_at(s, places.NORMAL), CHI2_95 * sqrt(max(across, 0.0)), s[MU], friction, stiffness_of(s),
+        stiffness * stiffness_of(s),
+    )  # fmt: skip
 
 
 class Uncertain(float):
@@ -188,18 +226,15 @@ class SlidingLoop(Readable):
     @property
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
-        if not self.sliding:
-            return CHI2_95 * self.law.slope
-        at = COVARIANCE + G1 * (STATES + 1)
-        a, b, c = self._state[at], self._state[at + 1], self._state[at + STATES + 1]
-        return CHI2_95 * sqrt(max(0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b)), 0.0))
+        return float(slide_estimate(self.law, self._state).cone)
 
     @property
     def friction(self) -> Uncertain | None:
         """Coefficient of friction; None before a slide."""
         if not self.sliding:
             return None
-        value, std = float(self._state[MU]), sqrt(max(self._variance(MU), 0.0))
+        now = slide_estimate(self.law, self._state)
+        value, std = float(now.friction), float(now.friction_std)
         return Uncertain(value, std, (max(value - 1.96 * std, 0.0), value + 1.96 * std))
 
     @property
@@ -207,16 +242,15 @@ class SlidingLoop(Readable):
         """Stiffness as the measured position feels it [N/m]; None before a slide."""
         if not self.sliding:
             return None
-        value, std = float(self._state[BASE] * exp(self._state[LOG_K])), sqrt(max(self._variance(LOG_K), 0.0))
-        return Uncertain(value, std * value, (value * exp(-1.96 * std), value * exp(1.96 * std)))
+        now = slide_estimate(self.law, self._state)
+        value, std = float(now.stiffness), float(now.stiffness_std)
+        factor = exp(1.96 * std / value)
+        return Uncertain(value, std, (value / factor, value * factor))
 
     @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
-
-    def _variance(self, i: int) -> float:
-        return float(self._state[COVARIANCE + i * (STATES + 1)])
 
 
 def _three(name: str, values: ArrayLike) -> Array:
