@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.native.expressions import number
-from palpate.native.structs import by_pointer, is_struct, leaves, members, plain
+from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, returned, written
 from palpate.native.translation import Translation
 
 WIDTH = 118
@@ -184,7 +184,7 @@ class _Writer:
             return
         flat = self.module.flat
         start = self.whole.function(self.module.start, (self.kind, self.state_kind)[: 1 + (flat > 0)])
-        body = f"{start.name}(gains, {self._numbers()})" if flat else f"*state = {start.name}(gains)"
+        body = f"{start.name}(gains, {self._numbers() if flat else 'state'})"
         self.functions.append(f"{head} {{\n    {body};\n}}")
 
     def _numbers(self) -> str:
@@ -204,6 +204,7 @@ class _Writer:
         inner = members(result) if is_struct(result) else []
         fields = [] if self.module.flat else members(self.state_kind)
         changes = bool(fields) and [kind for _, kind in inner[1:]] == [kind for _, kind in fields]
+        changes = changes and len(written(result)) == len(fields)
         public = structs.publish(inner[0][1] if changes else result)
         known = self.whole.function(entry.law, tuple(kinds))
         values = ["gains" if by_pointer(self.kind) else "*gains"]
@@ -214,20 +215,21 @@ class _Writer:
             else a.name
             for a, kind in zip(entry.arguments, kinds[2:], strict=True)
         ]
-        call = f"{known.name}({', '.join(values)})"
+        places = written(known.result)
+        zero = (f"&({structs.name(kind)}){{0}}" for _, kind in places)
+        call = f"{known.name}({', '.join([*values, *([f'&{to}' for to, _ in places] if changes else zero)])})"
         constant = "" if changes or (known.writes and self.module.flat) else "const "
         arguments = [f"const {self.gains} *gains", f"{constant}{self.state} *state"]
         arguments += [argument.text for argument in entry.arguments]
         head = f"{public} {self.module.name}_{entry.name}({', '.join(arguments)})"
         self._declare(head, entry.meaning, entry.arguments)
         if changes:
-            of = structs.name(known.result)
-            pairs = zip(fields, inner[1:], strict=True)
-            body = f"    const {of} value = {call};\n"
-            body += "".join(f"    state->{field} = value.{at};\n" for (field, _), (at, _) in pairs)
-            body += "    return value.v0;"
+            lines = [f"{structs.name(kind)} {to};" for to, kind in places]
+            lines += [f"const {structs.name(returned(known.result))} value = {call};"]
+            lines += [f"state->{field} = {to};" for (field, _), (to, _) in zip(fields, places, strict=True)]
+            body = "\n".join(f"    {line}" for line in [*lines, "return value;"])
         else:
-            body = f"    {'' if public == 'void' else 'return '}{call};"
+            body = f"    {'' if public == 'void' else 'return '}{'*' if places else ''}{call};"
         self.functions.append(f"{head} {{\n{body}\n}}")
 
     def _words(self, name: str, way: tuple[str, ...], texts: Mapping[float, str]) -> None:
@@ -271,7 +273,8 @@ class _Writer:
     def _source(self, table: str) -> str:
         parts = [
             self._head(f"{self.module.name}.c"),
-            f'#include "{self.module.name}.h"\n\n#include <float.h>\n#include <math.h>\n#include <stddef.h>',
+            f'#include "{self.module.name}.h"',
+            "\n".join(f"#include <{one}.h>" for one in ("float", "math", "stddef", "string")),
             _IEEE,
             *self.whole.structs.definitions,
             *self.whole.constants.definitions,

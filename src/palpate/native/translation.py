@@ -106,6 +106,19 @@ class Translation:
             self.definitions.append(f"/* {found['says']} */\nstatic {key[1]} {own}{found['body'].rstrip()}")
         return self._helpers[key]
 
+    def storage(self, kind: Any, reads: bool) -> str:
+        """The name of a function that reads a part from the beginning of an array, or writes it there."""
+        of = self.structs.name(kind)
+        key = (of, "read" if reads else "write")
+        if key not in self._helpers:
+            own = self._helpers[key] = self._claim(f"{'read' if reads else 'write'}_{of}", "again")
+            says = f"A {of} {'from' if reads else 'to'} the beginning of an array."
+            given, to, source = (f"{of} *to", "to", "a.at") if reads else (f"const {of} *v", "a.at", "v")
+            body = f"    memcpy({to}, {source}, sizeof({of}));\n" + ("    return to;\n" if reads else "")
+            kind_in_c = f"const {of} *" if reads else "void "
+            self.definitions.append(f"/* {says} */\nstatic {kind_in_c}{own}(array1 a, {given}) {{\n{body}}}")
+        return self._helpers[key]
+
     def selector(self, kind: Any) -> str:
         """The name of a function that gives a field of a struct by its place."""
         of, inner = self.structs.name(kind), self.structs.name(members(kind)[0][1])
