@@ -30,7 +30,6 @@ The rooms, each `palpate.ROOM`:
     instruments     encoders, force sensors, filters, each with its lag
     checks          the conformance suite of all parts, for your own too
     analysis        a loop as a linear model: margins, boundaries of stability
-    studies         many runs: grids, random points, a search
     report          figures, tables, pages
 
 Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
@@ -77,7 +76,6 @@ _ROOMS = (
     "press",
     "report",
     "robots",
-    "studies",
     "wires",
 )
 

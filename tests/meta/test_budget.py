@@ -20,9 +20,10 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=421, lines=75450, tokens=509210),
+    "src/palpate": Weight(files=402, lines=70742, tokens=476960),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10575, tokens=80801),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=762, tokens=6205),
+    "packages/palpate-studies/src/palpate_studies": Weight(files=19, lines=4715, tokens=32240),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much. The law of sliding and the controllers of others once raised lines by 3 % and tokens by 4 %, beside 69

@@ -126,7 +126,7 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
     if scheduler is None:
         yield Threads(threads)
         return
-    from palpate.studies.cluster import Cluster
+    from palpate_studies.cluster import Cluster
 
     cluster = Cluster(scheduler)
     try:
