@@ -306,13 +306,30 @@ def test_the_operators_of_python_are_those_of_c(tmp_path):
     """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
     from palpate.native.translation import OPERATORS
 
-    values = [0.0, -0.0, 1.0, -1.0, 2.5, -7.5, 1e300, -1e-300, 3.0, 0.1, 0.3, 21.0, 2.0**52 + 1.0, 2.0**53, 1e15]
+    values = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        2.5,
+        -7.5,
+        1e300,
+        -1e-300,
+        3.0,
+        0.1,
+        0.3,
+        21.0,
+        2.0**52 + 1.0,
+        2.0**53,
+        1e15,
+    ]
     values += [1.0 - 2.0**-53, 7.0 * (1.0 + 2.0**-52), float("inf"), float("-inf"), float("nan")]
     compiled = {"modulo": remainder, "floored": quotient, "larger": larger, "smaller": smaller}
     cases = [(name, a, b) for name in compiled for a in values for b in values]
     calls = "".join(f'    printf("%a\\n", {name}({spelled(a)}, {spelled(b)}));\n' for name, a, b in cases)
     functions = "".join(OPERATORS[name, "double"].group() for name in compiled)
-    text = f"#include <math.h>\n#include <stdint.h>\n#include <stdio.h>\n{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
+    headers = "#include <math.h>\n#include <stdint.h>\n#include <stdio.h>\n"
+    text = f"{headers}{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
     (tmp_path / "operators.c").write_text(text)
     words = ["cc", "-std=c99", "-ffp-contract=off", "operators.c", "-lm", "-o", "operators"]
     subprocess.run(words, cwd=tmp_path, check=True)

@@ -33,7 +33,7 @@ static int64_t floored(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a 
 /* a % b with Python's sign, that of b. */
 static double modulo(double a, double b) {
     double rest;
-    if (a >= 0.0 && a < 9007199254740992.0 && a == (double)(int64_t)a && b >= 1.0 && b < 9007199254740992.0
+    if (a > 0.0 && a < 9007199254740992.0 && a == (double)(int64_t)a && b >= 1.0 && b < 9007199254740992.0
         && b == (double)(int64_t)b) {
         return a - b * (double)(int64_t)(a / b); /* of whole numbers below 2^53: exact */
     }
