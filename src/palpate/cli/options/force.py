@@ -131,6 +131,8 @@ class SlideNumberOptions:
         Smallest radius of curvature of the surface, as 100:mm.
     tilt
         Standard deviation of the given normal, in degrees.
+    step
+        Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it.
     """
 
     slide: Annotated[bool, FLAG] = False
@@ -138,13 +140,18 @@ class SlideNumberOptions:
     speed: Annotated[str, SIGNED] = "30:mm/s"
     radius: Annotated[str, SIGNED] = "100:mm"
     tilt: Annotated[float, SIGNED] = 7.0
+    step: Annotated[str, SIGNED] = "0:mm"
 
     def added_to(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return with_slide(gains, self.mu_max, self.speed, self.radius, self.tilt) if self.slide else gains
+        return (
+            with_slide(gains, self.mu_max, self.speed, self.radius, self.tilt, self.step)
+            if self.slide
+            else gains
+        )
 
 
-def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float) -> Gains:
+def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float, step: str) -> Gains:
     """Gains with the numbers of a slide, as typed.
 
     Raises:
@@ -157,6 +164,7 @@ def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float
     from palpate.force.slide_table import Slide
 
     v, R = in_si("--speed", speed, "velocity"), in_si("--radius", radius, "length")
+    height = in_si("--step", step, "length")
     if not 0.0 < mu_max <= 2.0:
         raise InputError(
             f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {mu_max:g}"
@@ -169,7 +177,9 @@ def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float
         raise InputError(f"--radius must be from 1 mm to 10 km, got {R:g} m")
     if not 0.1 <= tilt <= 25.0:
         raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {tilt:g}")
-    return replace(gains, slide=Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt)))
+    if not 0.0 <= height <= 0.1:
+        raise InputError(f"--step must be from 0 to 100 mm, got {1e3 * height:g} mm")
+    return replace(gains, slide=Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt), step=height))
 
 
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))

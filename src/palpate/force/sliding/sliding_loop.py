@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law, part, reader
-from palpate._jit.elementary import exp
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -20,25 +19,14 @@ from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
 from palpate.force.sliding import slide_law as places
 from palpate.force.sliding.slide_domain import numbers_of
-from palpate.force.sliding.slide_law import (
-    G1,
-    G2,
-    LOG_K,
-    MU,
-    SIZE,
-    SLIDING_TROUBLES,
-    STATES,
-    Sliding,
-    put_vector,
-    slide_step,
-    stiffness_of,
-    variance,
-    vector_at,
-)  # fmt: skip
+from palpate.force.sliding.slide_law import SIZE, SLIDING_TROUBLES, Sliding, put_vector, slide_step, vector_at
+from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
 from palpate.results import Readable
 
 CHI2_95 = sqrt(5.991)
 """Deviations within which two jointly normal numbers lie with 95 %."""
+Z_95 = 1.96
+"""Deviations within which a normal number lies with 95 %."""
 DOWN = (0.0, 0.0, -1.0)
 ENCODER = 2e-6
 """Standard deviation of a measured position from tick to tick [m]: encoders of many arms resolve a micrometre."""
@@ -68,7 +56,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
         acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
-        encoder=ENCODER, doubt=UNSURE_LAG,
+        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step,
     )  # fmt: skip
 
 
@@ -109,33 +97,35 @@ class SlideEstimate(NamedTuple):
 @law
 def slide_estimate(law, s):
     """The surface as it is known."""
+    normal = vector_at(s, places.NORMAL)
     if s[places.PHASE] != places.SLIDE:
-        return SlideEstimate(vector_at(s, places.NORMAL), CHI2_95 * law.slope, 0.0, 0.0, 0.0, 0.0)
+        return SlideEstimate(normal, CHI2_95 * law.slope, 0.0, 0.0, 0.0, 0.0)
     a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
-    across = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
-    friction, stiffness = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
-    return SlideEstimate(
-        vector_at(s, places.NORMAL), CHI2_95 * sqrt(max(across, 0.0)), s[MU], friction, stiffness_of(s),
-        stiffness * stiffness_of(s),
-    )  # fmt: skip
+    larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
+    friction, stiff = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, STIFF, STIFF), 0.0))
+    cone = CHI2_95 * sqrt(max(larger, 0.0)) / s[STIFF]
+    return SlideEstimate(normal, cone, s[MU], friction, s[BASE] * s[STIFF], s[BASE] * stiff)
 
 
 class Uncertain(float):
-    """A number with its uncertainty.
+    """A number that is not negative, with its uncertainty.
 
     Args:
         value: the estimate.
         std: its standard deviation.
-        ci95: the 95 % interval.
     """
 
     std: float
-    ci95: tuple[float, float]
 
-    def __new__(cls, value: float, std: float, ci95: tuple[float, float]) -> Uncertain:
+    def __new__(cls, value: float, std: float) -> Uncertain:
         one = super().__new__(cls, value)
-        one.std, one.ci95 = std, ci95
+        one.std = std
         return one
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        return max(float(self) - Z_95 * self.std, 0.0), float(self) + Z_95 * self.std
 
 
 class SlidingLoop(Readable):
@@ -234,8 +224,7 @@ class SlidingLoop(Readable):
         if not self.sliding:
             return None
         now = slide_estimate(self.law, self._state)
-        value, std = float(now.friction), float(now.friction_std)
-        return Uncertain(value, std, (max(value - 1.96 * std, 0.0), value + 1.96 * std))
+        return Uncertain(float(now.friction), float(now.friction_std))
 
     @property
     def stiffness(self) -> Uncertain | None:
@@ -243,9 +232,7 @@ class SlidingLoop(Readable):
         if not self.sliding:
             return None
         now = slide_estimate(self.law, self._state)
-        value, std = float(now.stiffness), float(now.stiffness_std)
-        factor = exp(1.96 * std / value)
-        return Uncertain(value, std, (value / factor, value * factor))
+        return Uncertain(float(now.stiffness), float(now.stiffness_std))
 
     @property
     def trouble(self) -> str:
