@@ -82,7 +82,7 @@ _OF_THE_LANGUAGE = """
 """
 _OF_ITS_LIBRARY = """
     main exp log pow sin cos sqrt floor fmod fabs isnan isfinite copysign y0 y1 yn j0 j1 jn gamma signal index memset
-    nan NAN INFINITY I memcpy
+    nan NAN INFINITY I memcpy larger smaller square cube root modulo floored
 """
 
 
