@@ -17,7 +17,7 @@ import numpy as np
 from palpate._jit.registry import parts, stored
 from palpate._jit.stored import kind_of
 from palpate.native.source import refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members, plain, returned, written
+from palpate.native.structs import by_pointer, c_name, is_struct, members, plain, result_places, value_type
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""
@@ -77,7 +77,7 @@ class Value(NamedTuple):
         return self.text if self.place == "pointer" else f"&{self._within(UNARY)}"
 
 
-def filled(call: str, *addresses: str) -> str:
+def with_addresses(call: str, *addresses: str) -> str:
     """A call of a function that writes structs, with their addresses."""
     for address in addresses:
         call = call.replace("@", address, 1)
@@ -253,7 +253,7 @@ class Expressions:
     def _field(self, base: Value, node: ast.Subscript) -> Value:
         inner = members(base.type)
         self.need(
-            returned(base.type) == base.type, node, "a field of a tuple with parts", "unpack it into names"
+            value_type(base.type) == base.type, node, "a field of a tuple with parts", "unpack it into names"
         )
         if isinstance(node.slice, ast.Constant):
             return base.member(*inner[self._field_number(node.slice)])
@@ -350,12 +350,12 @@ class Expressions:
             made = self.whole.typing.resolve_function_type(types.NamedTupleClass(callee), kinds, {})
             return self.struct(values, plain(made.return_type), node)
         if callee in stored:
-            return self._stored(*stored[callee], node)
+            return self._storage(*stored[callee], node)
         if inspect.isfunction(callee):
             return self._calling_overload(callee, self._arguments(callee, node, 0), node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
 
-    def _stored(self, part: type, reads: bool, node: ast.Call) -> Value:
+    def _storage(self, part: type, reads: bool, node: ast.Call) -> Value:
         """A part read from the beginning of an array; or the array's beginning as the part that is written there."""
         values = [self.expression(one) for one in node.args]
         name, kind = self.whole.storage(plain(kind_of(part)), reads), plain(kind_of(part))
@@ -431,11 +431,11 @@ class Expressions:
     def _call_of(self, name: str, values: list[Value], kind: Any) -> Value:
         """A call in C; a large struct is written where the last argument points to."""
         texts = [value.address if by_pointer(value.type) else value.at(CHOICE) for value in values]
-        places = written(kind)
+        places = result_places(kind)
         if not places:
             return Value(f"{name}({', '.join(texts)})", kind)
         call = f"{name}({', '.join([*texts, *('@' for _ in places)])})"
         return Value(
-            filled(call, *(f"&({self.whole.structs.name(one)}){{0}}" for _, one in places)),
+            with_addresses(call, *(f"&({self.whole.structs.name(one)}){{0}}" for _, one in places)),
             kind, place="pointer", call=call,
         )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.native.expressions import number
-from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, returned, written
+from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
 from palpate.native.translation import Translation
 
 WIDTH = 118
@@ -204,7 +204,7 @@ class _Writer:
         inner = members(result) if is_struct(result) else []
         fields = [] if self.module.flat else members(self.state_kind)
         changes = bool(fields) and [kind for _, kind in inner[1:]] == [kind for _, kind in fields]
-        changes = changes and len(written(result)) == len(fields)
+        changes = changes and len(result_places(result)) == len(fields)
         public = structs.publish(inner[0][1] if changes else result)
         known = self.whole.function(entry.law, tuple(kinds))
         values = ["gains" if by_pointer(self.kind) else "*gains"]
@@ -215,7 +215,7 @@ class _Writer:
             else a.name
             for a, kind in zip(entry.arguments, kinds[2:], strict=True)
         ]
-        places = written(known.result)
+        places = result_places(known.result)
         zero = (f"&({structs.name(kind)}){{0}}" for _, kind in places)
         call = f"{known.name}({', '.join([*values, *([f'&{to}' for to, _ in places] if changes else zero)])})"
         constant = "" if changes or (known.writes and self.module.flat) else "const "
@@ -225,7 +225,7 @@ class _Writer:
         self._declare(head, entry.meaning, entry.arguments)
         if changes:
             lines = [f"{structs.name(kind)} {to};" for to, kind in places]
-            lines += [f"const {structs.name(returned(known.result))} value = {call};"]
+            lines += [f"const {structs.name(value_type(known.result))} value = {call};"]
             lines += [f"state->{field} = {to};" for (field, _), (to, _) in zip(fields, places, strict=True)]
             body = "\n".join(f"    {line}" for line in [*lines, "return value;"])
         else:

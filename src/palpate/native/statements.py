@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.registry import parts
-from palpate.native.expressions import SUM, Expressions, Value, filled
+from palpate.native.expressions import SUM, Expressions, Value, with_addresses
 from palpate.native.source import comments_of, refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members, returned, written
+from palpate.native.structs import by_pointer, c_name, is_struct, members, result_places, value_type
 
 STEP = "    "
 
@@ -59,11 +59,11 @@ class FunctionBody(Expressions):
                 self._first.append(f"(void){own};")
             parameters.append(given)
             self.variables[argument], self._blocks[argument] = Value(own, kind, place=place), self.tree.body
-        self._slots = self._places_in_result() if written(self.result) else {}
+        self._slots = self._places_in_result() if result_places(self.result) else {}
         lines = self._block(self.tree.body)
-        of = self.whole.structs.name(returned(self.result))
-        parameters += [f"{self.whole.structs.name(kind)} *{to}" for to, kind in written(self.result)]
-        if by_pointer(returned(self.result)):
+        of = self.whole.structs.name(value_type(self.result))
+        parameters += [f"{self.whole.structs.name(kind)} *{to}" for to, kind in result_places(self.result)]
+        if by_pointer(value_type(self.result)):
             of = f"const {of} *"
         head = f"static {of} {name}({', '.join(parameters) or 'void'}) {{".replace("* ", "*")
         return "\n".join([head, *(STEP + line for line in self._first), *lines, "}"])
@@ -139,12 +139,12 @@ class FunctionBody(Expressions):
             )
         else:
             value = self.cast(self.expression(node.value, alone=True), self.result, node)
-        places = [Value(to, kind, place="pointer") for to, kind in written(self.result)]
+        places = [Value(to, kind, place="pointer") for to, kind in result_places(self.result)]
         if not places:
             return [f"return {value.at(0)};"]
         if value.call:
-            return [f"return {filled(value.call, *(place.text for place in places))};"]
-        if returned(self.result) == self.result:
+            return [f"return {with_addresses(value.call, *(place.text for place in places))};"]
+        if value_type(self.result) == self.result:
             return [*self._fill(places[0], value), "return to;"]
         self.need(value.fields, node, "a tuple with parts by its name", "return its fields")
         small = next(one for one in value.fields if not by_pointer(one.type))
@@ -156,7 +156,7 @@ class FunctionBody(Expressions):
         if value.text == place.text:
             return []
         if value.call:
-            return [f"{filled(value.call, place.address)};"]
+            return [f"{with_addresses(value.call, place.address)};"]
         if not (value.fields and by_pointer(value.type)):
             return [f"{place.at(0)} = {value.at(0)};"]
         pairs = zip(members(value.type), value.fields, strict=True)
@@ -186,7 +186,7 @@ class FunctionBody(Expressions):
             inner = node.args if self.function.__globals__.get(getattr(node.func, "id", "")) in parts else []
         if is_struct(place.type):
             for one, field in zip(inner, members(place.type), strict=False):
-                whole = place.text == "to" and returned(self.result) != self.result
+                whole = place.text == "to" and value_type(self.result) != self.result
                 own = Value(f"to{field[0][1:]}", field[1], place="pointer") if whole else place.member(*field)
                 yield from self._elements(one, own)
 
@@ -257,7 +257,7 @@ class FunctionBody(Expressions):
     def _unpack(self, target: ast.Tuple, value: Value) -> list[str]:
         good = is_struct(value.type) and len(members(value.type)) == len(target.elts)
         self.need(good, target, f"unpacking {value.type}", "give as many names as it has fields")
-        if value.call and returned(value.type) != value.type:
+        if value.call and value_type(value.type) != value.type:
             return self._unpack_call(target, value)
         lines, value = ([], value) if value.place and not value.call else self._temporary(value)
         for one, field in zip(target.elts, members(value.type), strict=True):
@@ -278,7 +278,7 @@ class FunctionBody(Expressions):
             before += lines
             after += [] if new or name == "_" else self._store(one, place)
             places.append(place)
-        call = Value(filled(value.call, *(place.address for place in places)), returned(value.type))
+        call = Value(with_addresses(value.call, *(place.address for place in places)), value_type(value.type))
         stored = [f"{call.text};"] if getattr(small, "id", "") == "_" else self._store(small, call)
         return [*before, *stored, *after]
 

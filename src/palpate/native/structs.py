@@ -60,7 +60,7 @@ def by_pointer(kind: Any) -> bool:
     return is_struct(kind) and leaves(kind) > LARGE
 
 
-def written(kind: Any) -> list[tuple[str, Any]]:
+def result_places(kind: Any) -> list[tuple[str, Any]]:
     """Places that a function with such a result writes: a large struct, or of a tuple all but its one small field."""
     large = (
         [(f"to{name[1:]}", one) for name, one in members(kind) if by_pointer(one)] if is_struct(kind) else []
@@ -70,9 +70,9 @@ def written(kind: Any) -> list[tuple[str, Any]]:
     return [("to", kind)] if by_pointer(kind) else []
 
 
-def returned(kind: Any) -> Any:
+def value_type(kind: Any) -> Any:
     """The type of a function's value in C: of a tuple whose large fields it writes, the small field."""
-    split = written(kind) not in ([], [("to", kind)])
+    split = result_places(kind) not in ([], [("to", kind)])
     return next(one for _, one in members(kind) if not by_pointer(one)) if split else kind
 
 
