@@ -14,8 +14,9 @@ from palpate.force.contact_evidence import AIR
 from palpate.force.force_loop import PHASES, SurfaceEstimate, surface_estimate
 from palpate.force.gains import Gains
 from palpate.force.guard import QUIET, TROUBLES, GuardedState, safe_step
-from palpate.force.sliding import slide_law
-from palpate.force.sliding.slide_law import put_vector, slide_step, vector_at
+from palpate.force.sliding import slide_state
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import put_vector, vector_at
 from palpate.force.sliding.sliding_loop import slide_estimate, sliding
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 from palpate.identifiers.kernels import contact_state, contact_stream
@@ -99,9 +100,15 @@ def slide_update(gains, state, desired, force, position, direction, missed, velo
 
 
 @law
+def slide_known(gains, state):
+    """The surface as it is known."""
+    return slide_estimate(state)
+
+
+@law
 def slide_sliding(gains, state):
     """Whether the force was held and the tip slides."""
-    return state[slide_law.PHASE] == slide_law.SLIDE
+    return state[slide_state.PHASE] == slide_state.SLIDE
 
 
 def sliding_module(gains: Gains, into: ArrayLike, notes: tuple[str, ...] = ()) -> Module:
@@ -119,14 +126,14 @@ def sliding_module(gains: Gains, into: ArrayLike, notes: tuple[str, ...] = ()) -
     )
     entries = (
         Entry("update", slide_update, "One tick: the velocity of the commanded position.", arguments, True),
-        Entry("estimate", slide_estimate, "The surface; zeros, but for the normal, before a slide."),
+        Entry("estimate", slide_known, "The surface; zeros, but for the normal, before a slide."),
         Entry("is_sliding", slide_sliding, "Whether the force was held and the tip slides."),
     )
-    words = {"trouble": ((f"numbers[{slide_law.TROUBLE}]",), slide_law.SLIDING_TROUBLES)}
+    words = {"trouble": ((f"numbers[{slide_state.TROUBLE}]",), slide_state.SLIDING_TROUBLES)}
     head = (f"law of the press: {gains.law}", f"gains: {gains.digest}", *notes)
     title = "holds a force along an unknown curved surface"
     numbers = sliding(gains, into)
-    return Module("palpate_slide", title, numbers, slide_init, entries, words, head, slide_law.SIZE)
+    return Module("palpate_slide", title, numbers, slide_init, entries, words, head, slide_state.SIZE)
 
 
 @part

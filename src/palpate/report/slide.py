@@ -11,7 +11,7 @@ from palpate.arrays import Array
 from palpate.files import write_text
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
-from palpate.force.sliding.slide_law import SLIDING_TROUBLES
+from palpate.force.sliding.slide_state import SLIDING_TROUBLES
 from palpate.force.sliding.slide_world import COLUMNS, SETTLED, Ground, figures_of
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
@@ -53,8 +53,8 @@ def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
             "median_error_deg": float(np.degrees(found.normal)), "coverage": found.cone,
             "cone95_deg": float(np.degrees(CHI2_95 * np.median(c["cone"][judged]))),
         },
-        "friction": {"value": mu, "ci95": list(mu.ci95)},
-        "stiffness": {"value": K, "ci95": list(K.ci95)},
+        "friction": {"value": float(mu), "ci95": list(mu.ci95)},
+        "stiffness": {"value": float(K), "ci95": list(K.ci95)},
         "path_m": float(np.linalg.norm(np.diff(where, axis=0), axis=1).sum()),
         "contact_lost": found.lost,
     }  # fmt: skip

@@ -11,32 +11,72 @@ A jump of the force and a refuted normal halt the slide: the tip stops at once, 
 alone is controlled along n. Once it is held for the loop's lag, the filter begins again at an uncertain normal.
 """
 
-from typing import NamedTuple
-
-from palpate._jit import law, part
+from palpate._jit import law
 from palpate._vector import ZERO3, Vec3, sqrt
-from palpate.force.flat import GUARD, STATE, guard_in, put_guard, put_state, state_in
+from palpate.force.flat import guard_in, put_guard, put_state, state_in
 from palpate.force.guard import (
     BLIND,
     FAR,
     FINE,
     LATE,
+    LEAST,
     LIMITED,
-    QUIET,
     SATURATED,
     SCALES,
     STALE,
-    TROUBLES,
     safe_step,
 )
-from palpate.force.law import Cautious, gain
+from palpate.force.law import gain
+from palpate.force.sliding.slide_state import (
+    ALL,
+    ALONG,
+    AWAY,
+    AXIS,
+    BOUND,
+    DIRECTION,
+    EDGE,
+    FELT,
+    FRAMES,
+    HALT,
+    JERKS,
+    LAW,
+    LOSS,
+    LOST,
+    MOVE,
+    NORMAL,
+    ORIGIN,
+    PHASE,
+    POSITION,
+    PRESS,
+    READ_AT,
+    REFUTED,
+    ROUGH,
+    SAFETY,
+    SEEN,
+    SILENT,
+    SLIDE,
+    SLOPE,
+    SLOW,
+    STEPPED,
+    TICKS,
+    TOUCHES,
+    TROUBLE,
+    UNCHANGED,
+    VELOCITY,
+    beside,
+    cross,
+    press_again,
+    put_vector,
+    unit,
+    vector_at,
+    within,
+)  # fmt: skip
 from palpate.force.sliding.tangent_filter import (
     C11,
     C12,
     C22,
     F1,
     F2,
-    FILTER,
     FORCE,
     G1,
     G2,
@@ -50,46 +90,9 @@ from palpate.force.sliding.tangent_filter import (
     turned,
     variance,
 )  # fmt: skip
+from palpate.force.sliding.touches import next_touch, touched
 from palpate.force.stage import LOCKED
 
-
-@law
-def unit(a, otherwise):
-    """A vector's direction; of one without length another."""
-    length = sqrt(a @ a)
-    return a / length if length > 1e-12 else otherwise
-
-
-@law
-def cross(a, b):
-    """Vector product of two vectors."""
-    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
-
-
-@law
-def beside(n):
-    """A unit vector that is perpendicular to n."""
-    other = Vec3(1.0, 0.0, 0.0) if abs(n.x) < 0.7 else Vec3(0.0, 1.0, 0.0)
-    return unit(other - (other @ n) * n, other)
-
-
-PRESS, SLIDE = 0.0, 1.0
-"""Phases: the cautious law alone, and the slide."""
-ALONG, REFUTED, STEPPED, JERKS, LOST, DIRECTION, FRAMES, AWAY = 20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0, 27.0
-SLIDING_TROUBLES = TROUBLES | {
-    ALONG: "the direction asked for is along the normal: the tip does not slide; ask for one along the surface",
-    REFUTED: "the force leaves the friction cone about the estimated normal: the normal was wrong, or friction is "
-    "above mu_max; the tip stopped, and the normal is estimated again",
-    STEPPED: "the force jumped: a step, an edge or a hole in the surface; the tip stops until the force is held again, "
-    "then slides on at half the speed (give the height of steps that are expected as --step)",
-    JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
-    AWAY: "the force is off by more than a tenth: a step or an edge, friction that changes, or a normal that is not "
-    "yet known; slide more slowly",
-    LOST: "contact was lost: the tip stopped sliding, and approaches again",
-    FRAMES: "the force is not along the direction into the surface: force and position need the same axes, those of "
-    "the base; the tip was held",
-    DIRECTION: "the direction is no number: the tip does not slide",
-}
 CONE = 0.07
 """Angle by which a force may leave the friction cone [rad]: 4 degrees."""
 BAND = 0.1
@@ -109,86 +112,12 @@ SLOWEST = 0.1
 CROOKED = 0.4
 """Cosine between force and direction below which a press is in other axes: friction of 0.9 and a tilt of 20 degrees
 have 0.48."""
+LIGHT = 0.3
+"""Share of F_d with which a normal is touched."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
 """Friction of dry contacts: mean and standard deviation before any was felt."""
-
-
-@part
-class Sliding(NamedTuple):
-    """The law's numbers.
-
-    Args:
-        press: the cautious law of the press, and limits of arm and sensor.
-        into: direction into the surface, in which it is looked for (unit vector, base's axes).
-        slope: standard deviation of that direction against the surface's normal, each way [rad].
-        mu_max: largest friction that there may be.
-        ratio: tangential over normal stiffness of the contact.
-        turning: noise of the curvature [1/m^3].
-        curvature: standard deviation of the curvature before any was seen [1/m].
-        speed: of the slide [m/s].
-        acceleration: of the tip along the surface [m/s^2].
-        lead: sum of the lags from the reading to the tip [s].
-        late: age of a reading in ticks, 0 to 1.
-        encoder: standard deviation of a measured position [m].
-        doubt: standard deviation of the lag [s].
-        step: highest step that is expected in the surface [m].
-    """
-
-    press: Cautious
-    into: Vec3
-    slope: float
-    mu_max: float
-    ratio: float
-    turning: float
-    curvature: float
-    speed: float
-    acceleration: float
-    lead: float
-    late: float
-    encoder: float
-    doubt: float
-    step: float
-
-    def start(self, s):
-        """In free motion, knowing nothing but a direction into the surface: fills a state, shape (SIZE,)."""
-        for i in range(len(s)):
-            s[i] = 0.0
-        press_again(self, s, self.into, FINE)
-
-
-(PHASE, TROUBLE, SILENT, UNCHANGED, TICKS, BOUND, SLOW, ROUGH, HALT, LOSS) = (FILTER + i for i in range(10))
-"""Places behind the filter: phase, trouble, ticks without a good reading and since one changed, ticks of all, K_u,
-share of the speed after a step, mean squared deviation of the force's angle, ticks since the force is held again
-after a step (at least 1 in a halt), and ticks without contact."""
-(NORMAL, EDGE, VELOCITY, READ_AT, SEEN, FELT, POSITION, ORIGIN, AXIS) = (
-    FILTER + 10 + 3 * i for i in range(9)
-)
-"""Vectors: normal, e1, velocity along the surface [m/s], position at the last reading and in the last tick as the
-sensor saw it [m], last force [N], last position and its origin [m]; then the sensor's low-pass of three axes."""
-LAW = AXIS + 9
-SAFETY = LAW + STATE
-SIZE = SAFETY + GUARD
-"""Places of the cautious law's state and of its guard's; numbers of a state."""
-
-
-@law
-def vector_at(s, at):
-    """Three numbers of a state as a vector."""
-    return Vec3(s[at], s[at + 1], s[at + 2])
-
-
-@law
-def put_vector(s, at, v):
-    """Puts a vector into a state."""
-    s[at], s[at + 1], s[at + 2] = v.x, v.y, v.z
-
-
-@law
-def within(v, most):
-    """Whether each component is a number and at most so large."""
-    return abs(v.x) <= most and abs(v.y) <= most and abs(v.z) <= most
 
 
 # More than seven arguments: the readings of a tick, and the state with its room.
@@ -226,7 +155,11 @@ def slide_step(law, s, work, desired, force, position, direction, missed):
     put_vector(s, SEEN, seen)
     put_vector(s, FELT, force)
     if s[PHASE] == PRESS:
-        velocity = press_tick(law, s, late, desired, force, position, missed)
+        light = desired if s[TOUCHES] == ALL else max(LIGHT * desired, LEAST * c.noise)
+        velocity = press_tick(law, s, late, light, force, position, missed)
+    elif s[PHASE] == MOVE:
+        put_vector(s, READ_AT, late)
+        velocity = next_touch(law, s, force, position) if s[UNCHANGED] * c.tick <= c.theta else ZERO3
     else:
         if s[HALT] == 0.0:
             s[TROUBLE] = LATE if gap else FINE
@@ -238,17 +171,6 @@ def slide_step(law, s, work, desired, force, position, direction, missed):
         press_again(law, s, law.into, BLIND)
         return ZERO3
     return velocity * (c.speed / fast) if fast > c.speed else velocity
-
-
-@law
-def press_again(law, s, n, trouble):
-    """In free motion, with a direction into the surface."""
-    s[PHASE], s[TROUBLE], s[SILENT], s[LOSS] = PRESS, trouble, 0.0, 0.0
-    put_vector(s, NORMAL, n)
-    put_vector(s, EDGE, beside(n))
-    put_vector(s, VELOCITY, ZERO3)
-    put_state(s[LAW:SAFETY], law.press.start())
-    put_guard(s[SAFETY:], QUIET)
 
 
 @law
@@ -269,10 +191,15 @@ def press_tick(law, s, late, desired, force, position, missed):
         return ZERO3
     if press.stage.phase == LOCKED and size > 0.5 * desired and guard.trouble == FINE:
         stiffness = max(c.cap * press.known.found.x, c.floor)
-        tilt = 2.0 * law.slope * law.slope * (1.0 + c.compliance * stiffness)
+        if s[TOUCHES] < ALL:
+            over, sd = press.watch.mean - press.watch.rest - desired, c.cap * press.known.std.x
+            touched(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
+            return ZERO3
+        tilt = 2.0 * s[SLOPE] * s[SLOPE] * (1.0 + c.compliance * stiffness)
         relative = min(sqrt((c.cap * press.known.std.x / stiffness) ** 2 + tilt * tilt), 0.5)
         s[PHASE], s[BOUND] = SLIDE, press.bound.used
-        slide_from(law, s, unit(force, n), size, stiffness, relative, law.slope, LIKELY[0], LIKELY[1])
+        start = n if law.spacing > 0.0 else unit(force, n)
+        slide_from(law, s, start, size, stiffness, relative, s[SLOPE], LIKELY[0], LIKELY[1])
     return speed * n
 
 

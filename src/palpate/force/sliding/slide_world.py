@@ -18,7 +18,8 @@ from palpate.force.flat import flattened
 from palpate.force.gains import Gains
 from palpate.force.law import gain
 from palpate.force.simulated_press import world_of
-from palpate.force.sliding.slide_law import (
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import (
     BOUND,
     NORMAL,
     PHASE,
@@ -26,10 +27,9 @@ from palpate.force.sliding.slide_law import (
     SLIDE,
     TROUBLE,
     put_vector,
-    slide_step,
     unit,
     vector_at,
-)  # fmt: skip
+)
 from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, Z_95, numbers_in, sliding
 from palpate.force.sliding.tangent_filter import (
     BASE,
@@ -375,7 +375,7 @@ class SlideFigures:
     touched: bool  # the force was held, and the tip slid
     rms: float  # of the force error, share of F_d
     most: float  # largest error, share of F_d
-    worst: float  # largest normal force of the whole slide in F_d
+    worst: float  # largest normal force of the whole run in F_d
     lost: bool  # the true force was 0
     normal: float  # median error [rad]
     cone: float  # share of the time in which the 95 % cone holds the normal
@@ -401,7 +401,7 @@ def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
     true = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
     return SlideFigures(
         True, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()),
-        float(c["normal_force"][on].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
+        float(c["normal_force"].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
         float(np.median(c["normal_error"][judged])),
         float(np.mean(c["normal_error"][judged] < CHI2_95 * c["cone"][judged])),
         float(np.mean(np.abs(c["mu"][judged] - ground.friction) < Z_95 * c["mu_std"][judged])),

@@ -17,9 +17,10 @@ from palpate.force.flat import flattened
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
-from palpate.force.sliding import slide_law as places
+from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import numbers_of
-from palpate.force.sliding.slide_law import SIZE, SLIDING_TROUBLES, Sliding, put_vector, slide_step, vector_at
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
 from palpate.results import Readable
 
@@ -56,7 +57,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
         acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
-        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step,
+        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 
 
@@ -95,11 +96,11 @@ class SlideEstimate(NamedTuple):
 
 
 @law
-def slide_estimate(law, s):
+def slide_estimate(s):
     """The surface as it is known."""
     normal = vector_at(s, places.NORMAL)
     if s[places.PHASE] != places.SLIDE:
-        return SlideEstimate(normal, CHI2_95 * law.slope, 0.0, 0.0, 0.0, 0.0)
+        return SlideEstimate(normal, CHI2_95 * s[places.SLOPE], 0.0, 0.0, 0.0, 0.0)
     a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
     larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
     friction, stiff = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, STIFF, STIFF), 0.0))
@@ -216,14 +217,14 @@ class SlidingLoop(Readable):
     @property
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
-        return float(slide_estimate(self.law, self._state).cone)
+        return float(slide_estimate(self._state).cone)
 
     @property
     def friction(self) -> Uncertain | None:
         """Coefficient of friction; None before a slide."""
         if not self.sliding:
             return None
-        now = slide_estimate(self.law, self._state)
+        now = slide_estimate(self._state)
         return Uncertain(float(now.friction), float(now.friction_std))
 
     @property
@@ -231,7 +232,7 @@ class SlidingLoop(Readable):
         """Stiffness as the measured position feels it [N/m]; None before a slide."""
         if not self.sliding:
             return None
-        now = slide_estimate(self.law, self._state)
+        now = slide_estimate(self._state)
         return Uncertain(float(now.stiffness), float(now.stiffness_std))
 
     @property
