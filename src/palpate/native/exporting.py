@@ -11,25 +11,10 @@ import numpy as np
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder
 from palpate.force.sliding.sliding_loop import DOWN
-from palpate.native.laws import (
-    FORCE,
-    IDENTIFIER,
-    LAWS,
-    SLIDING,
-    force_module,
-    identifier_module,
-    sliding_module,
-    squares_module,
-)
+from palpate.native import laws, recording
+from palpate.native.laws import FORCE, IDENTIFIER, LAWS, SLIDING
 from palpate.native.module import Module, Sources, sources_of
 from palpate.native.package import files_of, write_folder
-from palpate.native.recording import (
-    Recording,
-    of_force_loop,
-    of_identifier,
-    of_least_squares,
-    of_sliding_loop,
-)
 from palpate.native.replay import unequal_ticks
 
 TICKS = 1_000_000
@@ -87,7 +72,7 @@ class ExportedLaw:
 
     module: Module
     sources: Sources
-    recording: Recording
+    recording: recording.Recording
     desired: float = 0.0
 
     def write(self, out: Path, version: str, *, replace: bool) -> None:
@@ -129,18 +114,18 @@ def exported_law(request: LawRequest, progress: Callable[[str], None] = lambda _
         gains = load_gains(request.gains)
         desired = gains.force
         if request.law == FORCE:
-            module, recording = force_module(gains), of_force_loop(ForceLoop(gains))
+            module, ticks = laws.force_module(gains), recording.of_force_loop(ForceLoop(gains))
         else:
-            module = sliding_module(gains, request.into)
-            recording = of_sliding_loop(SlidingLoop(gains, request.into))
+            module = laws.sliding_module(gains, request.into)
+            ticks = recording.of_sliding_loop(SlidingLoop(gains, request.into))
     elif request.law == IDENTIFIER:
         identifier = ContactIdentifier(request.low_pass, request.rate, request.lag, sampling=request.sampling)
-        module, recording, desired = identifier_module(identifier), of_identifier(identifier), 0.0
+        module, ticks, desired = laws.identifier_module(identifier), recording.of_identifier(identifier), 0.0
     else:
         n = request.parameters
         if n not in (3, 4):
             raise InputError(f"C has least squares of 3 or 4 parameters, got --parameters {n}")
         estimator = RecursiveLeastSquares(np.zeros(n), _VAGUE * np.eye(n), request.forgetting)
-        module, recording, desired = squares_module(estimator), of_least_squares(estimator), 0.0
+        module, ticks, desired = laws.squares_module(estimator), recording.of_least_squares(estimator), 0.0
     progress("translating the law to C")
-    return ExportedLaw(module, sources_of(module), recording, desired)
+    return ExportedLaw(module, sources_of(module), ticks, desired)

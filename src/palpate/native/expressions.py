@@ -158,12 +158,7 @@ class Expressions:
         return getattr(module, node.attr) if isinstance(module, ModuleType) else None
 
     def _literal(self, value: Any, node: Any) -> Value:
-        kinds = {
-            bool: self.whole.boolean,
-            int: self.whole.integer,
-            float: self.whole.real,
-            np.float64: self.whole.real,
-        }
+        kinds = self.whole.kinds
         self.need(type(value) in kinds, node, f"a {type(value).__name__}", "use a number or a truth")
         return Value(number(value), kinds[type(value)], UNARY if number(value).startswith("-") else ATOM)
 
@@ -382,7 +377,7 @@ class Expressions:
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
         kinds, first = tuple(value.type for value in values), values[0] if values else None
-        casts = {int: self.whole.integer, float: self.whole.real, bool: self.whole.boolean}
+        casts = self.whole.kinds
         if callee is abs and first and is_struct(first.type):
             return self._calling_overload(abs, values, node)
         if callee is len and first:

@@ -330,10 +330,7 @@ def _pieces(line: str) -> list[str]:
     indent = line[: len(line) - len(line.lstrip())]
     pieces, more = [], indent + "    "
     while len(line) > WIDTH:
-        places = [
-            line.rfind(sign, len(more) + 8, WIDTH)
-            for sign in (", ", " && ", " || ", " + ", " ? ", " : ", " /* ", " = ")
-        ]
+        places = [line.rfind(sign, len(more) + 8, WIDTH) for sign in _BREAKS]
         strong = max(places[:3])
         place = strong if strong > WIDTH // 2 else max(places)
         if place < 0:

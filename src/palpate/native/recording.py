@@ -126,53 +126,29 @@ def of_sliding_loop(loop: SlidingLoop) -> Recording:
 
 
 def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
-    gains, state = loop.gains, loop._state
-    tick, scale = gains.arm.tick, gains.arm.sensor.full_scale
-    K, mu = gains.cap * 10.0 ** rng.uniform(-2.5, 0.2), rng.uniform(0.0, 1.2) * loop.law.mu_max
-    curvature = rng.choice([0.0, -1.0, 1.0]) * 10.0 ** rng.uniform(0.0, 1.7)
-    n = np.array(loop.law.into) + rng.normal(0.0, 1.5 * loop.law.slope, 3)
-    n, wall, rate = (
-        n / np.linalg.norm(n),
-        gains.approach * tick * ticks * rng.uniform(0.02, 0.2),
-        rng.uniform(0.1, 5.0),
-    )
-    noise = gains.arm.sensor.noise * rng.choice([0.0, 1.0, 1.0]) * rng.standard_normal((ticks, 3))
-    kinds, whens = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < RARE
-    every, axes = max(1, round(1.0 / (gains.arm.sensor.sampling * tick))), rng.integers(0, 3, ticks)
-    reading, x, before, fault, left = np.zeros(3), np.zeros(3), np.zeros(3), 0, 0
-    out = np.zeros((ticks, 14))
+    gains, tick = loop.gains, loop.gains.arm.tick
+    K, mu = gains.cap * 10.0 ** rng.uniform(-2.5, 0.2), rng.uniform(0.0, 1.0)
+    bend, wall, rate = rng.uniform(-30.0, 30.0), 0.1 * gains.approach * tick * ticks, rng.uniform(0.1, 5.0)
+    n, noise = loop.normal + rng.normal(0.0, 0.1, 3), gains.arm.sensor.noise * rng.standard_normal((ticks, 3))
+    kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < RARE
+    x, v, fault, force, out = np.zeros(3), np.zeros(3), 0, np.zeros(3), np.zeros((ticks, 14))
     loop.reset()
     for k in range(ticks):
-        fault, left = (kinds[k], 1 + k % 199) if whens[k] else (fault if left > 1 else 0, left - 1)
-        across = x - (x @ n) * n
-        depth = x @ n - wall - 0.5 * curvature * (across @ across)
-        motion = (x - before) / tick
-        along = motion - (motion @ n) * n
-        if k % every == 0 and fault != STUCK:
-            fast = np.sqrt(along @ along) + 1e-4
-            reading = np.clip(
-                K * max(depth, 0.0) * (n + curvature * across + mu * along / fast) + noise[k], -scale, scale
-            )
-        wall += {RECEDES: 2e-6, STEPPED: 1e-3 * (left % 50 == 1)}.get(fault, 0.0)
-        given, place = reading.copy(), x.copy()
-        given[axes[k]] = _reading(gains, fault, left, reading[axes[k]])
-        place[axes[k]] = x[axes[k]] if fault != LOST else np.nan if left % 2 else 1e4
-        angle = rate * k * tick
-        direction = np.array([np.cos(angle), np.sin(angle), 0.0]) * (
-            np.nan if fault == UNASKED else float(k % 7 > 0)
-        )
-        missed = float(left % 7 * left) if fault == LATE else float("nan") if fault == LATER else 0.0
-        velocity = loop.update(given, place, direction, missed)
-        out[k, 1], out[k, 2:5], out[k, 5:8], out[k, 8:11], out[k, 11] = (
-            loop.desired,
-            given,
-            place,
-            direction,
-            missed,
-        )
-        out[k, 12], out[k, 13] = digest_of(velocity), digest_of(state) if k % 100 == 99 else 0.0
-        before, x = x, x + tick * velocity
-    out[0, 0] = 1.0
+        fault = kinds[k] if begins[k] else fault * (k % 100 > 0)
+        across, along, axis = x - (x @ n) * n, v - (v @ n) * n, k % 3
+        wall += {RECEDES: 2e-6, STEPPED: 1e-3 * (k % 100 == 50)}.get(fault, 0.0)
+        if fault != STUCK:
+            slip = mu * along / (np.linalg.norm(along) + 1e-4)
+            force = K * max(x @ n - wall - bend * (across @ across), 0.0) * (n + slip) + noise[k]
+            force[axis] = _reading(gains, fault, k, force[axis])
+        place = x + (np.nan if fault == LOST else 0.0)
+        way = np.array([np.cos(rate * k * tick), np.sin(rate * k * tick), 0.0])
+        way *= np.nan if fault == UNASKED else float(k % 9 > 0)
+        missed = {LATE: float(k % 40), LATER: np.nan}.get(fault, 0.0)
+        v = loop.update(force, place, way, missed)
+        state = digest_of(loop._state) if k % 100 == 99 else 0.0
+        out[k] = [k == 0, loop.desired, *force, *place, *way, missed, digest_of(v), state]
+        x = x + tick * v
     return out
 
 

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from palpate._jit.typing_rules import TypingRules
 from palpate.native.constants import Constants
 from palpate.native.source import place_of, refuse, syntax_of
@@ -48,12 +50,9 @@ class Translation:
 
         self.rules = TypingRules()
         self.typing = self.rules.context
-        self.real, self.integer, self.boolean, self.none = (
-            types.float64,
-            types.int64,
-            types.boolean,
-            types.none,
-        )
+        self.real, self.integer = types.float64, types.int64
+        self.boolean, self.none = types.boolean, types.none
+        self.kinds = {bool: self.boolean, int: self.integer, float: self.real, np.float64: self.real}
         self.structs = Structs(prefix)
         self._claimed: set[str] = set()
         self.constants = Constants(self.structs, self._claim)
