@@ -288,7 +288,7 @@ def timer(law: ExportedLaw) -> str:
     )
     call = text.split("value = ")[1].split(";")[0]
     if law.module.entries[0].writes:
-        call = re.sub(r"number_of\(digest_of\((\w+),.*", r"\1[0])", call)
+        call = re.sub(r"digest_of\((\w+),.*", r"\1[0])", call)
     filled = TIMER.replace("NAME", law.module.name).replace("CALL", call)
     size = f"enum {{ ROW = {law.recording.inputs + 3} }};\nstatic double row[ROW];\n{out}"
     return filled.replace("static double row[ROW];", size)
