@@ -79,7 +79,7 @@ class SlideOptions:
     step: Annotated[str, SIGNED] = "0:mm"
     touches: Annotated[str, SIGNED] = "10:mm"
     gains: Path | None = None
-    seed: Annotated[int, WHOLE] = 0
+    seed: Annotated[int, WHOLE, Parameter(group=Group("Noise", sort_key=2))] = 0
 
     def ground(self) -> tuple[Ground, float]:
         """The surface, and its radius [m]."""
