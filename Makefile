@@ -5,7 +5,8 @@
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 THESIS := packages/palpate-thesis
-REFERENCES := packages/palpate-references
+# The distributions beside palpate, which add commands to it.
+BESIDE := $(wildcard packages/*)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
 # Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
@@ -36,7 +37,7 @@ lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/lint-imports --config $(THESIS)/pyproject.toml
+	for package in $(BESIDE); do $(BIN)/lint-imports --config $$package/pyproject.toml || exit 1; done
 
 format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can mend
 	$(BIN)/ruff check --fix
@@ -98,7 +99,7 @@ pictures: .venv/dev.stamp ## make the film and the pictures of the README again;
 lock: .venv/python.stamp ## resolve the dependencies again and pin them with hashes
 	$(BIN)/python -m venv --clear build/lock
 	build/lock/bin/python -m pip --disable-pip-version-check --quiet install uv
-	build/lock/bin/uv $(LOCK) pyproject.toml --group build --extra live -o requirements/run.txt
+	build/lock/bin/uv $(LOCK) pyproject.toml --group build --group beside -o requirements/run.txt
 	build/lock/bin/uv $(LOCK) pyproject.toml --group dev -c requirements/run.txt -o requirements/dev.txt
 
 LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
@@ -106,7 +107,7 @@ LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --genera
 	--no-header --no-annotate --no-emit-index-url --no-emit-find-links --only-binary :all:
 
 clean: ## remove the environment and everything that is made
-	rm -rf .venv build dist site $(THESIS)/build $(THESIS)/dist .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build dist site $(BESIDE:=/build) $(BESIDE:=/dist) .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 .venv/python.stamp:
 	@test -n "$(PYTHON)" || { echo "palpate needs Python 3.11 or newer on the PATH; or say which: make PYTHON=/path/to/python3" >&2; exit 1; }
@@ -116,9 +117,9 @@ clean: ## remove the environment and everything that is made
 	$(PYTHON) -m venv --clear .venv
 	@touch $@
 
-.venv/run.stamp: requirements/run.txt pyproject.toml $(THESIS)/pyproject.toml $(REFERENCES)/pyproject.toml .venv/python.stamp
+.venv/run.stamp: requirements/run.txt pyproject.toml $(BESIDE:=/pyproject.toml) .venv/python.stamp
 	$(PIP_INSTALL) --require-hashes -r requirements/run.txt
-	$(PIP) install --no-deps --no-build-isolation --editable . --editable $(THESIS) --editable $(REFERENCES)
+	$(PIP) install --no-deps --no-build-isolation --editable . $(BESIDE:%=--editable %)
 	@touch $@
 
 .venv/dev.stamp: requirements/dev.txt .venv/run.stamp

@@ -8,10 +8,10 @@ from student import Damped
 
 from palpate.checks import controller_checks, outcomes
 from palpate.plugins import permit
-from palpate.studies import run
-from palpate.studies.pairing import comparisons
-from palpate.studies.plan import plan
-from palpate.studies.study import parse
+from palpate_studies import run
+from palpate_studies.pairing import comparisons
+from palpate_studies.plan import plan
+from palpate_studies.study import parse
 
 STUDY = """
 title = "Damped push or PI, on random foam"

@@ -134,7 +134,7 @@ def _read(kind: str, path: Path) -> str:
         if f"@{kind}" in LOADED:
             LOADED[f"@{kind}"](str(path))
         elif kind == "journal":
-            from palpate.studies import run_study
+            from palpate_studies import run_study
 
             with run_study.open_journal(path, HEAD()) as book:
                 list(book.rows())
@@ -204,8 +204,8 @@ def _load_experiment(path: str) -> None:
 
 
 def _load_study(path: str) -> None:
-    from palpate.studies.plan import plan
-    from palpate.studies.study import load
+    from palpate_studies.plan import plan
+    from palpate_studies.study import load
 
     plan(load(path), path)
 

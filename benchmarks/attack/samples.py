@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "packages" / "palpate-studies" / "tests")]
 
 N = 200
 TIME = np.arange(N) * 1e-3
@@ -90,8 +90,8 @@ def study(path: Path) -> None:
 
 def journal(path: Path) -> None:
     """Finished runs of a study."""
-    from palpate.studies import run_study as journals
-    from palpate.studies.run_one import Row
+    from palpate_studies import run_study as journals
+    from palpate_studies.run_one import Row
 
     with journals.open_journal(path, HEAD()) as book:
         for run in range(10):
@@ -123,7 +123,7 @@ def _wrote(path: Path, *words: str) -> None:
 
 def HEAD() -> object:
     """Of the journal."""
-    from palpate.studies.run_study import JournalHead
+    from palpate_studies.run_study import JournalHead
 
     return JournalHead("T", "study", "0.1.0", "sources", 10)
 

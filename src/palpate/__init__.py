@@ -18,10 +18,8 @@ The rooms, each `palpate.ROOM`:
     logs            files in and out: text, Parquet, MATLAB, ROS bags, MCAP
     contact_frame   an arm's wrench and pose along the contact's normal; weighing a tool
     maps            a surface's stiffness from presses at places, and where to press next
-    excitation      design of a desired force that identifies a surface
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
-    export          an identified surface as a contact of MuJoCo, Drake or Newton
     robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
     press           any serial arm presses on a surface, in simulation
     bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
@@ -30,7 +28,6 @@ The rooms, each `palpate.ROOM`:
     instruments     encoders, force sensors, filters, each with its lag
     checks          the conformance suite of all parts, for your own too
     analysis        a loop as a linear model: margins, boundaries of stability
-    studies         many runs: grids, random points, a search
     report          figures, tables, pages
 
 Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
@@ -66,8 +63,6 @@ _ROOMS = (
     "contact_frame",
     "controllers",
     "environments",
-    "excitation",
-    "export",
     "force",
     "identification",
     "identifiers",
@@ -77,7 +72,6 @@ _ROOMS = (
     "press",
     "report",
     "robots",
-    "studies",
     "wires",
 )
 

@@ -65,6 +65,14 @@ def shorten(text: str, most: int) -> str:
     return text[: kept - kept // 3] + _GAP + text[-(kept // 3) :]
 
 
+def duration(seconds: float) -> str:
+    """A time in words of a fitting unit."""
+    for size, unit in ((365.25 * 86400.0, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:,.0f} {unit}"
+    return f"{seconds:.0f} seconds"
+
+
 def _visible(letter: str) -> str:
     if letter in _KEPT or unicodedata.category(letter) not in _UNSAFE:
         return letter

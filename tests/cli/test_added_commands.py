@@ -58,6 +58,21 @@ def test_a_command_is_listed_by_the_first_line_of_its_docstring_and_runs(distrib
     assert "Desired force [N]." in capsys.readouterr().out
 
 
+def test_a_command_within_a_package_is_listed_and_the_package_not_imported(
+    distribution, tmp_path, monkeypatch, capsys
+):
+    distribution("", "polish")
+    monkeypatch.delitem(sys.modules, "strange", raising=False)
+    (tmp_path / "strange").mkdir()
+    (tmp_path / "strange" / "__init__.py").write_text(MODULE, encoding="utf-8")
+    (tmp_path / "strange" / "commands.py").write_text(COMMAND, encoding="utf-8")
+    info = tmp_path / "stranger-1.0.dist-info" / "entry_points.txt"
+    info.write_text("[palpate.commands]\npolish = strange.commands:polish\n", encoding="utf-8")
+    assert main(["--help"]) == 0
+    assert "Polish with a force." in capsys.readouterr().out
+    assert "strange" not in sys.modules
+
+
 @pytest.mark.parametrize("source", [MODULE, "def polish(:", "polish = 1"])
 def test_a_broken_distribution_stops_neither_the_list_nor_another_command(distribution, capsys, source):
     distribution(source, "polish")
@@ -85,3 +100,12 @@ def test_a_command_whose_distribution_is_missing_says_how_to_get_it(monkeypatch,
     assert told.out == ""
     assert told.err.count("\n") == 1
     assert told.err.endswith(f"which is not installed: pip install {COMPANIONS[command]}\n")
+
+
+def test_a_scene_without_the_distribution_of_simulators_says_how_to_get_it(monkeypatch, capsys):
+    monkeypatch.setattr("palpate.cli.export.entry_points", lambda **_: ())
+    assert main(["export", "found.json", "--to", "newton"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert printed.err.endswith("which is not installed: pip install palpate-export\n")

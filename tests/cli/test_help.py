@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 
 from palpate.cli import main
 from palpate.cli._help import example, page, wrapped
-from palpate.cli._program import COMMANDS, program
+from palpate.cli._program import COMMANDS, added_commands, program
 from palpate.cli.options.names import MODELS
 from palpate.identification.models import NAMES
 
+ALL = [*COMMANDS, *added_commands()]
+"""Those of palpate, and of the distributions beside it."""
 WIDTH = 80
 PANEL = re.compile(r"^╭─ (.+?) ─*╮$")
 MOST = 14
@@ -48,7 +50,7 @@ def examples(text):
     return [line.strip() for line in joined.splitlines() if line.startswith("    palpate ")]
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALL)
 def test_each_help_has_an_example_that_palpate_understands(help_of, command):
     found = [line for line in examples(help_of(command)) if line.split()[1] == command]
     assert found, f"palpate {command} --help has no example"
@@ -57,7 +59,7 @@ def test_each_help_has_an_example_that_palpate_understands(help_of, command):
         assert bound is not None, line
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALL)
 def test_options_are_in_groups(help_of, command):
     groups, name = {}, ""
     for line in help_of(command).splitlines():
@@ -70,13 +72,13 @@ def test_options_are_in_groups(help_of, command):
     assert max(groups.values(), default=0) <= MOST, groups
 
 
-@pytest.mark.parametrize("command", ["", *COMMANDS])
+@pytest.mark.parametrize("command", ["", *ALL])
 def test_no_line_is_longer_than_the_terminal(help_of, command):
     for line in help_of(*[command] if command else []).splitlines():
         assert len(line) <= WIDTH or " " not in line.strip(), line
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALL)
 def test_no_text_is_broken_where_its_source_was(help_of, command):
     """A line in a panel is short only where the next word would not fit, or a phrase ends."""
     lines = [line.strip("│ ").rstrip() for line in help_of(command).splitlines() if line.startswith("│")]
@@ -140,7 +142,7 @@ def test_other_suggestions_stay(capsys):
 def test_completion_knows_commands_and_options(capsys, shell):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
-    for word in (*COMMANDS, "wrench-frame", "working-point"):
+    for word in (*ALL, "wrench-frame", "working-point"):
         assert word in script
 
 
@@ -151,7 +153,7 @@ def test_completion_imports_nothing_heavy():
     assert not loaded & {"numba", "scipy", "matplotlib", "polars", "mujoco"}
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", ALL)
 def test_the_short_help_is_usage_examples_and_eight_options(capsys, command):
     assert main([command, "-h"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -11,10 +13,11 @@ from palpate.errors import InputError
 from palpate.force import Gains, SlidingLoop, load_arm, load_gains
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate.force.sliding import slide_law as places
+from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
-from palpate.force.sliding.slide_law import COVARIANCE, STATES, begin, correct, predict
+from palpate.force.sliding.slide_law import slide_from
 from palpate.force.sliding.slide_world import directions, figures_of, ground_of, simulate
+from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, begin, correct, predict
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -34,7 +37,7 @@ def in_a_slide(loop: SlidingLoop, normal: np.ndarray) -> None:
     loop.reset()
     state = loop._state
     state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
-    places.slide_from(loop.law, state, places.Vec3(*normal), loop.desired, 2e4, 0.1, 0.12)
+    slide_from(loop.law, state, places.Vec3(*normal), loop.desired, 2e4, 0.1, 0.12, 0.35, 0.3)
 
 
 @pytest.mark.parametrize("arm", ["ur5e", "fr3"])
@@ -103,6 +106,61 @@ def test_hostile_streams_leave_only_finite_velocities_within_the_limit(loop: Sli
             assert abs(np.linalg.norm(loop.normal) - 1.0) < 1e-9
 
 
+@pytest.mark.parametrize("height", [1e-3, -1e-3])
+def test_a_step_halts_the_slide_and_leaves_stiffness_and_normal(height: float) -> None:
+    gains = tuned(speed=0.05, slope=0.04, step=1e-3)
+    ground = ground_of("step", 0.2, 2e4, friction=0.3, height=height, period=0.03)
+    ways = directions("line", 8.0, gains.arm.rate, 0.05, 0.1)
+    rows = simulate(gains, ground, ways)
+    found = figures_of(rows, gains, ground)
+    codes, speed = rows[:, 14], rows[:, 15]
+    halted = (codes == places.STEPPED) | (codes == places.REFUTED)
+    assert halted.any()
+    assert speed[halted].max() < 1e-12
+    assert found.said
+    assert found.worst < 1.7
+    assert not found.lost
+    assert found.stiffness > 0.95
+    assert rows[-100:, 7].max() < np.radians(1.0)
+    assert abs(rows[-100:, 0] / gains.force - 1.0).max() < 0.05
+
+
+@pytest.mark.parametrize("arm", ["ur5e", "fr3"])
+@pytest.mark.parametrize("shape", ["plane", "bowl", "eggs"])
+def test_three_touches_measure_the_normal_before_the_slide(arm: str, shape: str) -> None:
+    gains = tuned(arm, touches=0.01)
+    ground = ground_of(shape, 0.12, 1e4, friction=0.5)
+    rows = simulate(
+        gains, ground, directions("circle", 1.0, gains.arm.rate, 0.03, 0.04), into=[0.3, 0.2, -1.0]
+    )
+    first = int(np.flatnonzero(rows[:, 13])[0])
+    assert rows[first, 7] < 3.0 * rows[first, 8]
+    assert rows[first, 8] < np.radians(0.7)
+    assert rows[:, 0].max() < 1.1 * gains.force
+    touches = np.flatnonzero((rows[1:first, 0] > 0.0) & (rows[: first - 1, 0] == 0.0))
+    assert len(touches) == 4
+    assert rows[:first, 0].max() < 1.1 * gains.force
+    assert rows[: touches[3], 0].max() < 0.5 * gains.force
+
+
+def test_a_sensor_that_is_not_tared_holds_the_tip_between_touches() -> None:
+    loop = SlidingLoop(tuned(touches=0.01))
+    state = loop._state
+    state[places.PHASE], state[places.TOUCHES], state[places.TICKS] = places.MOVE, 1.0, 10.0
+    tip = np.array([0.0, 0.0, 0.1])
+    v = loop.update([0.3, 0.1, -9.0], tip, [1.0, 0.0, 0.0])
+    assert loop.trouble.startswith("the sensor shows a force")
+    assert not v.any()
+
+
+def test_a_held_force_says_nothing_of_stiffness() -> None:
+    """An extended filter in (K, g, H) came to 0.78 K on this plane after 8 s."""
+    gains, ground = tuned(speed=0.05, slope=0.04), ground_of("plane", 0.2, 1.5e4, friction=0.3)
+    rows = simulate(gains, ground, directions("circle", 8.0, gains.arm.rate, 0.05, 0.07))
+    assert rows[-1, 11] == pytest.approx(gains.arm.seen(1.5e4), rel=0.05)
+    assert figures_of(rows, gains, ground).stiffness > 0.95
+
+
 @pytest.mark.parametrize(
     ("force", "direction", "said"),
     [
@@ -119,7 +177,7 @@ def test_each_fault_is_said(loop: SlidingLoop, force: list[float], direction: li
     loop.update([0.0, 0.0, -15.0], np.zeros(3), np.zeros(3))
     v = loop.update(force, np.zeros(3), direction)
     assert said in loop.trouble
-    assert np.linalg.norm(v - (v @ DOWN) * DOWN) < 1e-3
+    assert np.linalg.norm(v - (v @ loop.normal) * loop.normal) < 1e-3
 
 
 def test_the_filter_agrees_with_its_model_by_finite_differences() -> None:
@@ -187,6 +245,8 @@ def test_the_domain_shrinks_with_speed_and_ends_where_its_terms_say() -> None:
         (["--speed", "9"], "0.25 m/s"),
         (["--radius", "-1"], "--radius"),
         (["--tilt", "60"], "--tilt"),
+        (["--step", "-1"], "--step"),
+        (["--touches", "1"], "--touches"),
     ],
 )
 def test_wrong_numbers_of_a_slide_are_one_line(wrong: list[str], said: str, capsys, tmp_path) -> None:
@@ -209,3 +269,28 @@ def test_wrong_numbers_of_a_slide_are_one_line(wrong: list[str], said: str, caps
     assert said in told
     assert told.count("\n") == 1
     assert not out.exists()
+
+
+def test_the_command_writes_its_answer(tmp_path, capsys) -> None:
+    words = [
+        "slide",
+        "--seconds",
+        "1",
+        "--normal",
+        "0.2,0.1,-1",
+        "--step",
+        "1:mm",
+        "--out",
+        str(tmp_path / "out"),
+        "--json",
+    ]
+    assert main(words) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["end"] == "held"
+    assert answer["stiffness"]["ci95"][0] < answer["truth"]["stiffness"] < answer["stiffness"]["ci95"][1]
+    assert {p.name for p in (tmp_path / "out").iterdir()} >= {
+        "record.parquet",
+        "summary.json",
+        "slide.png",
+        "report.html",
+    }

@@ -46,8 +46,6 @@ def test_each_room_that_offers_names_is_in_the_reference(root):
         "identification",
         "logs",
         "signals",
-        "studies",
-        "live",
     }
     shown = {path.stem for path in (root / "docs" / "reference").glob("*.md")}
     assert (rooms | {"press", "report"}) - inside - shown == set()
@@ -70,7 +68,7 @@ def test_the_tutorial_goes_from_a_log_to_a_certified_loop(root, tmp_path, monkey
     assert len(lines) == 8
     for line in lines:
         words, _, file = line.partition(" > ")
-        if words.startswith("palpate live"):  # it serves until it is ended, and is `tests/live`'s
+        if words.startswith("palpate live"):  # it serves until it is ended, and is tested by its own package
             continue
         assert main(shlex.split(words)[1:]) == 0, line
         told = capsys.readouterr().out
@@ -86,7 +84,7 @@ def test_the_tutorial_goes_from_a_log_to_a_certified_loop(root, tmp_path, monkey
 @pytest.mark.long
 def test_the_site_is_built_without_a_complaint_and_asks_no_other_host(root, tmp_path):
     pytest.importorskip("zensical", reason="zensical builds the site: it comes with `make docs`")
-    for name in ("docs", "examples", "src"):
+    for name in ("docs", "examples", "packages", "src"):
         shutil.copytree(root / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "zensical.toml").write_bytes((root / "zensical.toml").read_bytes())
     command = [sys.executable, "-m", "zensical", "build", "--clean"]

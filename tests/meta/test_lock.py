@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from importlib.metadata import version
 
 import pytest
 from packaging.requirements import Requirement
@@ -48,6 +49,38 @@ def test_the_lock_satisfies_what_is_declared(root):
             assert wanted.specifier.contains(pin.version), f"{lock}: {wanted} against {pin}; run `make lock`"
 
 
+def beside(root) -> dict[str, dict]:
+    """The [project] table of each distribution beside palpate, by its folder."""
+    files = sorted(root.glob("packages/*/pyproject.toml"))
+    assert files
+    return {file.parent.name: tomllib.loads(file.read_text(encoding="utf-8"))["project"] for file in files}
+
+
+def test_what_the_distributions_beside_palpate_declare_is_in_its_lock(root):
+    """So that one lock serves all of them."""
+    palpate, all_beside, locked = declared(root)["project"], beside(root), pins(root, "run")
+    for folder, project in all_beside.items():
+        assert project["name"] == folder
+        assert project["version"] == palpate["version"] == version("palpate")
+        for wanted in map(Requirement, project["dependencies"]):
+            ours = {"palpate": palpate, **all_beside}.get(wanted.name)
+            if ours is not None:
+                assert wanted.specifier.contains(ours["version"]), f"{folder}: {wanted}"
+                continue
+            (pin,) = locked[canonicalize_name(wanted.name)].specifier
+            assert wanted.specifier.contains(pin.version), f"{folder}: {wanted} against {pin}"
+
+
+def test_an_extra_of_palpate_asks_a_distribution_beside_it_for_its_own(root):
+    all_beside = beside(root)
+    for extra, lines in declared(root)["project"]["optional-dependencies"].items():
+        for wanted in map(Requirement, lines):
+            if wanted.name in all_beside:
+                theirs = all_beside[wanted.name]
+                assert wanted.specifier.contains(theirs["version"]), extra
+                assert wanted.extras <= theirs.get("optional-dependencies", {}).keys(), extra
+
+
 def test_developers_run_what_users_run(root):
     run, dev = pins(root, "run"), pins(root, "dev")
     assert run
@@ -56,9 +89,9 @@ def test_developers_run_what_users_run(root):
 
 
 def test_what_breaks_by_majors_has_an_upper_bound(root):
-    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
-    extras = project["optional-dependencies"].values()
-    asked = {*project["dependencies"], *(one for extra in extras for one in extra)}
+    asked: set[str] = set()
+    for project in (declared(root)["project"], *beside(root).values()):
+        asked.update(project["dependencies"], *project.get("optional-dependencies", {}).values())
     assert {one for one in asked if "<" not in one.partition(";")[0]} == {"distributed>=2025.1"}
 
 

@@ -17,8 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
     "README.md",
     "CONTRIBUTING.md",
-    "packages/palpate-thesis/README.md",
-    "packages/palpate-references/README.md",
+    *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("packages/*/README.md")),
     *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")),
 ]
 TYPED = ("README.md", "docs/tutorial.md")

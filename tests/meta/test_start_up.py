@@ -5,7 +5,7 @@ import resource
 import subprocess
 import sys
 
-from palpate.cli._program import COMMANDS
+from palpate.cli._program import COMMANDS, added_commands
 
 HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "polars", "jinja2", "pandas", "mujoco", "sympy"}
 
@@ -59,7 +59,9 @@ def test_importing_laws_does_not_import_numba():
 
 def test_help_of_each_command_compiles_nothing():
     """All in one process: what one of them imports is still there after the last."""
-    asked = "\n".join(f"assert main(['{command}', '--help']) == 0" for command in COMMANDS)
+    asked = "\n".join(
+        f"assert main(['{command}', '--help']) == 0" for command in (*COMMANDS, *added_commands())
+    )
     loaded = modules_after(f"from palpate.cli import main\n{asked}")
     assert "cyclopts" in loaded
     assert not loaded & HEAVY

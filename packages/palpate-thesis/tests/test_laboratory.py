@@ -16,7 +16,7 @@ from palpate.bench import Experiment, build, changed, load
 from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.studies.cluster import Cluster
+from palpate_studies.cluster import Cluster
 from palpate_thesis.claims import Claim, count_in_words, count_verdicts, with_wholes
 from palpate_thesis.conditions import rougher
 from palpate_thesis.figure import studies, study

@@ -27,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     import sys
 
     from palpate.cli._help import short_help
-    from palpate.cli._program import COMMANDS, EXPANDED, TYPED, program
+    from palpate.cli._program import COMMANDS, COMPANIONS, EXPANDED, TYPED, program
     from palpate.cli._streams import guarded
     from palpate.cli._terminal import print_lines
     from palpate.cli.options.kept import expanded
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_address_space()
         if any(word.startswith(("--options", "--preset")) for word in words):
             words = expanded(words, app)
-        if words[1:] == ["-h"] and words[0] in COMMANDS:
+        if words[1:] == ["-h"] and words[0] in {*COMMANDS, *COMPANIONS}:
             print_lines(*short_help(app, words[0]))
             return 0
         EXPANDED.set(tuple(words))

@@ -29,7 +29,6 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "excite": "Design a force that identifies a surface, and predict the uncertainty.",
     "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
@@ -37,24 +36,30 @@ COMMANDS = {
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "slide": "Hold a force along an unknown curved surface while the tip moves, in simulation.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "live": "Show a pressing arm, or a log, in the browser.",
-    "study": "Run an experiment many times: grids, random points, a search; resumable.",
     "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
 }
 
 
-GROUPS = {
-    Group("From a log", sort_key=1): ("identify", "topics", "payload", "excite", "map"),
-    Group("Force loop", sort_key=2): ("tune", "certify", "press", "slide"),
-    Group("Simulate", sort_key=3): ("run", "live", "study", "export", "checks"),
-    Group("Thesis and references", sort_key=4): ("thesis", "laboratory", "references"),
-}
-"""Commands by what a user begins with."""
 _PROGRAM = Group("The program itself", sort_key=5)
+GROUPS = {
+    Group("From a log", sort_key=1): ("identify", "payload", "topics", "excite", "map"),
+    Group("Force loop", sort_key=2): ("tune", "certify", "press", "slide"),
+    Group("Simulate", sort_key=3): ("export", "run", "live", "study", "checks"),
+    Group("Thesis and references", sort_key=4): ("laboratory", "references", "thesis"),
+    _PROGRAM: ("speed", "completion"),
+}
+"""Commands by what a user begins with, in the order of the help."""
 # Commands of other distributions, by the distribution that has them.
-COMPANIONS = {"thesis": "palpate-thesis", "laboratory": "palpate-thesis", "references": "palpate-references"}
+COMPANIONS = {
+    "excite": "palpate-excitation",
+    "live": "palpate-live",
+    "study": "palpate-studies",
+    "thesis": "palpate-thesis",
+    "laboratory": "palpate-thesis",
+    "references": "palpate-references",
+}
 ENTRY_POINTS = "palpate.commands"
 """The group of entry points by which a distribution adds a command: its name, and module:function."""
 
@@ -85,13 +90,19 @@ def added_commands() -> dict[str, str]:
     return {e.name: e.value for e in sorted(entry_points(group=ENTRY_POINTS)) if e.name not in COMMANDS}
 
 
+def _file_of(module: str) -> Path:
+    """File of a module. Of its outermost package alone the import system is asked: for more it would import that."""
+    package, *inner = module.split(".")
+    spec = find_spec(package)
+    origin = Path((spec and spec.origin) or "")
+    return origin.parent.joinpath(*inner).with_suffix(".py") if inner else origin
+
+
 def _first_line(place: str) -> str:
-    """The first line of a function's docstring, from its source: the module is not imported."""
+    """The first line of a function's docstring, from its source: neither the module nor its package is imported."""
     module, _, function = place.partition(":")
     with suppress(ImportError, OSError, SyntaxError, ValueError):
-        spec = find_spec(module)
-        source = Path(spec.origin).read_bytes() if spec is not None and spec.origin else b""
-        for node in ast.parse(source).body:
+        for node in ast.parse(_file_of(module).read_bytes()).body:
             if isinstance(node, ast.FunctionDef) and node.name == function:
                 return (ast.get_docstring(node) or "").partition("\n")[0]
     return "Not readable; install its distribution again."
@@ -127,8 +138,10 @@ def program(asked: str = "") -> App:
     if asked in COMPANIONS and asked not in added:
         package = COMPANIONS[asked]
         raise InputError(f"{asked} is a command of {package}, which is not installed: pip install {package}")
-    for order, (name, place) in enumerate((own | added).items()):
+    order = [name for names in GROUPS.values() for name in names]
+    for name, place in (own | added).items():
         group = next((group for group, names in GROUPS.items() if name in names), _PROGRAM)
         text = _describe(place) if name == asked else COMMANDS.get(name) or _first_line(place)
-        app.command(place, name=name, help=text, sort_key=order, group=group)
+        key = order.index(name) if name in order else len(order)
+        app.command(place, name=name, help=text, sort_key=key, group=group)
     return app

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from palpate.cli._streams import flush
 from palpate.files import as_json
-from palpate.text import printable
+from palpate.text import duration, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -199,12 +199,10 @@ class _Lines:
         self._first: int | None = None
 
     def show(self, done: int) -> None:
-        from palpate.studies.preview import in_words
-
         self._first = done if self._first is None else self._first
         now = time.monotonic()
         if now - self._told < _EVERY or done == self._first:
             return
         self._told = now
-        left = in_words((now - self._begun) / (done - self._first) * (self._of - done))
+        left = duration((now - self._begun) / (done - self._first) * (self._of - done))
         self._screen.print(f"{self._what}: {done} of {self._of}, some {left} left", soft_wrap=True)

@@ -55,6 +55,10 @@ class SlideOptions:
         Largest friction coefficient that there may be.
     tilt
         Standard deviation of --normal in degrees.
+    step
+        Highest step that is expected, as 1:mm: the slide is slow enough to stop on it.
+    touches
+        Spacing of three light touches that measure the normal before the slide; 0:mm for none.
     gains
         Gains from palpate tune --slide; made for the arm if left out.
     seed
@@ -72,6 +76,8 @@ class SlideOptions:
     normal: Annotated[str, SIGNED] = "0,0,-1"
     mu_max: Annotated[float, SIGNED] = 0.9
     tilt: Annotated[float, SIGNED] = 7.0
+    step: Annotated[str, SIGNED] = "0:mm"
+    touches: Annotated[str, SIGNED] = "10:mm"
     gains: Path | None = None
     seed: Annotated[int, WHOLE] = 0
 
@@ -109,7 +115,7 @@ class SlideOptions:
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
         gains = gains_for(load_arm(self.arm), wanted)
-        return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt)
+        return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt, self.step, self.touches)
 
 
 def slide(

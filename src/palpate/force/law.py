@@ -125,8 +125,8 @@ class Cautious(NamedTuple):
         stage = staged(self, state, watch, desired, before, false)
         if false:
             watch = retared(self, watch)
-        known = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
-        known = taken(self, known, state, stage, watch, follow, force)
+        start = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
+        known = taken(self, start, state, stage, watch, follow, force)
         bound = bounded(self, state.bound, stage, known, watch, follow)
         backstop = guarded(self, state.backstop, state.stage, stage, watch, desired, before)
         u = backstop.care * gain(self, bound.used) * (desired - (force - watch.rest))

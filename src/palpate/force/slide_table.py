@@ -28,3 +28,7 @@ class Slide(Table):
     """Standard deviation of the curvature before any was seen [1/m]."""
     acceleration: Positive = 0.4
     """Of the tip along the surface [m/s^2]."""
+    step: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
+    """Highest step that is expected in the surface [m]: the slide is slow enough to stop on it."""
+    touches: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
+    """Spacing of three light touches that measure the normal before the slide; 0 for none [m]."""

@@ -26,7 +26,7 @@ RIGID = 1e9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Result, shown_by="palpate.report.tuning.in_python"):
+class Tuning(Result, shown_by="palpate.report.tuning.page"):
     """A tuned loop: what `palpate tune` says.
 
     Args:

@@ -11,9 +11,9 @@ from palpate.arrays import Array
 from palpate.files import write_text
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
-from palpate.force.sliding.slide_law import SLIDING_TROUBLES
+from palpate.force.sliding.slide_state import SLIDING_TROUBLES
 from palpate.force.sliding.slide_world import COLUMNS, SETTLED, Ground, figures_of
-from palpate.force.sliding.sliding_loop import CHI2_95
+from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Answer, Card, answer_page
@@ -21,6 +21,7 @@ from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _UNITS = dict.fromkeys(("normal_force", "fx", "fy", "fz"), "N") | dict.fromkeys(("x", "y", "z"), "m")
@@ -41,8 +42,7 @@ def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
     if not found.touched:
         return summary
     where = np.stack([c[axis][on] for axis in "xyz"], 1)
-    mu, K = float(c["mu"][-1]), float(c["stiffness"][-1])
-    half, ratio = 1.96 * float(c["mu_std"][-1]), float(np.exp(1.96 * c["log_std"][-1]))
+    mu, K = (Uncertain(float(c[name][-1]), float(c[f"{name}_std"][-1])) for name in ("mu", "stiffness"))
     judged = np.flatnonzero(on)[round(SETTLED * gains.arm.rate) :]
     return summary | {
         "force": {
@@ -53,8 +53,8 @@ def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
             "median_error_deg": float(np.degrees(found.normal)), "coverage": found.cone,
             "cone95_deg": float(np.degrees(CHI2_95 * np.median(c["cone"][judged]))),
         },
-        "friction": {"value": mu, "ci95": [max(mu - half, 0.0), mu + half]},
-        "stiffness": {"value": K, "ci95": [K / ratio, K * ratio]},
+        "friction": {"value": float(mu), "ci95": list(mu.ci95)},
+        "stiffness": {"value": float(K), "ci95": list(K.ci95)},
         "path_m": float(np.linalg.norm(np.diff(where, axis=0), axis=1).sum()),
         "contact_lost": found.lost,
     }  # fmt: skip
@@ -150,17 +150,18 @@ def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
     )
     normal.set_ylabel("normal's error [deg]")
     friction.plot(way, c["mu"], color=style.INK, linewidth=1.2)
-    low, high = c["mu"] - 1.96 * c["mu_std"], c["mu"] + 1.96 * c["mu_std"]
-    friction.fill_between(way, low, high, color=style.MEASURED, alpha=0.2, linewidth=0)
+    _between(friction, way, c["mu"], c["mu_std"], style.MEASURED)
     friction.axhline(summary["truth"]["friction"], **style.KNOWN)
     friction.set_ylabel("friction [1]")
-    ratio = np.exp(1.96 * c["log_std"])
     stiffness.plot(way, c["stiffness"], color=style.K, linewidth=1.2)
-    stiffness.fill_between(
-        way, c["stiffness"] / ratio, c["stiffness"] * ratio, color=style.K, alpha=0.2, linewidth=0
-    )
+    _between(stiffness, way, c["stiffness"], c["stiffness_std"], style.K)
     stiffness.axhline(summary["truth"]["stiffness"], **style.KNOWN)
     stiffness.set_ylabel("K [N/m]")
     speed.plot(way, 1e3 * c["speed"], color=style.INK, linewidth=1.2)
     speed.set(ylabel="speed [mm/s]", xlabel="path [mm]")
     return drawing
+
+
+def _between(axes: Axes, way: Array, value: Array, std: Array, color: str) -> None:
+    low, high = np.maximum(value - Z_95 * std, 0.0), value + Z_95 * std
+    axes.fill_between(way, low, high, color=color, alpha=0.2, linewidth=0)

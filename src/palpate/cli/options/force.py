@@ -72,7 +72,7 @@ class SurfaceOptions:
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest stiffness [N/m]."""
-        from palpate.excitation.quantities import spread
+        from palpate.cli.options.quantities import spread
 
         return spread("--stiffness", str(self.stiffness), "stiffness")
 
@@ -131,6 +131,10 @@ class SlideNumberOptions:
         Smallest radius of curvature of the surface, as 100:mm.
     tilt
         Standard deviation of the given normal, in degrees.
+    step
+        Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it.
+    touches
+        Spacing of three light touches that measure the normal before the slide; 0:mm for none.
     """
 
     slide: Annotated[bool, FLAG] = False
@@ -138,13 +142,19 @@ class SlideNumberOptions:
     speed: Annotated[str, SIGNED] = "30:mm/s"
     radius: Annotated[str, SIGNED] = "100:mm"
     tilt: Annotated[float, SIGNED] = 7.0
+    step: Annotated[str, SIGNED] = "0:mm"
+    touches: Annotated[str, SIGNED] = "10:mm"
 
     def added_to(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return with_slide(gains, self.mu_max, self.speed, self.radius, self.tilt) if self.slide else gains
+        numbers = self.mu_max, self.speed, self.radius, self.tilt, self.step, self.touches
+        return with_slide(gains, *numbers) if self.slide else gains
 
 
-def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float) -> Gains:
+# More than seven arguments: each is an option as typed.
+def with_slide(
+    gains: Gains, mu_max: float, speed: str, radius: str, tilt: float, step: str, touches: str
+) -> Gains:
     """Gains with the numbers of a slide, as typed.
 
     Raises:
@@ -157,6 +167,7 @@ def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float
     from palpate.force.slide_table import Slide
 
     v, R = in_si("--speed", speed, "velocity"), in_si("--radius", radius, "length")
+    lengths = {"--step": in_si("--step", step, "length"), "--touches": in_si("--touches", touches, "length")}
     if not 0.0 < mu_max <= 2.0:
         raise InputError(
             f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {mu_max:g}"
@@ -169,7 +180,12 @@ def with_slide(gains: Gains, mu_max: float, speed: str, radius: str, tilt: float
         raise InputError(f"--radius must be from 1 mm to 10 km, got {R:g} m")
     if not 0.1 <= tilt <= 25.0:
         raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {tilt:g}")
-    return replace(gains, slide=Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt)))
+    for name, length in lengths.items():
+        if not 0.0 <= length <= 0.1:
+            raise InputError(f"{name} must be from 0 to 100 mm, got {1e3 * length:g} mm")
+    height, spacing = lengths.values()
+    numbers = Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt), step=height, touches=spacing)
+    return replace(gains, slide=numbers)
 
 
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))

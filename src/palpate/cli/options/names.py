@@ -1,4 +1,4 @@
-"""Names that a shell completes: arms, experiments, studies, presets, models. Others are taken too, as of files."""
+"""Names that a shell completes: arms, experiments, presets, models. Others are taken too, as of files."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def _known_names(*names: str) -> Any:
     return Literal[names] | str
 
 
-def _shipped_names(*folders: str) -> Any:
-    """The same of the files that come with palpate in some of its folders."""
-    files = [path for folder in folders for path in (Path(__file__).parents[2] / folder).glob("*.toml")]
+def shipped_names(*folders: str, package: Path = Path(__file__).parents[2]) -> Any:
+    """One of the names of the TOML files in some folders of a package, or another."""
+    files = [path for folder in folders for path in (package / folder).glob("*.toml")]
     return _known_names(*sorted(path.stem for path in files))
 
 
@@ -39,14 +39,12 @@ if TYPE_CHECKING:
     Physics = str
     Preset = str
     SerialArm = str
-    Study = str
 else:
     Controller = _known_names("cautious", "hybrid", "proportional-integral", "impedance")
-    Experiment = _shipped_names("bench/experiments", "bench/presses")
-    LoopArm = _shipped_names("force/arms")
+    Experiment = shipped_names("bench/experiments", "bench/presses")
+    LoopArm = shipped_names("force/arms")
     Model = _known_names(*MODELS)
     Mode = _known_names("torque", "position")
     Physics = _known_names("own", "mujoco")
-    Preset = _shipped_names("logs/presets")
-    SerialArm = _shipped_names("robots/serial/arms")
-    Study = _shipped_names("studies/shipped")
+    Preset = shipped_names("logs/presets")
+    SerialArm = shipped_names("robots/serial/arms")

@@ -7,6 +7,7 @@ from typing import Any
 from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.force.slide_table import Slide
+from palpate.force.sliding.touches import slope_of_touches
 
 LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
 """Largest terms of the domain; measured by benchmarks/force/sliding.py."""
@@ -35,8 +36,17 @@ def slide_terms(gains: Gains, stiffness: float, friction: float, radius: float) 
         "lag": share * v * UNSURE / radius,
         "turning": share * (v * (gains.theta + AHEAD) / radius) ** 2,
         "sticking": friction * F / (slide.ratio * seen * radius),
-        "tilt": friction * slide.slope / slide.ratio,
+        "tilt": friction * _slope(gains, seen) / slide.ratio,
     }
+
+
+def _slope(gains: Gains, stiffness: float) -> float:
+    """Standard deviation of the normal at the beginning, each way [rad]."""
+    slide = numbers_of(gains)
+    if slide.touches == 0.0:
+        return slide.slope
+    unsure = gains.arm.sensor.noise / stiffness
+    return min(float(slope_of_touches(slide.touches, unsure, slide.turning)), slide.slope)
 
 
 def obeys(terms: dict[str, float]) -> bool:

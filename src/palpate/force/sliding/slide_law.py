@@ -2,312 +2,122 @@
 
     velocity = g(K_u) (F_d - F_m) n + v,    F_m = max(f.n, |f|/sqrt(1 + mu_max^2)),    v perpendicular to n + H v L
 
-n and H are those of the tangent filter, L the sum of the lags, g the cautious gain with the K_u of the press. K_u does
-not change in a slide: motion along a wrong normal looks like stiffness. F_m is at most the normal force of any normal
-that friction up to mu_max admits, so that no wrong normal presses harder than F_d sqrt(1 + mu_max^2).
+n and H are those of the tangent filter (`tangent_filter.py`), L the sum of the lags, g the cautious gain with the K_u
+of the press. K_u does not change in a slide: motion along a wrong normal looks like stiffness. F_m is at most the
+normal force of any normal that friction up to mu_max admits, so that no wrong normal presses harder than
+F_d sqrt(1 + mu_max^2).
 
-The tangent filter is an extended Kalman filter. In the frame (e1, e2, n) of the estimated normal n, which points into
-the surface, its state is
-
-    N normal force [N], g (2) true normal less n, H (3) curvature [1/m], ln K, mu, phi (2) tangential over normal force
-
-A motion (d, dz) of the tip, d along the surface and dz into it, predicts
-
-    N += K (dz + g.d + d'H d/2)     g += H d     phi += (mu d/|d| - phi)(1 - exp(-|d| K r/(mu N)))
-
-the last being Dahl's friction with tangential stiffness r K. A reading f is three scalar rows: f.n = N - N phi.g, and
-f_t/f.n = g + phi. The frame turns by g after each, so that g is zero again.
+A jump of the force and a refuted normal halt the slide: the tip stops at once, nothing is estimated, and the force
+alone is controlled along n. Once it is held for the loop's lag, the filter begins again at an uncertain normal.
 """
 
-from typing import NamedTuple
-
-from palpate._jit import law, part
-from palpate._vector import ZERO3, Vec3, exp, sqrt
-from palpate.force.flat import GUARD, STATE, guard_in, put_guard, put_state, state_in
+from palpate._jit import law
+from palpate._vector import ZERO3, Vec3, sqrt
+from palpate.force.flat import guard_in, put_guard, put_state, state_in
 from palpate.force.guard import (
     BLIND,
     FAR,
     FINE,
     LATE,
+    LEAST,
     LIMITED,
-    QUIET,
     SATURATED,
     SCALES,
     STALE,
-    TROUBLES,
     safe_step,
 )
-from palpate.force.law import Cautious, gain
+from palpate.force.law import gain
+from palpate.force.sliding.slide_state import (
+    ALL,
+    ALONG,
+    AWAY,
+    AXIS,
+    BOUND,
+    DIRECTION,
+    EDGE,
+    FELT,
+    FRAMES,
+    HALT,
+    JERKS,
+    LAW,
+    LOSS,
+    LOST,
+    MOVE,
+    NORMAL,
+    ORIGIN,
+    PHASE,
+    POSITION,
+    PRESS,
+    READ_AT,
+    REFUTED,
+    ROUGH,
+    SAFETY,
+    SEEN,
+    SILENT,
+    SLIDE,
+    SLOPE,
+    SLOW,
+    STEPPED,
+    TICKS,
+    TOUCHES,
+    TROUBLE,
+    UNCHANGED,
+    VELOCITY,
+    beside,
+    cross,
+    press_again,
+    put_vector,
+    unit,
+    vector_at,
+    within,
+)  # fmt: skip
+from palpate.force.sliding.tangent_filter import (
+    C11,
+    C12,
+    C22,
+    F1,
+    F2,
+    FORCE,
+    G1,
+    G2,
+    MU,
+    STIFF,
+    begin,
+    correct,
+    predict,
+    slope_variance,
+    stiffness_of,
+    turned,
+    variance,
+)  # fmt: skip
+from palpate.force.sliding.touches import next_touch, touched
 from palpate.force.stage import LOCKED
 
-FORCE, G1, G2, H11, H12, H22, LOG_K, MU, F1, F2 = range(10)
-STATES = 10
-COVARIANCE = STATES
-"""Place of the covariance, row by row, behind the state."""
-BASE = STATES + STATES * STATES
-"""Place of K at the beginning [N/m], in units of which the state has ln K."""
-FILTER = BASE + 1
-"""Numbers of the filter."""
-HUBER = 3.0
-"""Deviations from which an innovation counts no more than linearly."""
-WANDER = 0.05
-"""Standard deviation of phi about Dahl's law after one length of its relaxation, in units of mu."""
-STICKS = 0.15
-"""The same in units of what phi lacks of mu: what Dahl's law leaves of a contact that sticks."""
-CHANGES = 0.1, 0.3
-"""Standard deviations of ln K and of mu along a metre of path, per square root of it."""
-
-
-@law
-def add_row(s, to, source, factor):
-    """Adds a factor times one row of the covariance to another, and the same of the columns."""
-    for j in range(STATES):
-        s[COVARIANCE + STATES * to + j] += factor * s[COVARIANCE + STATES * source + j]
-    for j in range(STATES):
-        s[COVARIANCE + STATES * j + to] += factor * s[COVARIANCE + STATES * j + source]
-
-
-@law
-def scale_row(s, to, factor):
-    """Multiplies a row and a column of the covariance."""
-    for j in range(STATES):
-        s[COVARIANCE + STATES * to + j] *= factor
-    for j in range(STATES):
-        s[COVARIANCE + STATES * j + to] *= factor
-
-
-@law
-def variance(s, i, j):
-    """An entry of the covariance."""
-    return s[COVARIANCE + STATES * i + j]
-
-
-@law
-def spread(s, i, more):
-    """Adds process noise to a state."""
-    s[COVARIANCE + (STATES + 1) * i] += more
-
-
-@law
-def stiffness_of(s):
-    """Stiffness K of the surface [N/m]."""
-    return s[BASE] * exp(s[LOG_K])
-
-
-@law
-def predict(s, d1, d2, dz, ratio, turning, noise):
-    """The state after a motion of the tip; `turning` is the noise of curvature [1/m^3], `noise` that of dz [m]."""
-    way = sqrt(d1 * d1 + d2 * d2)
-    stiffness = stiffness_of(s)
-    rise = dz + s[G1] * d1 + s[G2] * d2
-    bend = 0.5 * (s[H11] * d1 * d1 + 2.0 * s[H12] * d1 * d2 + s[H22] * d2 * d2)
-    # e^x acts on the covariance as a product of shears, each of one row and its column
-    add_row(s, FORCE, LOG_K, stiffness * (rise + bend))
-    add_row(s, FORCE, G1, stiffness * d1)
-    add_row(s, FORCE, G2, stiffness * d2)
-    add_row(s, FORCE, H11, 0.5 * stiffness * d1 * d1)
-    add_row(s, FORCE, H12, stiffness * d1 * d2)
-    add_row(s, FORCE, H22, 0.5 * stiffness * d2 * d2)
-    add_row(s, G1, H11, d1)
-    add_row(s, G1, H12, d2)
-    add_row(s, G2, H12, d1)
-    add_row(s, G2, H22, d2)
-    s[FORCE] += stiffness * (rise + bend)
-    s[G1] += s[H11] * d1 + s[H12] * d2
-    s[G2] += s[H12] * d1 + s[H22] * d2
-    spread(s, FORCE, (stiffness * noise) ** 2)
-    if way <= 0.0:
-        return
-    mu = max(s[MU], 0.02)
-    lengths = way * ratio * stiffness / (mu * max(s[FORCE], 0.1))
-    kept = exp(-lengths)
-    for i in range(2):
-        along = (d1 if i == 0 else d2) / way
-        lacks = s[MU] * along - s[F1 + i]
-        scale_row(s, F1 + i, kept)
-        add_row(
-            s, F1 + i, MU, along * (1.0 - kept) - lacks * kept * lengths / mu
-        )  # while it sticks, nothing tells mu
-        s[F1 + i] += (1.0 - kept) * lacks
-        spread(s, F1 + i, ((WANDER * max(mu, 0.05)) ** 2 + (STICKS * lacks) ** 2) * (1.0 - kept * kept))
-    for i in range(H11, H22 + 1):
-        spread(s, i, turning * way * (0.5 if i == H12 else 1.0))
-    spread(s, LOG_K, CHANGES[0] ** 2 * way)
-    spread(s, MU, CHANGES[1] ** 2 * way)
-
-
-# More than seven arguments: a row of three entries needs no array.
-@law
-def correct(s, one, weight1, two, weight2, three, weight3, innovation, noise, gate, work):
-    """A reading that is w1 x1 + w2 x2 + w3 x3 and a noise of this variance; `work` has room for STATES numbers.
-
-    Returns the innovation in its standard deviations; beyond `gate` of them nothing is corrected.
-    """
-    for i in range(STATES):
-        at = COVARIANCE + STATES * i
-        work[i] = weight1 * s[at + one] + weight2 * s[at + two] + weight3 * s[at + three]
-    total = weight1 * work[one] + weight2 * work[two] + weight3 * work[three] + noise
-    if not total > 0.0:
-        return 0.0
-    deviations = innovation / sqrt(total)
-    if abs(deviations) > gate:
-        return deviations
-    if abs(deviations) > HUBER:
-        total *= abs(deviations) / HUBER
-    for i in range(STATES):
-        s[i] += work[i] / total * innovation
-    for i in range(STATES):
-        for j in range(STATES):
-            s[COVARIANCE + STATES * i + j] -= work[i] * work[j] / total
-    return deviations
-
-
-# More than seven arguments: each is a number of the prior.
-@law
-def begin(s, force, slope, curvature, stiffness, relative, mu, mu_std, noise):
-    """The filter at a normal that is known to a standard deviation `slope` [rad] in each direction.
-
-    `stiffness` is known to `relative` of itself, `curvature` is the standard deviation of one that is zero [1/m].
-    """
-    for i in range(FILTER):
-        s[i] = 0.0
-    s[FORCE], s[BASE], s[MU] = force, stiffness, mu
-    spread(s, FORCE, noise * noise)
-    spread(s, G1, slope * slope)
-    spread(s, G2, slope * slope)
-    for i in range(H11, H22 + 1):
-        spread(s, i, curvature * curvature * (0.25 if i == H12 else 1.0))
-    spread(s, LOG_K, relative * relative)
-    spread(s, MU, mu_std * mu_std)
-    spread(s, F1, mu * mu + mu_std * mu_std)
-    spread(s, F2, mu * mu + mu_std * mu_std)
-
-
-@law
-def unit(a, otherwise):
-    """A vector's direction; of one without length another."""
-    length = sqrt(a @ a)
-    return a / length if length > 1e-12 else otherwise
-
-
-@law
-def cross(a, b):
-    """Vector product of two vectors."""
-    return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
-
-
-@law
-def beside(n):
-    """A unit vector that is perpendicular to n."""
-    other = Vec3(1.0, 0.0, 0.0) if abs(n.x) < 0.7 else Vec3(0.0, 1.0, 0.0)
-    return unit(other - (other @ n) * n, other)
-
-
-PRESS, SLIDE = 0.0, 1.0
-"""Phases: the cautious law alone, and the slide."""
-ALONG, REFUTED, STEPPED, JERKS, LOST, DIRECTION, FRAMES = 20.0, 21.0, 22.0, 23.0, 24.0, 25.0, 26.0
-SLIDING_TROUBLES = TROUBLES | {
-    ALONG: "the direction asked for is along the normal: the tip does not slide; ask for one along the surface",
-    REFUTED: "the force leaves the friction cone about the estimated normal: the normal was wrong, or friction is "
-    "above mu_max; the tip stopped, and the normal is found again",
-    STEPPED: "the force jumped without turning: a step, an edge or a hole in the surface; the tip slows down",
-    JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
-    LOST: "contact was lost: the tip stopped sliding, and approaches again",
-    FRAMES: "the force is not along the direction into the surface: force and position need the same axes, those of "
-    "the base; the tip was held",
-    DIRECTION: "the direction is no number: the tip does not slide",
-}
 CONE = 0.07
 """Angle by which a force may leave the friction cone [rad]: 4 degrees."""
+BAND = 0.1
+"""Share of F_d within which the force counts as held."""
 GATE = 6.0
 """Deviations of the normal force that are a step's."""
+AFTER = 0.5, 0.1
+"""Standard deviations of the normal after a step, each way [rad], and of mu: an edge of 45 degrees is within two."""
 JERKY = 6.0
 """Mean squared deviation of the force's angle that is said as stick-slip."""
 WORTH = 0.06
 """Share of F_d that the slope's uncertainty may cost: the speed is limited so that it costs no more."""
+EXCESS = 0.3
+"""Share of F_d by which an edge of 45 degrees may raise the force within the loop's lag, where steps are expected."""
 SLOWEST = 0.1
 """Share of the speed that is kept however unsure the slope is."""
 CROOKED = 0.4
 """Cosine between force and direction below which a press is in other axes: friction of 0.9 and a tilt of 20 degrees
 have 0.48."""
+LIGHT = 0.3
+"""Share of F_d with which a normal is touched."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
 """Friction of dry contacts: mean and standard deviation before any was felt."""
-
-
-@part
-class Sliding(NamedTuple):
-    """The law's numbers.
-
-    Args:
-        press: the cautious law of the press, and limits of arm and sensor.
-        into: direction into the surface, in which it is looked for (unit vector, base's axes).
-        slope: standard deviation of that direction against the surface's normal, each way [rad].
-        mu_max: largest friction that there may be.
-        ratio: tangential over normal stiffness of the contact.
-        turning: noise of the curvature [1/m^3].
-        curvature: standard deviation of the curvature before any was seen [1/m].
-        speed: of the slide [m/s].
-        acceleration: of the tip along the surface [m/s^2].
-        lead: sum of the lags from the reading to the tip [s].
-        late: age of a reading in ticks, 0 to 1.
-        encoder: standard deviation of a measured position [m].
-        doubt: standard deviation of the lag [s].
-    """
-
-    press: Cautious
-    into: Vec3
-    slope: float
-    mu_max: float
-    ratio: float
-    turning: float
-    curvature: float
-    speed: float
-    acceleration: float
-    lead: float
-    late: float
-    encoder: float
-    doubt: float
-
-    def start(self, s):
-        """In free motion, knowing nothing but a direction into the surface: fills a state, shape (SIZE,)."""
-        for i in range(len(s)):
-            s[i] = 0.0
-        press_again(self, s, self.into, FINE)
-
-
-(PHASE, TROUBLE, SILENT, UNCHANGED, TICKS, BOUND, SLOW, ROUGH, WAY, LOSS) = (FILTER + i for i in range(10))
-"""Places behind the filter: phase, trouble, ticks without a good reading and since one changed, ticks of all, K_u,
-share of the speed after a step, mean squared deviation of the force's angle, path in lengths of the relaxation of
-friction, and ticks without contact."""
-(NORMAL, EDGE, VELOCITY, READ_AT, SEEN, FELT, POSITION, ORIGIN, AXIS) = (
-    FILTER + 10 + 3 * i for i in range(9)
-)
-"""Vectors: normal, e1, velocity along the surface [m/s], position at the last reading and in the last tick as the
-sensor saw it [m], last force [N], last position and its origin [m]; then the sensor's low-pass of three axes."""
-LAW = AXIS + 9
-SAFETY = LAW + STATE
-SIZE = SAFETY + GUARD
-"""Places of the cautious law's state and of its guard's; numbers of a state."""
-
-
-@law
-def vector_at(s, at):
-    """Three numbers of a state as a vector."""
-    return Vec3(s[at], s[at + 1], s[at + 2])
-
-
-@law
-def put_vector(s, at, v):
-    """Puts a vector into a state."""
-    s[at], s[at + 1], s[at + 2] = v.x, v.y, v.z
-
-
-@law
-def within(v, most):
-    """Whether each component is a number and at most so large."""
-    return abs(v.x) <= most and abs(v.y) <= most and abs(v.z) <= most
 
 
 # More than seven arguments: the readings of a tick, and the state with its room.
@@ -345,9 +155,14 @@ def slide_step(law, s, work, desired, force, position, direction, missed):
     put_vector(s, SEEN, seen)
     put_vector(s, FELT, force)
     if s[PHASE] == PRESS:
-        velocity = press_tick(law, s, late, desired, force, position, missed)
+        light = desired if s[TOUCHES] == ALL else max(LIGHT * desired, LEAST * c.noise)
+        velocity = press_tick(law, s, late, light, force, position, missed)
+    elif s[PHASE] == MOVE:
+        put_vector(s, READ_AT, late)
+        velocity = next_touch(law, s, force, position) if s[UNCHANGED] * c.tick <= c.theta else ZERO3
     else:
-        s[TROUBLE] = LATE if gap else FINE
+        if s[HALT] == 0.0:
+            s[TROUBLE] = LATE if gap else FINE
         if not same:
             learn(law, s, work, late, desired, force)
         velocity = command(law, s, desired, force, direction)
@@ -356,17 +171,6 @@ def slide_step(law, s, work, desired, force, position, direction, missed):
         press_again(law, s, law.into, BLIND)
         return ZERO3
     return velocity * (c.speed / fast) if fast > c.speed else velocity
-
-
-@law
-def press_again(law, s, n, trouble):
-    """In free motion, with a direction into the surface."""
-    s[PHASE], s[TROUBLE], s[SILENT], s[LOSS] = PRESS, trouble, 0.0, 0.0
-    put_vector(s, NORMAL, n)
-    put_vector(s, EDGE, beside(n))
-    put_vector(s, VELOCITY, ZERO3)
-    put_state(s[LAW:SAFETY], law.press.start())
-    put_guard(s[SAFETY:], QUIET)
 
 
 @law
@@ -387,17 +191,33 @@ def press_tick(law, s, late, desired, force, position, missed):
         return ZERO3
     if press.stage.phase == LOCKED and size > 0.5 * desired and guard.trouble == FINE:
         stiffness = max(c.cap * press.known.found.x, c.floor)
-        relative = min(max(c.cap * press.known.std.x / stiffness, 0.1), 0.5)
+        if s[TOUCHES] < ALL:
+            over, sd = press.watch.mean - press.watch.rest - desired, c.cap * press.known.std.x
+            touched(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
+            return ZERO3
+        tilt = 2.0 * s[SLOPE] * s[SLOPE] * (1.0 + c.compliance * stiffness)
+        relative = min(sqrt((c.cap * press.known.std.x / stiffness) ** 2 + tilt * tilt), 0.5)
         s[PHASE], s[BOUND] = SLIDE, press.bound.used
-        slide_from(law, s, unit(force, n), size, stiffness, relative, law.slope)
+        start = n if law.spacing > 0.0 else unit(force, n)
+        slide_from(law, s, start, size, stiffness, relative, s[SLOPE], LIKELY[0], LIKELY[1])
     return speed * n
 
 
+# More than seven arguments: each is a number of the prior.
 @law
-def slide_from(law, s, n, size, stiffness, relative, slope):
+def slide_from(law, s, n, size, stiffness, relative, slope, mu, mu_std):
     """The slide at its beginning, with a normal that is known to `slope` [rad] each way."""
-    begin(s, size, slope, law.curvature, stiffness, relative, LIKELY[0], LIKELY[1], law.press.noise)
-    s[SLOW], s[ROUGH], s[WAY], s[LOSS] = 1.0, 1.0, 0.0, 0.0
+    begin(s, size, slope, law.curvature, stiffness, relative, mu, mu_std, law.press.noise)
+    s[SLOW], s[ROUGH], s[HALT], s[LOSS] = 1.0, 1.0, 0.0, 0.0
+    put_vector(s, NORMAL, n)
+    put_vector(s, EDGE, beside(n))
+    put_vector(s, VELOCITY, ZERO3)
+
+
+@law
+def halt(s, n, trouble):
+    """Stops the tip, with a normal along which the force is controlled until the slide goes on."""
+    s[HALT], s[TROUBLE] = 1.0, trouble
     put_vector(s, NORMAL, n)
     put_vector(s, EDGE, beside(n))
     put_vector(s, VELOCITY, ZERO3)
@@ -410,34 +230,36 @@ def learn(law, s, work, late, desired, force):
     e2 = cross(n, e1)
     way = late - vector_at(s, READ_AT)
     put_vector(s, READ_AT, late)
+    if s[HALT] > 0.0:
+        return
     d1, d2, dz = way @ e1, way @ e2, way @ n
-    length = max(s[MU], 0.05) * max(s[FORCE], 0.1) / (law.ratio * stiffness_of(s))
-    s[WAY] += sqrt(d1 * d1 + d2 * d2) / length
     predict(s, d1, d2, dz, law.ratio, law.turning, law.encoder + law.doubt * abs(dz) / c.period)
     f, f1, f2 = force @ n, force @ e1, force @ e2
     if f < max(c.level, 0.1 * desired):
         return
     noise, N = c.noise * c.noise, s[FORCE]
     # the product of two uncertain states is noise here: before slip no reading shows the normal
-    slope, friction = variance(s, G1, G1) + variance(s, G2, G2), variance(s, F1, F1) + variance(s, F2, F2)
+    slope = (variance(s, G1, G1) + variance(s, G2, G2)) / (s[STIFF] * s[STIFF])
+    friction = variance(s, F1, F1) + variance(s, F2, F2)
     curved = N * N * slope * (friction + slope)
-    if abs(correct(s, FORCE, 1.0, G1, -N * s[F1], G2, -N * s[F2], f - N, noise + curved, GATE, work)) > GATE:
-        s[FORCE], s[SLOW], s[TROUBLE] = f, 0.5, STEPPED
-        spread(s, FORCE, noise)
-        spread(s, G1, 0.1 * law.slope * law.slope)
-        spread(s, G2, 0.1 * law.slope * law.slope)
-    angle = noise / (f * f) * max(1.0, s[ROUGH])
-    one = correct(s, G1, 1.0, F1, 1.0, F2, 0.0, f1 / f - s[G1] - s[F1], angle, 1e9, work)
-    two = correct(s, G2, 1.0, F2, 1.0, F1, 0.0, f2 / f - s[G2] - s[F2], angle, 1e9, work)
+    w1, w2 = -N * s[F1] / s[STIFF], -N * s[F2] / s[STIFF]
+    jump = correct(s, FORCE, 1.0, G1, w1, G2, w2, f - N, noise + curved, GATE, work)
+    if abs(jump) > GATE:
+        halt(s, n, STEPPED)
+        return
+    angle, w = noise / (f * f) * max(1.0, s[ROUGH]), 1.0 / s[STIFF]
+    one = correct(s, G1, w, F1, 1.0, F2, 0.0, f1 / f - w * s[G1] - s[F1], angle, 1e9, work)
+    two = correct(s, G2, w, F2, 1.0, F1, 0.0, f2 / f - w * s[G2] - s[F2], angle, 1e9, work)
     both = 0.5 * (one * one + two * two) * max(1.0, s[ROUGH])
     s[ROUGH] += 0.02 * (min(both, 100.0) - s[ROUGH])
     if s[ROUGH] > JERKY and s[TROUBLE] == FINE:
         s[TROUBLE] = JERKS
     s[MU], s[FORCE] = min(max(s[MU], 0.0), law.mu_max), max(s[FORCE], 0.0)
-    turned = unit(n + s[G1] * e1 + s[G2] * e2, n)
-    s[G1], s[G2] = 0.0, 0.0
-    put_vector(s, NORMAL, turned)
-    put_vector(s, EDGE, unit(e1 - (e1 @ turned) * turned, beside(turned)))
+    s[STIFF] = max(s[STIFF], 0.05)
+    t1, t2 = turned(s)
+    n = unit(n + t1 * e1 + t2 * e2, n)
+    put_vector(s, NORMAL, n)
+    put_vector(s, EDGE, unit(e1 - (e1 @ n) * n, beside(n)))
     s[SLOW] = min(s[SLOW] + c.period / RECOVERY, 1.0)
 
 
@@ -455,16 +277,24 @@ def command(law, s, desired, force, direction):
         put_vector(s, VELOCITY, ZERO3)
         return ZERO3
     if size > 0.3 * desired and normal < size * cone_of(law):
-        slide_from(law, s, unit(force, n), size, stiffness_of(s), 0.3, 2.0 * law.slope)
-        s[TROUBLE] = REFUTED
-        return ZERO3
+        n = unit(force, n)
+        halt(s, n, REFUTED)
     s[LOSS] = s[LOSS] + 1.0 if normal < max(c.level, 0.05 * desired) else 0.0
     if s[LOSS] * c.tick > 2.0 * c.theta:
         press_again(law, s, n, LOST)
         return ZERO3
     felt = max(normal, size / sqrt(1.0 + law.mu_max * law.mu_max))
+    if s[TROUBLE] == FINE and abs(s[FORCE] - desired) > BAND * desired:
+        s[TROUBLE] = AWAY
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
+    if s[HALT] > 0.0:
+        s[HALT] = s[HALT] + 1.0 if abs(felt - desired) < BAND * desired else 1.0
+        if s[HALT] * c.tick > law.lead:
+            relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
+            slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], s[MU], AFTER[1])
+            s[SLOW] = 0.5
+        return press * n
     v = along_surface(law, s, desired, direction)
     put_vector(s, VELOCITY, v)
     return press * n + v
@@ -477,8 +307,8 @@ def along_surface(law, s, desired, direction):
     e2 = cross(n, e1)
     asked = sqrt(direction @ direction)
     wanted, v1, v2 = ZERO3, v @ e1, v @ e2
-    bend = (s[H11] * v1 + s[H12] * v2) * e1 + (s[H12] * v1 + s[H22] * v2) * e2
-    ahead = unit(n + law.lead * bend, n)
+    bend = (s[C11] * v1 + s[C12] * v2) * e1 + (s[C12] * v1 + s[C22] * v2) * e2
+    ahead = unit(n + (law.lead / s[STIFF]) * bend, n)
     flat = direction - (direction @ ahead) * ahead
     if not asked < 1e6:
         s[TROUBLE] = DIRECTION
@@ -486,8 +316,10 @@ def along_surface(law, s, desired, direction):
         s[TROUBLE] = ALONG
     elif asked > 0.0 and s[LOSS] == 0.0:
         stiffness = s[BOUND] / (1.0 + c.compliance * s[BOUND])
-        slope = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 1e-12))
+        slope = sqrt(max(slope_variance(s), 1e-12))
         sure = max(WORTH * c.alpha * desired / (stiffness * c.theta * slope), SLOWEST * law.speed)
+        if stiffness * law.step > EXCESS * desired:
+            sure = min(sure, EXCESS * desired / (stiffness * law.lead))
         wanted = min(law.speed * min(asked, 1.0) * s[SLOW], sure) * unit(flat, e1)
     v = v - (v @ ahead) * ahead
     change = wanted - v
@@ -512,10 +344,10 @@ def followed_tip(c, s, position):
     origin, q = vector_at(s, ORIGIN), vector_at(s, POSITION)
     p = position - origin
     put_vector(s, POSITION, p)
-    return (
-        Vec3(axis(c, s, AXIS, q.x, p.x), axis(c, s, AXIS + 3, q.y, p.y), axis(c, s, AXIS + 6, q.z, p.z))
-        + origin
-    )
+    x = axis(c, s, AXIS, q.x, p.x)
+    y = axis(c, s, AXIS + 3, q.y, p.y)
+    z = axis(c, s, AXIS + 6, q.z, p.z)
+    return Vec3(x, y, z) + origin
 
 
 @law

@@ -18,29 +18,28 @@ from palpate.force.flat import flattened
 from palpate.force.gains import Gains
 from palpate.force.law import gain
 from palpate.force.simulated_press import world_of
-from palpate.force.sliding.slide_law import (
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import (
     BOUND,
-    G1,
-    G2,
-    JERKS,
-    LOG_K,
-    MU,
     NORMAL,
     PHASE,
-    REFUTED,
     SIZE,
     SLIDE,
-    STATES,
-    STEPPED,
     TROUBLE,
     put_vector,
-    slide_step,
-    stiffness_of,
     unit,
-    variance,
     vector_at,
-)  # fmt: skip
-from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, numbers_in, sliding
+)
+from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, Z_95, numbers_in, sliding
+from palpate.force.sliding.tangent_filter import (
+    BASE,
+    MU,
+    STATES,
+    STIFF,
+    slope_variance,
+    stiffness_of,
+    variance,
+)
 
 PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP = (float(i) for i in range(8))
 SHAPES = {
@@ -52,8 +51,8 @@ LAWS = {
     "sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE,
 }  # fmt: skip
 COLUMNS = (
-    "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness", "log_std",
-    "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
+    "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness",
+    "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
 )  # fmt: skip
 """Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
 speed commanded along the surface [m/s], reading [N], friction as it acts."""
@@ -260,9 +259,9 @@ def note(ground, s, tip, n, velocity, reading, mean, row):
     put_vector(row, 1, tip.x)
     put_vector(row, 4, n)
     row[7] = sqrt(max(2.0 + 2.0 * (n @ up), 0.0))
-    row[8] = sqrt(max(variance(s, G1, G1), variance(s, G2, G2), 0.0))
+    row[8] = sqrt(slope_variance(s))
     row[9], row[10] = s[MU], sqrt(max(variance(s, MU, MU), 0.0))
-    row[11], row[12] = stiffness_of(s), sqrt(max(variance(s, LOG_K, LOG_K), 0.0))
+    row[11], row[12] = stiffness_of(s), s[BASE] * sqrt(max(variance(s, STIFF, STIFF), 0.0))
     row[13], row[14] = 0.0, s[TROUBLE]
     across = velocity - (velocity @ n) * n
     row[15] = sqrt(across @ across)
@@ -376,15 +375,13 @@ class SlideFigures:
     touched: bool  # the force was held, and the tip slid
     rms: float  # of the force error, share of F_d
     most: float  # largest error, share of F_d
-    worst: float  # largest normal force of the whole slide in F_d
+    worst: float  # largest normal force of the whole run in F_d
     lost: bool  # the true force was 0
     normal: float  # median error [rad]
     cone: float  # share of the time in which the 95 % cone holds the normal
     friction: float  # the same of mu
     stiffness: float  # the same of K
-    steps: bool  # a step was said
-    jerks: bool  # stick-slip was said
-    refuted: bool  # a normal was refuted
+    said: bool  # a trouble was shown
 
     @property
     def obeys(self) -> bool:
@@ -399,18 +396,17 @@ def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
     judged = on[round(SETTLED * gains.arm.rate) :]
     if not len(judged):
         nan = float("nan")
-        return SlideFigures(False, nan, nan, nan, True, nan, 0.0, 0.0, 0.0, False, False, False)
+        return SlideFigures(False, nan, nan, nan, True, nan, 0.0, 0.0, 0.0, False)
     error = c["normal_force"][judged] / gains.force - 1.0
     true = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
-    said = set(c["trouble"][on])
     return SlideFigures(
         True, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()),
-        float(c["normal_force"][on].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
+        float(c["normal_force"].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
         float(np.median(c["normal_error"][judged])),
         float(np.mean(c["normal_error"][judged] < CHI2_95 * c["cone"][judged])),
-        float(np.mean(np.abs(c["mu"][judged] - ground.friction) < 1.96 * c["mu_std"][judged])),
-        float(np.mean(np.abs(np.log(c["stiffness"][judged] / true)) < 1.96 * c["log_std"][judged])),
-        STEPPED in said, JERKS in said, REFUTED in said,
+        float(np.mean(np.abs(c["mu"][judged] - ground.friction) < Z_95 * c["mu_std"][judged])),
+        float(np.mean(np.abs(c["stiffness"][judged] - true) < Z_95 * c["stiffness_std"][judged])),
+        bool(c["trouble"][judged].any()),
     )  # fmt: skip
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import exp, sqrt
+from math import sqrt
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import kernel, law, reader
+from palpate._jit import kernel, law, part, reader
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -16,26 +17,17 @@ from palpate.force.flat import flattened
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST
 from palpate.force.lag import sum_of_lags
-from palpate.force.sliding import slide_law as places
+from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import numbers_of
-from palpate.force.sliding.slide_law import (
-    BASE,
-    COVARIANCE,
-    G1,
-    LOG_K,
-    MU,
-    SIZE,
-    SLIDING_TROUBLES,
-    STATES,
-    Sliding,
-    put_vector,
-    slide_step,
-    vector_at,
-)  # fmt: skip
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
+from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
 from palpate.results import Readable
 
 CHI2_95 = sqrt(5.991)
 """Deviations within which two jointly normal numbers lie with 95 %."""
+Z_95 = 1.96
+"""Deviations within which a normal number lies with 95 %."""
 DOWN = (0.0, 0.0, -1.0)
 ENCODER = 2e-6
 """Standard deviation of a measured position from tick to tick [m]: encoders of many arms resolve a micrometre."""
@@ -65,7 +57,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
         acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
-        encoder=ENCODER, doubt=UNSURE_LAG,
+        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 
 
@@ -82,22 +74,59 @@ def flat_slide(numbers, s, work, desired, force, position, direction, missed, ve
 _slide = kernel(flat_slide)
 
 
+@part
+class SlideEstimate(NamedTuple):
+    """The surface as a slide knows it.
+
+    Args:
+        normal: into the surface; before contact the direction that was given.
+        cone: half-angle of the cone about it that holds the true one with 95 % [rad].
+        friction: its coefficient; 0 before a slide.
+        friction_std: its standard deviation.
+        stiffness: as the measured position feels it [N/m]; 0 before a slide.
+        stiffness_std: its standard deviation [N/m].
+    """
+
+    normal: Vec3
+    cone: float
+    friction: float
+    friction_std: float
+    stiffness: float
+    stiffness_std: float
+
+
+@law
+def slide_estimate(s):
+    """The surface as it is known."""
+    normal = vector_at(s, places.NORMAL)
+    if s[places.PHASE] != places.SLIDE:
+        return SlideEstimate(normal, CHI2_95 * s[places.SLOPE], 0.0, 0.0, 0.0, 0.0)
+    a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
+    larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
+    friction, stiff = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, STIFF, STIFF), 0.0))
+    cone = CHI2_95 * sqrt(max(larger, 0.0)) / s[STIFF]
+    return SlideEstimate(normal, cone, s[MU], friction, s[BASE] * s[STIFF], s[BASE] * stiff)
+
+
 class Uncertain(float):
-    """A number with its uncertainty.
+    """A number that is not negative, with its uncertainty.
 
     Args:
         value: the estimate.
         std: its standard deviation.
-        ci95: the 95 % interval.
     """
 
     std: float
-    ci95: tuple[float, float]
 
-    def __new__(cls, value: float, std: float, ci95: tuple[float, float]) -> Uncertain:
+    def __new__(cls, value: float, std: float) -> Uncertain:
         one = super().__new__(cls, value)
-        one.std, one.ci95 = std, ci95
+        one.std = std
         return one
+
+    @property
+    def ci95(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        return max(float(self) - Z_95 * self.std, 0.0), float(self) + Z_95 * self.std
 
 
 class SlidingLoop(Readable):
@@ -188,35 +217,28 @@ class SlidingLoop(Readable):
     @property
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
-        if not self.sliding:
-            return CHI2_95 * self.law.slope
-        at = COVARIANCE + G1 * (STATES + 1)
-        a, b, c = self._state[at], self._state[at + 1], self._state[at + STATES + 1]
-        return CHI2_95 * sqrt(max(0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b)), 0.0))
+        return float(slide_estimate(self._state).cone)
 
     @property
     def friction(self) -> Uncertain | None:
         """Coefficient of friction; None before a slide."""
         if not self.sliding:
             return None
-        value, std = float(self._state[MU]), sqrt(max(self._variance(MU), 0.0))
-        return Uncertain(value, std, (max(value - 1.96 * std, 0.0), value + 1.96 * std))
+        now = slide_estimate(self._state)
+        return Uncertain(float(now.friction), float(now.friction_std))
 
     @property
     def stiffness(self) -> Uncertain | None:
         """Stiffness as the measured position feels it [N/m]; None before a slide."""
         if not self.sliding:
             return None
-        value, std = float(self._state[BASE] * exp(self._state[LOG_K])), sqrt(max(self._variance(LOG_K), 0.0))
-        return Uncertain(value, std * value, (value * exp(-1.96 * std), value * exp(1.96 * std)))
+        now = slide_estimate(self._state)
+        return Uncertain(float(now.stiffness), float(now.stiffness_std))
 
     @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
-
-    def _variance(self, i: int) -> float:
-        return float(self._state[COVARIANCE + i * (STATES + 1)])
 
 
 def _three(name: str, values: ArrayLike) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.studies.run_one import map_unordered
+from palpate_studies.run_one import map_unordered
 from palpate_thesis.inference.contradictions import Table
 from palpate_thesis.inference.sentences import Sentence, sentences, verdicts
 from palpate_thesis.inference.trial import Trial

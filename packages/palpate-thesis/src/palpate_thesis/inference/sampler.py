@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.studies.plan import Sobol
+from palpate_studies.plan import Sobol
 
 Evaluate = Callable[[Array, Array], Array]
 """Log-likelihoods of points, shape (n, d) -> (n,). Where one falls below its floor, the second argument of shape (n,),

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate._jit import sources_stamp
 from palpate.arrays import Array
-from palpate.studies.run_one import map_unordered
+from palpate_studies.run_one import map_unordered
 from palpate_thesis.inference import archive, sampler
 from palpate_thesis.inference.archive import Archive, Head, Tried
 from palpate_thesis.inference.sampler import Sample, Settings
@@ -25,7 +25,7 @@ from palpate_thesis.laboratory.laboratory import laboratory_at
 from palpate_thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
-    from palpate.studies.cluster import Cluster
+    from palpate_studies.cluster import Cluster
 
 Progress = Callable[[float, int, int], None]
 MOST_WRONG = 0.5
