@@ -99,7 +99,7 @@ pictures: .venv/dev.stamp ## make the film and the pictures of the README again;
 lock: .venv/python.stamp ## resolve the dependencies again and pin them with hashes
 	$(BIN)/python -m venv --clear build/lock
 	build/lock/bin/python -m pip --disable-pip-version-check --quiet install uv
-	build/lock/bin/uv $(LOCK) pyproject.toml --group build --extra live -o requirements/run.txt
+	build/lock/bin/uv $(LOCK) pyproject.toml --group build --group beside -o requirements/run.txt
 	build/lock/bin/uv $(LOCK) pyproject.toml --group dev -c requirements/run.txt -o requirements/dev.txt
 
 LOCK := pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from palpate.bench import build, load
 from palpate.bench.tables import changed, parse
-from palpate.excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
 from palpate.identification import identify
 from palpate.records import Record
-from palpate.report.excitation.table import experiment
 from palpate.signals.low_pass import LowPass
+from palpate_excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
+from palpate_excitation.report.table import experiment
 
 RUNS = 20
 SENSOR = LowPass.parse("butterworth3:120")

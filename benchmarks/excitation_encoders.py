@@ -14,10 +14,10 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.excitation import Budget, Design, KnownBandwidth, Problem, Sensors, SurfaceRange, design
-from palpate.excitation.spectra import ForceChain
 from palpate.identifiers import ContactIdentifier
 from palpate.references import Multisine
+from palpate_excitation import Budget, Design, KnownBandwidth, Problem, Sensors, SurfaceRange, design
+from palpate_excitation.spectra import ForceChain
 
 Array = NDArray[np.float64]
 

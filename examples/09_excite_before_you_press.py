@@ -8,10 +8,10 @@ gives additional information about K.
 import palpate
 from palpate.bench import build
 from palpate.bench.tables import parse
-from palpate.excitation import Budget, Problem, SurfaceRange, design
 from palpate.records import Record
-from palpate.report.excitation.table import experiment
 from palpate.signals.low_pass import LowPass
+from palpate_excitation import Budget, Problem, SurfaceRange, design
+from palpate_excitation.report.table import experiment
 
 truth = {"K": 5200.0, "B": 200.0, "M": 0.3}
 surfaces = SurfaceRange(*((value, value) for value in truth.values()))

@@ -35,7 +35,7 @@ def palpate(command: str, into: str | None = None) -> int:
     return code
 
 
-controller = [sys.executable, "-m", "palpate.wires.rtde_arm", "--address", ADDRESS, "--arm", "cell.toml"]
+controller = [sys.executable, "-m", "palpate_rehearsal.rtde_arm", "--address", ADDRESS, "--arm", "cell.toml"]
 with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()

@@ -40,7 +40,7 @@ def palpate(command: str) -> int:
 node = [
     sys.executable,
     "-m",
-    "palpate.wires.ros2_arm",
+    "palpate_rehearsal.ros2_arm",
     "--domain",
     str(DOMAIN),
     "--joints",

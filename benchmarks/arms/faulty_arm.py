@@ -1,7 +1,7 @@
-"""A stand-in of `palpate.wires` that lies from SIGUSR1 on, and keeps a trace of what it is commanded.
+"""A simulated arm of `palpate_rehearsal` that lies from SIGUSR1 on, and keeps a trace of what it is commanded.
 
-`python faulty_arm.py FAULT TRACE MODULE WORDS...` runs `palpate.wires.MODULE`. Each tick of the trace is four numbers:
-the time of this computer, the commanded position [m], the tip's position [m] and the force on the surface [N].
+`python faulty_arm.py FAULT TRACE MODULE WORDS...` runs `palpate_rehearsal.MODULE`. Each tick of the trace is four
+numbers: the time of this computer, the commanded position [m], the tip's position [m] and the force on the surface [N].
 """
 
 import importlib
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.wires import rehearsal
+from palpate_rehearsal import rehearsal
 
 HUGE = 1e30
 """A number that libfranka's floats hold, and no force or position is."""
@@ -129,7 +129,7 @@ def stamped(module: str, fault: Fault) -> None:
         state = sim.state
         sim.state = lambda number, now, values: state(number, fault.stamp(now), values)
     if module == "rtde_arm":
-        from palpate.wires.rtde_arm import Controller
+        from palpate_rehearsal.rtde_arm import Controller
 
         value = Controller.value
 
@@ -146,7 +146,8 @@ def stamped(module: str, fault: Fault) -> None:
 
         Controller.value = shown
     if module == "ros2_arm":
-        from palpate.wires import ros2_arm, ros2_messages
+        from palpate.wires import ros2_messages
+        from palpate_rehearsal import ros2_arm
 
         header, publish = ros2_messages.header, ros2_arm.Node.publish
 
@@ -185,7 +186,7 @@ def main() -> None:
     with Path(trace).open("ab", buffering=0) as file:
         install(fault, file)
         stamped(module, fault)
-        importlib.import_module(f"palpate.wires.{module}").main()
+        importlib.import_module(f"palpate_rehearsal.{module}").main()
 
 
 if __name__ == "__main__":

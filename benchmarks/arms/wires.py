@@ -63,7 +63,7 @@ def row(name: str, seconds: float, folder: Path) -> str:
     # libfranka's loop has ten times the ticks in the same lag.
     (own / "arm.toml").write_text(ARM.format(rate=rate, delay=0.1 if rate == 1000 else 0.05))
     (own / "gains.toml").write_text(gains_for(load_arm(str(own / "arm.toml")), FORCE).to_toml())
-    words = [sys.executable, "-m", f"palpate.wires.{module}", "--arm", str(own / "arm.toml"), *where]
+    words = [sys.executable, "-m", f"palpate_rehearsal.{module}", "--arm", str(own / "arm.toml"), *where]
     with subprocess.Popen([*words, "--stiffness", str(STIFFNESS)], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
         assert arm.stdout is not None
         at = address.format(line=arm.stdout.readline().strip())

@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
 from export import scenes
-from palpate.export import Request, contact_from, prepare
+from palpate_export import Request, contact_from, prepare
 
 ENGINES = {"mujoco": "MuJoCo", "mjcf-spring": "MuJoCo", "drake": "Drake", "newton": "Newton"}
 MARKS = "<!-- table: made by benchmarks/export/table.py -->", "<!-- end of table -->"

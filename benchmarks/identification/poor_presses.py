@@ -11,9 +11,9 @@ from presses import FIELDS, NAMES, SPREAD, log_of
 
 from palpate.bench import ForceSensor, given_motion, load
 from palpate.environments import KelvinVoigt
-from palpate.excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
+from palpate_excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], Array]

@@ -9,10 +9,10 @@ import numpy as np
 
 from palpate.bench import build, load
 from palpate.bench.tables import changed
-from palpate.excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
+from palpate_excitation.spectra import ForceChain, cramer_rao_bound, phase_std
 
 NAMES = ("K", "B", "M")
 FIELDS = {"K": "stiffness", "B": "damping", "M": "mass"}

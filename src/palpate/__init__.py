@@ -18,10 +18,8 @@ The rooms, each `palpate.ROOM`:
     logs            files in and out: text, Parquet, MATLAB, ROS bags, MCAP
     contact_frame   an arm's wrench and pose along the contact's normal; weighing a tool
     maps            a surface's stiffness from presses at places, and where to press next
-    excitation      design of a desired force that identifies a surface
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
-    export          an identified surface as a contact of MuJoCo, Drake or Newton
     robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
     press           any serial arm presses on a surface, in simulation
     bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
@@ -65,8 +63,6 @@ _ROOMS = (
     "contact_frame",
     "controllers",
     "environments",
-    "excitation",
-    "export",
     "force",
     "identification",
     "identifiers",

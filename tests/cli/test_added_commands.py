@@ -100,3 +100,12 @@ def test_a_command_whose_distribution_is_missing_says_how_to_get_it(monkeypatch,
     assert told.out == ""
     assert told.err.count("\n") == 1
     assert told.err.endswith(f"which is not installed: pip install {COMPANIONS[command]}\n")
+
+
+def test_a_scene_without_the_distribution_of_simulators_says_how_to_get_it(monkeypatch, capsys):
+    monkeypatch.setattr("palpate.cli.export.entry_points", lambda **_: ())
+    assert main(["export", "found.json", "--to", "newton"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert printed.err.endswith("which is not installed: pip install palpate-export\n")

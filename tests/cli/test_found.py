@@ -2,9 +2,9 @@
 
 import pytest
 
-from palpate.cli._one_log import read_found
+from palpate.cli.one_log import read_found
 from palpate.errors import InputError
-from palpate.export.contact import contact_from
+from palpate_export.contact import contact_from
 
 
 @pytest.mark.parametrize("digits", [18, 19, 400, 5000])

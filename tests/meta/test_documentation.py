@@ -46,7 +46,6 @@ def test_each_room_that_offers_names_is_in_the_reference(root):
         "identification",
         "logs",
         "signals",
-        "live",
     }
     shown = {path.stem for path in (root / "docs" / "reference").glob("*.md")}
     assert (rooms | {"press", "report"}) - inside - shown == set()
@@ -69,7 +68,7 @@ def test_the_tutorial_goes_from_a_log_to_a_certified_loop(root, tmp_path, monkey
     assert len(lines) == 8
     for line in lines:
         words, _, file = line.partition(" > ")
-        if words.startswith("palpate live"):  # it serves until it is ended, and is `tests/live`'s
+        if words.startswith("palpate live"):  # it serves until it is ended, and is tested by its own package
             continue
         assert main(shlex.split(words)[1:]) == 0, line
         told = capsys.readouterr().out

@@ -14,7 +14,7 @@ from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
 from palpate.press.tool import Command, held_tool, with_tool
-from palpate.report.press.page import notes
+from palpate.report.press import notes
 from palpate.robots import SerialArm
 
 G = 9.80665

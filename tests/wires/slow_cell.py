@@ -103,7 +103,9 @@ def child(*words: str, **environment: str):
 
 def arm(folder: Path, *words: str):
     """The arm's process and its address."""
-    return child("-m", "palpate.wires.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words)
+    return child(
+        "-m", "palpate_rehearsal.sim_arm", "--arm", str(folder / "arm.toml"), "--seconds", "60", *words
+    )
 
 
 def rows_came(path, rows=40) -> bool:

@@ -22,11 +22,11 @@ from wires.slow_cell import ALONE, DOMAIN, WORDS, child, slower_cell, while_it_p
 
 OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
 KINDS = {
-    "sim": ("palpate.wires.sim_arm", (), "{line}"),
-    "rtde": ("palpate.wires.rtde_arm", ("--address", f"{OWN}.19"), "{line}"),
-    "franka": ("palpate.wires.franka_arm", ("--address", f"{OWN}.20"), "{line}"),
+    "sim": ("palpate_rehearsal.sim_arm", (), "{line}"),
+    "rtde": ("palpate_rehearsal.rtde_arm", ("--address", f"{OWN}.19"), "{line}"),
+    "franka": ("palpate_rehearsal.franka_arm", ("--address", f"{OWN}.20"), "{line}"),
     "ros2": (
-        "palpate.wires.ros2_arm", ("--domain", str(DOMAIN)),
+        "palpate_rehearsal.ros2_arm", ("--domain", str(DOMAIN)),
         "{line}?wrench=/ft/wrench&pose=/tcp/pose&command=/command&as=twist&wrench-frame=tool&force-sign=reaction",
     ),
 }  # fmt: skip

@@ -45,7 +45,7 @@ def address():
 @contextmanager
 def controller(folder, address, *words):
     where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60")
-    with child("-m", "palpate.wires.franka_arm", *where, *words) as (process, line):
+    with child("-m", "palpate_rehearsal.franka_arm", *where, *words) as (process, line):
         assert line == f"franka:{address}"
         yield process
 

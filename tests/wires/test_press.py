@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import Limits, LostError, Rows, Sense, Task, checked, press
-from palpate.wires.rehearsal import OneDirection
+from palpate_rehearsal.rehearsal import OneDirection
 from wires.slow_cell import cell
 
 

@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
 @contextmanager
 def node(folder, *words):
     where = ("--domain", DOMAIN, "--arm", folder / "arm.toml", "--stiffness", 4000, "--seconds", 60)
-    with child("-m", "palpate.wires.ros2_arm", *where, *words, CYCLONEDDS_URI=ALONE) as (process, line):
+    with child("-m", "palpate_rehearsal.ros2_arm", *where, *words, CYCLONEDDS_URI=ALONE) as (process, line):
         assert line == f"ros2:{DOMAIN}"
         yield process
 

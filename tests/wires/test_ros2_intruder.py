@@ -80,7 +80,7 @@ def pressed(folder, capsys, kind, act, *more):
     words = ["press", "--wire", where, "--gains", str(folder / "gains.toml"), *WORDS, "--json", "--yes"]
     node = ("--domain", DOMAIN, "--arm", folder / "arm.toml", "--stiffness", 4000, "--seconds", 60)
     with (
-        child("-m", "palpate.wires.ros2_arm", *node, *more, CYCLONEDDS_URI=ALONE),
+        child("-m", "palpate_rehearsal.ros2_arm", *node, *more, CYCLONEDDS_URI=ALONE),
         intruder(kind) as (writer, now),
     ):
         while_it_presses(Path("rec") / "rows.f64", lambda: act(writer, now))

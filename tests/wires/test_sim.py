@@ -20,7 +20,8 @@ from cli.json_keys import documented
 from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from palpate.wires import LostError, open_wire, sim, sim_arm
+from palpate.wires import LostError, open_wire, sim
+from palpate_rehearsal import sim_arm
 from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
 
 

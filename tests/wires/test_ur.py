@@ -39,7 +39,7 @@ def address():
 @contextmanager
 def controller(folder, address, *words):
     where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60")
-    with child("-m", "palpate.wires.rtde_arm", *where, *words) as (process, line):
+    with child("-m", "palpate_rehearsal.rtde_arm", *where, *words) as (process, line):
         assert line == f"rtde:{address}"
         yield process
 

@@ -25,7 +25,7 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     """
     from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.maps.phantom import load_phantom, palpate_phantom
-    from palpate.report.map import page
+    from palpate.report import map as page
 
     assert phantom.map is not None
     surface = load_phantom(phantom.map)

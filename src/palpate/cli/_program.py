@@ -29,7 +29,6 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "excite": "Design a force that identifies a surface, and predict the uncertainty.",
     "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
@@ -37,7 +36,6 @@ COMMANDS = {
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "slide": "Hold a force along an unknown curved surface while the tip moves, in simulation.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "live": "Show a pressing arm, or a log, in the browser.",
     "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
@@ -55,6 +53,8 @@ GROUPS = {
 """Commands by what a user begins with, in the order of the help."""
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
+    "excite": "palpate-excitation",
+    "live": "palpate-live",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",

@@ -58,7 +58,7 @@ class ProofOptions:
     @property
     def surfaces(self) -> tuple[float, float] | None:
         """K + B/theta [N/m]."""
-        from palpate.excitation.quantities import spread
+        from palpate.cli.options.quantities import spread
 
         if self.stiffness is None:
             return None
@@ -72,7 +72,7 @@ class ProofOptions:
     @property
     def longest(self) -> float | None:
         """Longest damping time B/K [s]."""
-        from palpate.excitation.quantities import spread
+        from palpate.cli.options.quantities import spread
 
         if self.damping_time is None:
             return None
@@ -178,7 +178,7 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
     from palpate.analysis.others_controllers import STIFFEST, certify_controller
-    from palpate.excitation.quantities import quantity
+    from palpate.cli.options.quantities import quantity
     from palpate.files import MADE, write_text
 
     output.check_new(output.out, ending=".yaml")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._one_log import OneLog, answered
 from palpate.cli._terminal import KINDS, console
+from palpate.cli.one_log import OneLog, answered
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.force import IndenterOptions
@@ -173,7 +173,7 @@ def identify(
     logs = sheets_as_logs(logs, source.names, source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         return _one(log_of(logs[0]), asked, output)
-    from palpate.cli._one_log import many
+    from palpate.cli.one_log import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
     return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)

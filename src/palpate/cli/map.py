@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._one_log import OneLog
 from palpate.cli._program import command
 from palpate.cli._streams import noticed
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
+from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.log import LogOptions
@@ -291,7 +291,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
 
 
 def _write(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
-    from palpate.report.map import page
+    from palpate.report import map as page
 
     if output.figure is not None:
         from palpate.report.style import save
@@ -310,7 +310,7 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
-    from palpate.report.map import page
+    from palpate.report import map as page
 
     more = page.further(result)
     answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")

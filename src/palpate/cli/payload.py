@@ -84,7 +84,7 @@ def payload(
         found.payload.save(output.out)
         written.append(output.out)
     if report is not None:
-        from palpate.report.payload.page import page
+        from palpate.report.payload import page
 
         write_text(report, page(found, log.name))
         written.append(report)
@@ -96,7 +96,7 @@ def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
     if json:
         print_answer(found.to_json())
         return
-    from palpate.report.payload.page import sentence, table
+    from palpate.report.payload import sentence, table
 
     notes = [f"{note['code']}: {note['text']}" for note in found.notes]
     screen = show_answer(log.name, f": {sentence(found)}", [table(found)], notes)

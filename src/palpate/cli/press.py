@@ -114,7 +114,7 @@ def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
 
     from palpate.logs import write_record
     from palpate.press.summary import summarise
-    from palpate.report.press.page import write_report
+    from palpate.report.press import write_report
 
     record = changed(record, meta={**record.meta, "command": printable(command())})
     summary = signed({"command": printable(command()), **summarise(record, pressing.asked)})
@@ -126,7 +126,7 @@ def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
 
 
 def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press.page import notes, sentence, tables
+    from palpate.report.press import notes, sentence, tables
 
     if as_json:
         print_answer(summary)

@@ -178,8 +178,8 @@ def _draw(
 
 def _identify(record: Path) -> tuple[Identification | None, str]:
     """The identification of the record by `palpate identify`, or the reason for its absence."""
-    from palpate.cli._one_log import OneLog
     from palpate.cli.identify import ModelOptions
+    from palpate.cli.one_log import OneLog
 
     try:
         return OneLog(ModelOptions()).identified(record)[0], ""

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli._answer import print_answer
-from palpate.cli._one_log import read_found
 from palpate.cli._program import command
 from palpate.cli._terminal import console, place
+from palpate.cli.one_log import read_found
 from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,

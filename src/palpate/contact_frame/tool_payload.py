@@ -41,7 +41,7 @@ arm turns its tool faster."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Weighed(Result, shown_by="palpate.report.payload.in_python"):
+class Weighed(Result, shown_by="palpate.report.payload"):
     """A tool's payload, estimated from a log.
 
     Args:

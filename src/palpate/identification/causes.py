@@ -33,6 +33,13 @@ _CAUSES = {
     "blocks": Cause("differences between parts of the log", "press longer, or more often, about one depth"),
     "repetition": Cause("differences between parts of the log", "press more often"),
     "strokes": Cause("the difference between loading and unloading", "press more slowly, or more often"),
+    "dynamic stiffness": Cause(
+        "the difference between the model and the dynamic stiffness",
+        "keep the motion near one frequency and depth",
+    ),
+    "recovery": Cause(
+        "a surface that has not recovered from the contact before", "wait longer between contacts"
+    ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
     "curvature": Cause("the change of the slope over the press", "press about the force that you need"),
     "within the octave": Cause(

@@ -124,7 +124,7 @@ def _lag(choice: Choice) -> LagFound | None:
         told = prior.value + filtered != 0 or prior.std > 0
         return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "told") if told else None
     half = found.half_of(LAG) if LAG in found.names else 1.96 * prior.std
-    if half <= _NARROWER * 1.96 * prior.std and choice.explains and not lag_open(choice.problem):
+    if half <= _NARROWER * 1.96 * prior.std and not lag_open(choice.problem):
         return LagFound(found[LAG] + filtered, half / 1.96, half, "measured")
     return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "prior")
 

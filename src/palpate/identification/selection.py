@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from palpate.arrays import Mask
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.answer import Answer, unrecovered
-from palpate.identification.estimators.budget import TOUCH
+from palpate.identification.estimators.answer import Answer
+from palpate.identification.estimators.budget import TOUCH, Spread
 from palpate.identification.estimators.linearisation import Linearisation, lag_open
 from palpate.identification.estimators.octaves import Solution, estimate, held, segments_of, solve
 from palpate.identification.filters.state_variable import Chain
@@ -50,7 +51,7 @@ def answer(problem: Problem, model: Model) -> Answer:
         InputError: the stretches in contact are too short.
     """
     local, solution = _in_contact(problem, model)
-    plain = local.answered(solution)
+    plain = _with_recovery(local.answered(solution))
     wider = None if model.nonlinear else problem.with_approach
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
@@ -63,6 +64,17 @@ def answer(problem: Problem, model: Model) -> Answer:
         },
     )
     return found if found.half_of("K") < plain.half_of("K") else plain
+
+
+def _with_recovery(found: Answer) -> Answer:
+    """An answer whose stiffnesses err by what a branch still had of the contact before, where the log has several."""
+    spans = found.problem.contacts.spans
+    if "K1" not in found.names or len(spans) < 2:
+        return found
+    gap = min(after[0] - before[1] for before, after in pairwise(spans)) * found.problem.motion.chain.dt
+    left = causes.of_recovery(dict(zip(found.names, found.theta.tolist(), strict=True)), gap)
+    variance = np.array([left.get(name, 0.0) ** 2 for name in found.names])
+    return replace(found, budget={**found.budget, "recovery": Spread(variance)})
 
 
 def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
@@ -157,8 +169,6 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
     return None
 
 
-THIRD = 1 / 3
-"""Share of the force's amplitude in contact that a model may leave unexplained and still identify anything."""
 _ADDED = {
     "standard-linear-solid": ("K1", "tau"),
     "hunt-crossley": ("n",),
@@ -174,41 +184,12 @@ class Choice:
     Args:
         answer: its parameters.
         problem: the rows that it was fitted to.
-        tried: every model, and what was said of it.
+        tried: every model, and the comment on it.
     """
 
     answer: Answer
     problem: Problem
     tried: tuple[Comparison, ...]
-
-    @property
-    def explains(self) -> bool:
-        """Whether less than a third of the force's amplitude is left."""
-        return self.left < THIRD
-
-    @property
-    def left(self) -> float:
-        """Share of the force's amplitude that is left, in the octaves or in time, whichever is more."""
-        return float(np.sqrt(max(1 - min(self.answer.explained, self._follow), 0.0)))
-
-    @property
-    def _follow(self) -> float:
-        """Share of the force's variance in time that the model explains; drift of the force and its noise left aside.
-
-        The octaves do not see a force that sinks over a whole contact, as of a relaxing surface.
-        """
-        fitted, problem = self.answer.fit, self.answer.problem
-        spans = problem.spans
-        left, whole = 0.0, 0.0
-        for number in np.unique(spans):
-            own = spans == number
-            u = np.linspace(-1.0, 1.0, int(own.sum()))
-            residuals, force = fitted.residuals[own], problem.force[own]
-            slope = float(u @ residuals) / max(float(u @ u), 1e-300)
-            left += float(np.sum((residuals - residuals.mean() - slope * u) ** 2))
-            whole += float(np.sum((force - force.mean()) ** 2))
-        noise = self.answer.noise * len(spans)
-        return 1 - max(left - noise, 0.0) / max(whole - noise, 1e-300)
 
 
 def choose(problem: Problem, options: Options) -> Choice:
@@ -278,7 +259,7 @@ def _against(rich: Answer, told: float, tolerance: float) -> str:
         known = half <= tolerance * abs(value) and (name != "n" or abs(value - 1) > half)
         if value <= 0 or not known:
             return f"the log does not show its {name} ({value:.3g} +- {half:.2g})"
-    return unrecovered(rich)
+    return ""
 
 
 def _between_readings(problem: Problem) -> float:

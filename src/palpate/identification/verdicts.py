@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
-from palpate.identification.estimators.answer import Answer, Prediction, unrecovered
+from palpate.identification.estimators.answer import Answer, Prediction
+from palpate.identification.estimators.budget import Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag
@@ -62,22 +64,17 @@ def verdicts(
         point: the working point, with which K must agree.
         terms: how.
     """
-    found = choice.answer
+    found = against_octave(choice.answer, point)
+    choice = replace(choice, answer=found)
     lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
     parameters = {name: _parameter(name, choice, holds, terms) for name in names}
-    if point is not None and found.fit.model.nonlinear:
-        parameters = _showing(parameters, found, point)
-    elif point is not None and {"K", "M"} <= set(found.names):
-        parameters = _agreeing(parameters, found, point)
     weighed = choice.problem.contacts.payload is not None
-    parameters = _passive(_of_lag(parameters, found, lag, terms), weighed)
+    parameters = _passive(parameters, weighed)
     if not choice.problem.contacts.signed:
         parameters = {name: _refuse(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
         parameters = {name: _refuse(p, _UNTOUCHED) for name, p in parameters.items()}
-    if reason := unrecovered(found):
-        parameters = {name: _refuse(p, reason) for name, p in parameters.items()}
     if point is not None and choice.problem.contacts.press is not None and not found.fit.model.nonlinear:
         parameters = _of_press(parameters, point)
     return parameters, _warnings(parameters, found, lag, terms)
@@ -112,9 +109,6 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
         return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
     bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_show(unit)}".rstrip()
     clear = interval[0] > 0 or interval[1] < 0
-    if not choice.explains:
-        reason = f"the model leaves {choice.left:.0%} of the force's amplitude unexplained"
-        return said(Verdict.REJECTED, reason, number=False)
     if half <= terms.tolerance * abs(value) and clear:
         return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
@@ -131,41 +125,58 @@ def _at(found: Answer, name: str, terms: Terms) -> str:
     return f", at a penetration of {_digits(depth)} {terms.position_unit}"
 
 
-def _agreeing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
-    """Nothing of a model that foretells another stiffness at the working point than the log shows is identified."""
-    own = point.stiffness
-    if own.ci95 is None or own.value is None or point.source != "octave":
-        return parameters
-    omega2 = (2 * np.pi * point.frequency_Hz) ** 2
-    i, j = found.names.index("K"), found.names.index("M")
-    foretold = found.theta[i] - omega2 * found.theta[j]
-    half = float(np.hypot(found.half[i], omega2 * found.half[j]))
-    shown = (own.ci95[1] - own.ci95[0]) / 2
-    if abs(foretold - own.value) <= np.hypot(half, shown):
-        return parameters
-    return _contradict(parameters, foretold, own.value, point)
+def against_octave(found: Answer, point: WorkingPoint | None) -> Answer:
+    """An answer with the gap between its stiffness at the working point and the log's own there as a cause.
+
+    A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
+    covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter).
+
+    Args:
+        found: parameters of a model.
+        point: the working point; nothing is compared without one, or with one that has no interval.
+    """
+    if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
+        return found
+    if found.fit.model.nonlinear:
+        shown, predicted = stiffness_of(found.problem, found.problem.force, point), _predicted(found, point)
+    elif point.source == "octave" and {"K", "M"} <= set(found.names):
+        shown, predicted = point.stiffness.value, _dynamic_stiffness(found, point.frequency_Hz)
+    else:
+        return found
+    if shown is None or predicted is None:
+        return found
+    own, slope = predicted
+    shown_half = (point.stiffness.ci95[1] - point.stiffness.ci95[0]) / 2
+    along = found.cov @ slope
+    power = float(slope @ along)
+    gap = max(abs(own - shown) - float(np.hypot(1.96 * np.sqrt(max(power, 0.0)), shown_half)), 0.0)
+    moved = along * gap / power if power > 0 else np.zeros(len(slope))
+    return replace(found, budget={**found.budget, "dynamic stiffness": Spread(moved**2)})
 
 
-def _showing(parameters: dict[str, Parameter], found: Answer, point: WorkingPoint) -> dict[str, Parameter]:
-    """The same of a model that is not a sum of derivatives: its force is read as the log's own is, at the same rows."""
-    own, problem = point.stiffness, found.problem
-    if own.ci95 is None:
-        return parameters
-    foretold, shown = (stiffness_of(problem, force, point) for force in (found.fit.force, problem.force))
-    if foretold is None or shown is None or abs(foretold - shown) <= (own.ci95[1] - own.ci95[0]) / 2:
-        return parameters
-    return _contradict(parameters, foretold, shown, point)
+def _dynamic_stiffness(found: Answer, frequency: float) -> tuple[float, Array]:
+    """K - omega^2 M of a linear answer at a frequency [Hz], and its derivatives, shape (p,)."""
+    slope = np.zeros(len(found.names))
+    slope[found.names.index("K")] = 1.0
+    slope[found.names.index("M")] = -((2 * np.pi * frequency) ** 2)
+    return float(slope @ found.theta), slope
 
 
-def _contradict(
-    parameters: dict[str, Parameter], foretold: float, shown: float, point: WorkingPoint
-) -> dict[str, Parameter]:
-    unit = point.stiffness.unit
-    reason = (
-        f"the model's stiffness at {point.frequency_Hz:.3g} Hz is {_digits(foretold)} {unit}, the log's dynamic"
-        f" stiffness there {_digits(shown)}"
-    )
-    return {name: _reject(p, reason) for name, p in parameters.items()}
+def _predicted(found: Answer, point: WorkingPoint) -> tuple[float, Array] | None:
+    """Stiffness of a model's force, read as the log's own is, and its derivatives by the parameters, shape (p,)."""
+    own, problem = stiffness_of(found.problem, found.fit.force, point), found.problem
+    if own is None:
+        return None
+    slope = np.zeros(len(found.names))
+    for i, name in enumerate(found.names):
+        if name not in found.fit.theta:
+            continue
+        step = 1e-4 * (abs(found.fit.theta[name]) or 1.0)
+        theta = found.fit.theta | {name: found.fit.theta[name] + step}
+        moved = Prediction.of(found.fit.model, problem.motion, problem.force, theta, found.fit.lag)
+        other = stiffness_of(problem, moved.force, point)
+        slope[i] = 0.0 if other is None else (other - own) / step
+    return own, slope
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
@@ -181,18 +192,6 @@ def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str
 
 
 _STEADY = "the log does not show it: the probe moves at constant speed"
-
-
-def _of_lag(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> dict[str, Parameter]:
-    """Nothing that is seen in time alone rests on a lag that nobody calibrated and that is far from any sensor's."""
-    if lag.known or LAG not in found.names or abs(found[LAG] - lag.value) <= _FAR * lag.std:
-        return parameters
-    reason = (
-        f"it depends on a force lag of {_digits(1e3 * found[LAG], 2)} ms that the fit estimates and no calibration"
-        " confirms: calibrate the lag and give it with --lag"
-    )
-    refused = {name: _without_number(p, reason) for name, p in parameters.items() if name in _IN_TIME}
-    return parameters | refused
 
 
 def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:

@@ -1,4 +1,4 @@
-"""The wire to an arm of ours in another process, over loopback: `python -m palpate.wires.sim_arm` is that arm."""
+"""The wire to an arm of ours in another process, over loopback: `python -m palpate_rehearsal.sim_arm` is that arm."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class SimWire:
             self._socket.close()
             raise InputError(
                 f"no simulated arm answers at {self._where} ({error.strerror or error}); start one with"
-                f" python -m palpate.wires.sim_arm --port {port}"
+                f" python -m palpate_rehearsal.sim_arm --port {port} (pip install palpate-rehearsal)"
             ) from None
         except InputError:
             self._socket.close()

@@ -6,9 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from palpate.cli._answer import print_answer
-from palpate.cli._terminal import console, counted, place, print_lines, show_table
 from palpate.cli.options.flags import FLAG
+from palpate.cli.toolkit import console, counted, place, print_answer, print_lines, show_table
 
 if TYPE_CHECKING:
     from palpate_references.check import Score
@@ -23,9 +22,9 @@ def references(
 ) -> int:
     """Check solvers against 44 contact logs whose parameters are certified to 11 digits; list the logs, or write them.
 
-    Examples:
-        palpate references check
-        palpate references export certified/
+    palpate references check
+
+    palpate references export certified/
 
     Args:
         action: `check` fits every log by palpate, SciPy and NumPy; `list` names the logs; `export` writes them.

@@ -6,8 +6,25 @@ frame = run(text_of_a_study, "runs/mine")
 
 from __future__ import annotations
 
-from palpate.bench.metrics import METRICS, Look, Metric
-from palpate_studies.run_one import Local
-from palpate_studies.run_study import run
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from palpate.bench.metrics import METRICS, Look, Metric
+    from palpate_studies.run_one import Local
+    from palpate_studies.run_study import run
+
+_NAMES = {
+    "palpate.bench.metrics": ("METRICS", "Look", "Metric"),
+    "palpate_studies.run_one": ("Local",),
+    "palpate_studies.run_study": ("run",),
+}
 __all__ = ["METRICS", "Local", "Look", "Metric", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported when it is first used: the help of the command imports none."""
+    for module, names in _NAMES.items():
+        if name in names:
+            return getattr(import_module(module), name)
+    raise AttributeError(f"palpate_studies has no {name!r}; it has {', '.join(__all__)}")

@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._terminal import COMPILING, confirmed, console, counted, place, say, show_answer
 from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.names import QUIET, shipped_names
 from palpate.cli.options.plugins import PluginOptions
 from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli.toolkit import COMPILING, confirmed, console, counted, place, print_answer, say, show_answer
 from palpate.errors import InputError
 from palpate.text import printable
 

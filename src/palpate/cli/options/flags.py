@@ -46,7 +46,7 @@ def in_si(option: str, text: str, kind: str) -> float:
     Raises:
         InputError: not a number, or not a unit of this kind.
     """
-    from palpate.excitation.quantities import quantity
+    from palpate.cli.options.quantities import quantity
 
     return quantity(option, text, kind)
 

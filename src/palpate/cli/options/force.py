@@ -72,7 +72,7 @@ class SurfaceOptions:
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest stiffness [N/m]."""
-        from palpate.excitation.quantities import spread
+        from palpate.cli.options.quantities import spread
 
         return spread("--stiffness", str(self.stiffness), "stiffness")
 

@@ -236,8 +236,9 @@ class Linearisation:
         """Parameters seen in time get the prior's uncertainty of an uncalibrated lag, no less.
 
         A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves
-        the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior. Nothing but a
-        damping passes for a lag of more than a radian of the fastest motion.
+        the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior, and as far from
+        the prior's mean as the fit has moved it. Nothing but a damping passes for a lag of more than a radian of the
+        fastest motion.
         """
         lag = self.names.index(LAG)
         rest = [i for i in range(len(self.names)) if i != lag]
@@ -245,6 +246,7 @@ class Linearisation:
         slope = np.zeros(len(self.names))
         slope[rest] = inverse(normal[np.ix_(rest, rest)]) @ normal[rest, lag]
         std, band = self.problem.lag.std, self.problem.band
+        std = max(std, abs(float(member.solution.theta[lag]) - self.problem.lag.value))
         in_time = self.names[: self.own] if self.model.nonlinear else ("M",)
         reach = dict.fromkeys(in_time, min(std, 1 / (2 * np.pi * band)) if np.isfinite(band) else std)
         reach |= {"B": std, LAG: 0.0}

@@ -1,4 +1,4 @@
-"""The page of a tuned force loop: the proved surfaces, the first touch, the margins, the gains."""
+"""A tuned force loop in Python, in a notebook and on a page: the proved surfaces, the first touch, the margins."""
 
 from __future__ import annotations
 
@@ -13,15 +13,33 @@ from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
 from palpate.report.answer import Answer, Card, Extent, answer_page, log_scale
 from palpate.report.figure_panels.panels import panels_of
-from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.tuning.table import rows
+from palpate.report.numbers import as_html, plain, printed, quantity, quantity_between
+from palpate.report.tuning.table import rows, show
+from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def page(told: Tuning, command: str = "palpate tune") -> str:
-    """The page as HTML; `command` is what made it."""
+def line(told: Tuning) -> str:
+    """The arm, the force, and whether anything is proved."""
+    proved = "proved" if told.proved else "nothing proved"
+    return printable(f"{told.gains.arm.title}, {told.gains.force:g} N, {proved}")
+
+
+def text(told: Tuning) -> str:
+    """Output of `palpate tune`."""
+    return printed(lambda console: show(told, console))
+
+
+def html(told: Tuning) -> str:
+    """The same as a table."""
+    table = [("", f"A force loop for {told.gains.arm.title}"), *rows(told)]
+    return as_html("Tuning", table, [text for _, text in told.warnings])
+
+
+def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
+    """The page of `palpate tune --report`; `command` is what made it."""
     gains = told.gains
     answer = Answer(
         title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
@@ -35,7 +53,7 @@ def page(told: Tuning, command: str = "palpate tune") -> str:
         cards={"": _cards(told)},
         lower={"Margins on the stiffest surface": _margins(told)},
         scale=_scale(told),
-        figures=[{"panels": panels_of(first_touch(told)), "caption": _touch_caption(told)}],
+        figures=[{"panels": panels_of(draw(told)), "caption": _touch_caption(told)}],
         folds=[
             ("All numbers", "and the proof's own statements", rows(told)),
             ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
@@ -124,7 +142,7 @@ def _scale(told: Tuning) -> dict[str, object]:
     return log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
 
 
-def first_touch(told: Tuning) -> Figure:
+def draw(told: Tuning) -> Figure:
     """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
     with style.inked():
         figure, (axis,) = style.figure(height=2.9)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli._answer import print_answer
-from palpate.cli._terminal import console, counted, place, say, show_table
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.values import FolderOptions
+from palpate.cli.toolkit import console, counted, place, print_answer, say, show_table
 
 if TYPE_CHECKING:
     from palpate_thesis.inference.result import Result

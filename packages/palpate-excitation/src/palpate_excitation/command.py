@@ -1,0 +1,344 @@
+"""`palpate excite`: a desired force that identifies a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
+from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.errors import InputError
+from palpate.files import write_text
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from palpate_excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
+
+
+_FASTEST = 200_000
+"""Rows or readings a second [Hz]: no sensor of force is read faster."""
+
+
+@Parameter(name="*", group=Group("The surfaces", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SurfaceOptions:
+    """Range of the surfaces.
+
+    Parameters
+    ----------
+    stiffness
+        Of the surfaces, N/m; one value if it is known.
+    damping
+        Of the surfaces, N s/m.
+    mass
+        Of the surfaces, kg; without it they have none.
+    """
+
+    stiffness: Annotated[str, SIGNED]
+    damping: Annotated[str, SIGNED]
+    mass: Annotated[str | None, SIGNED] = None
+
+    def range(self) -> SurfaceRange:
+        """Range of stiffness, damping and mass."""
+        from palpate.cli.options.quantities import spread
+        from palpate_excitation import SurfaceRange
+
+        return SurfaceRange(
+            spread("--stiffness", self.stiffness, "stiffness"),
+            spread("--damping", self.damping, "damping"),
+            None if self.mass is None else spread("--mass", self.mass, "mass"),
+        )
+
+
+@Parameter(name="*", group=Group("Limits", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class BudgetOptions:
+    """Limits of force and frequency.
+
+    Parameters
+    ----------
+    force
+        Mean force, N.
+    peak
+        Highest force, N.
+    least
+        Lowest force, N, so that contact is kept.
+    bandwidth
+        Highest frequency, Hz.
+    lowest
+        Lowest frequency, Hz.
+    force_rate
+        Fastest change of the desired force, N/s.
+    drive
+        Largest departure of the desired force from its mean, N, if it may exceed that of the force on the surface.
+    """
+
+    force: Annotated[str, SIGNED]
+    peak: Annotated[str, SIGNED]
+    least: Annotated[str, SIGNED] = "2"
+    bandwidth: Annotated[str, SIGNED] = "40"
+    lowest: Annotated[str, SIGNED] = "0.5"
+    force_rate: Annotated[str | None, SIGNED] = None
+    drive: Annotated[str | None, SIGNED] = None
+
+    def budget(self) -> Budget:
+        """Limits of force, frequency and speed."""
+        from palpate_excitation import Budget
+
+        return Budget(
+            in_si("--force", self.force, "force"),
+            in_si("--peak", self.peak, "force"),
+            in_si("--least", self.least, "force"),
+            in_si("--lowest", self.lowest, "frequency"),
+            in_si("--bandwidth", self.bandwidth, "frequency"),
+            inf if self.force_rate is None else in_si("--force-rate", self.force_rate, "force rate"),
+            in_si_if_given("--drive", self.drive, "force"),
+        )
+
+
+@Parameter(name="*", group=Group("Goals", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class GoalOptions:
+    """Precision and time.
+
+    Parameters
+    ----------
+    precision
+        Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%.
+    duration
+        Of the excitation, s; the shortest sufficient one if not given.
+    longest
+        Longest duration, s.
+    settle
+        Initial time that does not count, s.
+    kind
+        multisine or chirp.
+    criterion
+        Optimality of a multisine: worst (the worst parameter), or D, A or E as in optimal experiment design.
+    """
+
+    precision: Annotated[str, SIGNED] = "10%"
+    duration: Annotated[str | None, SIGNED] = None
+    longest: Annotated[str, SIGNED] = "60"
+    settle: Annotated[str, SIGNED] = "1"
+    kind: str = "multisine"
+    criterion: str = "worst"
+
+
+@Parameter(name="*", group=Group("The sensors", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class SensorOptions:
+    """Sensors of force and position.
+
+    Parameters
+    ----------
+    noise
+        Standard deviation of one reading of the force sensor, N.
+    sampling
+        Independent readings of the force sensor per second.
+    force_filter
+        Low-pass before the sampling, as butterworth3:120, or none.
+    rate
+        Rows per second of the log, and of --out.
+    position_step
+        Quantisation of the position, m.
+    lag_std
+        Standard deviation of the calibrated lag between force and position, s.
+    """
+
+    noise: Annotated[str, SIGNED] = "0.6"
+    sampling: Annotated[int, SIGNED] = 480
+    force_filter: str = "butterworth3:120"
+    rate: Annotated[int, SIGNED] = 1000
+    position_step: Annotated[str, SIGNED] = "1.6:um"
+    lag_std: Annotated[str, SIGNED] = "0"
+
+    def sensors(self) -> Sensors:
+        """Sensors of force and position."""
+        from palpate.signals.low_pass import LowPass
+        from palpate_excitation import Sensors
+        from palpate_excitation.spectra import ForceChain, phase_std
+
+        for option, value in (("--sampling", self.sampling), ("--rate", self.rate)):
+            if not 1 <= value <= _FASTEST:
+                raise InputError(f"{option} must be between 1 and {_FASTEST} Hz, got {value}")
+        # A sensor as fast as its log, or faster, gives one reading a row; its phase is then a part of the lag.
+        open_phase = phase_std(self.sampling, self.rate) if self.sampling < self.rate else 0.0
+        chain = ForceChain(
+            LowPass.parse(self.force_filter),
+            float(min(self.sampling, self.rate)),
+            in_si("--noise", self.noise, "force"),
+            open_phase,
+        )
+        step = in_si("--position-step", self.position_step, "length")
+        return Sensors(chain, step, float(self.rate), in_si("--lag-std", self.lag_std, "time"))
+
+
+@Parameter(name="*", group=Group("The robot", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class LoopOptions:
+    """Its force control.
+
+    Parameters
+    ----------
+    loop_bandwidth
+        Of the robot's force control, Hz, if nothing else is known of it.
+    tip_mass
+        Effective mass of the robot at its tip, kg; this and the following default to the bench's arm.
+    tip_friction
+        Dry friction as felt at the tip, N.
+    gain
+        Of the force error.
+    integral
+        Of the force error, 1/s.
+    """
+
+    loop_bandwidth: Annotated[str | None, SIGNED] = None
+    tip_mass: Annotated[str | None, SIGNED] = None
+    tip_friction: Annotated[str | None, SIGNED] = None
+    gain: Annotated[float | None, SIGNED] = None
+    integral: Annotated[float | None, SIGNED] = None
+
+    def loop(self) -> ForceLoop:
+        """Force loop that follows the desired force."""
+        from palpate_excitation import HybridLoop, KnownBandwidth
+
+        given = {
+            "tip_mass": in_si_if_given("--tip-mass", self.tip_mass, "mass"),
+            "friction": in_si_if_given("--tip-friction", self.tip_friction, "force"),
+            "gain": self.gain,
+            "integral": self.integral,
+        }
+        told: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        if self.loop_bandwidth is None:
+            return HybridLoop(**told)
+        if told:
+            raise InputError(
+                "--loop-bandwidth models the whole robot; leave out --tip-mass, --tip-friction, --gain, "
+                "--integral"
+            )
+        return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions(PictureOptions, FileOptions):
+    """Files to write.
+
+    Parameters
+    ----------
+    out
+        Where to write the desired force over time: .csv or .parquet.
+    experiment
+        Where to write an experiment for palpate run, a TOML file.
+    replace
+        Replace the files at --out and --experiment.
+    figure
+        Where to write the figure, a PNG; excite.png in the current folder if not given.
+    """
+
+    out: Path | None = None
+    experiment: Path | None = None
+    replace: Annotated[bool, FLAG] = False
+    figure: Path | None = None
+
+    def check_all(self) -> None:
+        """Check every path before any work is done."""
+        from palpate_excitation.report.table import check_ending
+
+        if self.out is not None:
+            check_ending(self.out)
+        self.check_new(self.out)
+        self.check_new(self.experiment, "--experiment", ".toml")
+        self.page()
+
+
+def excite(
+    *,
+    surface: SurfaceOptions,
+    limits: BudgetOptions,
+    goal: GoalOptions | None = None,
+    sensor: SensorOptions | None = None,
+    robot: LoopOptions | None = None,
+    output: OutputOptions | None = None,
+) -> int:
+    """Design a force that identifies a surface, and predict the uncertainty.
+
+    Numbers are SI, or carry their unit after a colon; a range is LOW:HIGH or LOW:HIGH:UNIT:
+
+    palpate excite --stiffness 3:8:N/mm --damping 50:300 --mass 0.1:0.3 --force 15 --peak 20 --precision K=5%,B=5%,M=25%
+
+    Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
+    """
+    from palpate.cli.options.quantities import shares
+    from palpate_excitation import Problem
+
+    goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
+    robot, output = robot or LoopOptions(), output or OutputOptions()
+    picture = output.picture("excite.png")
+    output.check_all()
+    surfaces = surface.range()
+    problem = Problem(
+        surfaces,
+        limits.budget(),
+        shares("--precision", goal.precision, surfaces.names),
+        sensor.sensors(),
+        robot.loop(),
+        goal.kind,
+        goal.criterion,
+        in_si_if_given("--duration", goal.duration, "time"),
+        in_si("--longest", goal.longest, "time"),
+        in_si("--settle", goal.settle, "time"),
+    )
+    return _answer(problem, sensor.rate, output, picture)
+
+
+def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
+    from palpate_excitation import design, remedies
+
+    found = design(problem)
+    helps = [] if found.feasible else remedies(found)
+    if found.feasible:
+        _write(found, rate, output.out, output.experiment)
+    if picture is not None:
+        from palpate_excitation.report.page import write_figure
+
+        write_figure(found, picture)
+    if output.report is not None:
+        from palpate_excitation.report.page import page
+
+        write_text(output.report, page(found, helps, printable(command())))
+    written = [*([output.out, output.experiment] if found.feasible else []), output.report]
+    _print(found, helps, written, picture, output.json)
+    return 0 if found.feasible else 1
+
+
+def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) -> None:
+    from palpate_excitation.report import table
+
+    if out is not None:
+        table.write_force(found, out, float(rate))
+    if experiment is not None:
+        write_text(experiment, table.experiment(found))
+
+
+def _print(
+    found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
+) -> None:
+    if json:
+        from palpate_excitation.report.table import summary
+
+        print_answer(summary(found, helps))
+        return
+    from palpate_excitation.report.table import show
+
+    screen = console()
+    screen.soft_wrap = True
+    show(found, helps, screen)
+    for path in (*filter(None, written), *([picture] if picture else [])):
+        place(screen, "written:", path)

@@ -1,0 +1,295 @@
+"""Surfaces and robots of an excitation: the force that a surface feels, and the uncertainty predicted from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from math import pi, sqrt
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.arrays import Array, Complex
+from palpate.errors import InputError
+from palpate.references import Chirp, Multisine
+from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
+from palpate_excitation.spectra import covariance
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One surface: f = M a + B v + K x.
+
+    Args:
+        stiffness: K [N/m].
+        damping: B [N s/m].
+        mass: M [kg]; 0 for a surface without one.
+    """
+
+    stiffness: float
+    damping: float
+    mass: float = 0.0
+
+    def impedance(self, omega: Array) -> NDArray[np.complexfloating[Any, Any]]:
+        """Force per displacement at angular frequencies [N/m], of their shape."""
+        return self.stiffness + 1j * omega * self.damping - self.mass * omega**2
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """The parameters K, B, M."""
+        return self.stiffness, self.damping, self.mass
+
+
+@dataclass(frozen=True)
+class SurfaceRange:
+    """All surfaces between the lowest and the highest of each parameter.
+
+    Args:
+        stiffness: lowest and highest K [N/m].
+        damping: lowest and highest B [N s/m].
+        mass: lowest and highest M [kg]; None for surfaces without one, of which no mass is asked.
+
+    Raises:
+        InputError: a range that is upside down or not above 0.
+    """
+
+    stiffness: Range
+    damping: Range
+    mass: Range | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("stiffness", "damping", "mass"):
+            ends = getattr(self, name)
+            if ends is not None and not 0 < ends[0] <= ends[1] < np.inf:
+                raise InputError(
+                    f"{name} must be LOW:HIGH with 0 < LOW <= HIGH, got {ends[0]:g}:{ends[1]:g}; a relative "
+                    "precision needs a value above 0"
+                )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters to identify: K and B, and M if there is one."""
+        return ("K", "B") if self.mass is None else ("K", "B", "M")
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The middle (of the logarithms) and the corners, each once."""
+        ranges = (self.stiffness, self.damping, self.mass or (0.0, 0.0))
+        corners = [Surface(*corner) for corner in product(*ranges)]
+        middle = Surface(*(sqrt(low * high) for low, high in ranges))
+        return tuple(dict.fromkeys([middle, *corners]))
+
+
+BENCH_FILTERS = LowPass(((3, 120.0), (2, 120.0)))
+"""Of the bench's sensor, and of its controller."""
+_ROUNDS = 200
+_SETTLED = 1e-4
+"""Change of a round, as a share, at which friction's describing function has been found; and rounds at most."""
+_STILL = 1e-9  # m/s; friction is never divided by less
+
+
+class ForceLoop(Protocol):
+    """Any robot under force control that is linear at a given speed."""
+
+    def transfer(self, omega: Array, impedance: Complex, speed: Array) -> Complex:
+        """Force on the surface per desired force, while the tip moves at an rms speed [m/s].
+
+        Args:
+            omega: angular frequencies [rad/s], shape (F,).
+            impedance: of the surfaces there [N/m], shape (C, F).
+            speed: shape (C, F) or (C, 1).
+
+        Returns:
+            Shape (C, F).
+        """
+
+    def stable(self, surface: Surface) -> bool:
+        """Whether the loop comes to rest on a surface."""
+
+
+@dataclass(frozen=True)
+class HybridLoop:
+    """A tip under hybrid control: the desired force fed forward, its error through a gain and an integral.
+
+    The tip obeys m a + b v + k x + friction + f = f_d + C (f_d - G f), so f/f_d = (1 + C) / (1 + C G + R/Z) with Z the
+    surface, R the tip, G the way of the measured force and C = gain + integral/s. Friction is a spring (presliding) in
+    series with a slider; at an rms speed the slider is the damper sqrt(2/pi) friction/speed, which takes the same power
+    (statistical linearisation, Booton, 1954).
+
+    The defaults are the bench's arm before its wall, fitted to multisines of 0.5 to 40 Hz and 2 to 12 N on foam and
+    rubber, whose forces they predict to some 10 % (at 2 N, where it mostly sticks, to 20 %).
+
+    Args:
+        tip_mass: m, effective at the tip [kg].
+        damping: b, of the tip [N s/m].
+        stiffness: k, of the other directions' position control against the tip's own [N/m].
+        friction: dry, as felt at the tip [N].
+        presliding: stiffness of the friction before it slides [N/m].
+        gain: of the force error [1].
+        integral: of the force error [1/s].
+        low_pass: that the measured force passes before the controller.
+        delay: of the measured force beyond that, half a hold included [s].
+    """
+
+    tip_mass: float = 11.5
+    damping: float = 180.0
+    stiffness: float = 8000.0
+    friction: float = 3.7
+    presliding: float = 240e3
+    gain: float = 1.0
+    integral: float = 3.0
+    low_pass: LowPass = BENCH_FILTERS
+    delay: float = 4.1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("tip_mass", "damping", "stiffness", "friction", "gain", "integral", "delay"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} of a force loop must be 0 or above, got {getattr(self, name)}")
+        if not 0 < self.presliding < np.inf:
+            raise InputError(f"presliding of a force loop must be above 0 N/m, got {self.presliding}")
+
+    def transfer(self, omega: Array, impedance: Complex, speed: Array) -> Complex:
+        """(1 + C) / (1 + C G + R/Z), shape (C, F)."""
+        s = 1j * omega
+        slider = sqrt(2 / pi) * self.friction / np.maximum(speed, _STILL)
+        tip = self._tip(s) + self.presliding * s * slider / (self.presliding + s * slider)
+        correction = self.gain + self.integral / s
+        return (1 + correction) / (1 + correction * self._measured_loop(omega) + tip / impedance)
+
+    def stable(self, surface: Surface) -> bool:
+        """By Nyquist: how far 1 + L turns from slow to fast, L that of the loop without friction, whose tip is stable.
+
+        It turns by a quarter forwards, from the integral's -90 degrees to 0, or not at all without an integral; each
+        unstable pair of poles takes a whole turn away.
+        """
+        omega = 2 * pi * np.geomspace(1e-3, 1e4, 20_000)
+        s, Z = 1j * omega, surface.impedance(omega)
+        loop = (self.gain + self.integral / s) * self._measured_loop(omega) * Z / (Z + self._tip(s))
+        angle = np.unwrap(np.angle(1 + loop))
+        return bool(angle[-1] - angle[0] > -pi)
+
+    def _tip(self, s: Complex) -> Complex:
+        return np.polyval([self.tip_mass, self.damping, self.stiffness], s)
+
+    def _measured_loop(self, omega: Array) -> Complex:
+        late: Complex = np.exp(-1j * omega * self.delay)
+        return self.low_pass.at(omega) * late
+
+
+@dataclass(frozen=True)
+class KnownBandwidth:
+    """A robot with a known bandwidth of its force control, the same on any surface.
+
+    Args:
+        bandwidth: where the force has fallen to 0.71 of the desired one [Hz]; a second-order Butterworth.
+    """
+
+    bandwidth: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.bandwidth < np.inf:
+            raise InputError(f"bandwidth of a force loop must be above 0 Hz, got {self.bandwidth}")
+
+    def transfer(self, omega: Array, impedance: Complex, speed: Array) -> Complex:
+        """The same low-pass on every surface, shape (C, F)."""
+        gain = LowPass(((2, self.bandwidth),)).at(omega)
+        return np.broadcast_to(gain, impedance.shape)
+
+    def stable(self, surface: Surface) -> bool:
+        """Stability, which is taken for granted."""
+        return True
+
+
+def contact_force(
+    loop: ForceLoop, omega: Array, impedance: Complex, amplitudes: Array, together: bool
+) -> Complex:
+    """Phasors of the force on each surface under a desired force of given amplitudes [N], shape (C, F).
+
+    Args:
+        loop: the robot.
+        omega: angular frequencies [rad/s], shape (F,).
+        impedance: of the surfaces [N/m], shape (C, F).
+        amplitudes: of the desired force [N], shape (F,).
+        together: all frequencies at once, as in a multisine; otherwise one after the other, as in a chirp.
+    """
+    speed = np.full((len(impedance), 1 if together else len(omega)), 1e-2)
+    for _ in range(_ROUNDS):
+        force = loop.transfer(omega, impedance, speed) * amplitudes
+        power = np.abs(omega * force / impedance) ** 2 / 2
+        new = np.sqrt(power.sum(axis=1, keepdims=True) if together else power)
+        change = np.abs(new - speed).max() / max(float(new.max()), _STILL)
+        speed = 0.5 * (speed + new)
+        if change < _SETTLED:
+            break
+    return force
+
+
+Wave = Multisine | Chirp
+
+ALL = ("K", "B", "M")
+POWER_KNOWN = 0.3
+"""Relative error of the position noise's power within the band of a fit, which is told from above that band."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Of one surface.
+
+    Args:
+        surface: which.
+        names: of the parameters that are identified.
+        information: about them (of their logarithms) and the lag, of a second, shape (n, n).
+        prior: information of the same parameters, shape (n, n).
+        rounding: covariance by the rounding of the position, which repeats with the motion, shape (n, n).
+        pull: share by which that rounding pulls each towards zero, shape (n,).
+        force: lowest and highest force on the surface [N].
+        travel: of the tip, from end to end [m].
+    """
+
+    surface: Surface
+    names: tuple[str, ...]
+    information: Array
+    prior: Array
+    rounding: Array
+    pull: Array
+    force: tuple[float, float]
+    travel: float
+
+    def half_widths(self, seconds: float) -> dict[str, float]:
+        """95 % half-width of each parameter, as a share of its value, after so many seconds.
+
+        A pull towards zero is corrected as well as the power of the rounding is known. No time makes that better, nor
+        the rounding itself.
+        """
+        C = covariance(seconds * self.information, self.prior)
+        C = C + self.rounding + np.diag((POWER_KNOWN * self.pull) ** 2)
+        return {name: NORMAL * float(np.sqrt(C[i, i])) for i, name in enumerate(self.names)}
+
+
+@dataclass(frozen=True)
+class Made:
+    """A wave about the mean force, and its predicted information.
+
+    Args:
+        wave: added to the mean force [N].
+        predictions: one a surface.
+        gap: by how much its spectrum may at most miss the best there is, as a share of the criterion.
+    """
+
+    wave: Wave
+    predictions: tuple[Prediction, ...]
+    gap: float
+
+    def worst(self, seconds: float) -> dict[str, float]:
+        """The largest half-width of each parameter on any surface, as a share of its value."""
+        widths = [prediction.half_widths(seconds) for prediction in self.predictions]
+        return {name: max(found[name] for found in widths) for name in self.predictions[0].names}
+
+    def excess(self, seconds: float, precision: Mapping[str, float]) -> float:
+        """The largest half-width per that asked for, of any parameter on any surface: at most 1 is good enough."""
+        widths = self.worst(seconds)
+        return max(widths[name] / asked for name, asked in precision.items())

@@ -1,0 +1,113 @@
+"""Common parts of the simulated arms that stand in for real ones: an arm of one direction, its messages, its pace."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from palpate._vector import ZERO3
+from palpate.force.arm import Arm, load_arm
+from palpate.force.simulated_press import surface, world_of
+from palpate.force.touching import BodyState, Surface, World, moved
+from palpate.wires.realtime import hurried
+
+START = 0.3
+"""Height of the surface in the base [m]."""
+_BEHIND = 1.0
+"""Behind real time by which this process must have been stopped [s]: so much is not made up for in a hurry."""
+
+
+class OneDirection:
+    """An arm that moves along its tool's axis, -z of the base, towards a surface.
+
+    Args:
+        arm: how it moves and senses.
+        touched: the surface.
+        gap: between tool and surface at the start [m].
+        bias: of the force sensor, in the base [N].
+        seed: of the sensor's noise.
+    """
+
+    def __init__(self, arm: Arm, touched: Surface, gap: float, bias: tuple[float, float, float], seed: int):
+        self.arm, self.surface = arm, touched
+        self.world: World = world_of(arm, noise=arm.sensor.noise)
+        self.bias = bias
+        self._rng = np.random.default_rng(seed)
+        self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
+        self.command, self.time = -gap, 0.0
+        self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
+
+    def tick(self, speed: float) -> None:
+        """Go on by one tick of the arm's own clock with this commanded speed [m/s]."""
+        world = self.world
+        self.command += world.tick * min(max(speed, -world.speed), world.speed)
+        into = self.command
+        if world.torque > 0.0:
+            into = world.stiffness * (self.command - self.body.x) - world.second * self.body.v
+        held = self._line[0] if world.delay > 0 else into
+        self._line = [*self._line[1:], into]
+        noise, h = self._rng.standard_normal(8), world.tick / world.steps
+        for j in range(world.steps):
+            self.body = moved(world, self.surface, self.body, held, self.time + j * h, h, noise, 0, 0.0)
+        self.time += world.tick
+
+    def reading(self) -> tuple[float, ...]:
+        """Force, torque, position, quaternion: the tool points down."""
+        force = (self.bias[0], self.bias[1], self.bias[2] - self.body.reading)
+        return (*force, 0.0, 0.0, 0.0, 0.4, 0.0, START - self.body.x, 1.0, 0.0, 0.0, 0.0)
+
+
+def words_of(module: str, about: str | None) -> argparse.ArgumentParser:
+    """The words that each of them takes."""
+    words = argparse.ArgumentParser(prog=f"python -m palpate_rehearsal.{module}", description=about)
+    words.add_argument(
+        "--arm", default="ur5e", help="ur5e, fr3, panda, iiwa14 or a TOML file of palpate tune"
+    )
+    words.add_argument("--stiffness", type=float, default=5000.0, help="of the surface, N/m")
+    words.add_argument("--damping", type=float, default=20.0, help="of the surface, N s/m")
+    words.add_argument("--gap", type=float, default=0.002, help="between tool and surface, m")
+    words.add_argument("--seconds", type=float, default=600.0, help="after which it ends")
+    return words
+
+
+def loopback(words: argparse.ArgumentParser, address: str) -> str:
+    """The address, if it is one of the loopback."""
+    if not address.startswith("127."):
+        words.error(f"--address must be one of the loopback, 127.*, got {address}")
+    return address
+
+
+def arm_of(told: argparse.Namespace, bias: tuple[float, float, float], seed: int = 0) -> OneDirection:
+    """The arm that was asked for; the bias is of its sensor [N]."""
+    return OneDirection(load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, bias, seed)
+
+
+def ready(line: str) -> None:
+    """Say where it listens."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
+    """Each tick when it is due, at real time, until the seconds of the arm are over.
+
+    With real-time priority, where the system gives it: a controller is not late because the loop's computer is busy.
+
+    Args:
+        arm: whose clock it is.
+        seconds: of the arm's time.
+        wait: called before each tick with the seconds that are left until it is due.
+    """
+    with hurried(True):
+        begun = time.monotonic()
+        while arm.time < seconds:
+            left = begun + arm.time - time.monotonic()
+            wait(max(left, 0.0))
+            if left < -_BEHIND:
+                begun -= left
+            yield

@@ -1,0 +1,119 @@
+"""A simulated arm in a process of its own, at real time: `python -m palpate_rehearsal.sim_arm --stiffness 5000`.
+
+It moves in one direction and listens on the loopback alone. Readings go to one master; without a command for ten ticks
+it rests.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from palpate.wires import sim as protocol
+from palpate_rehearsal.rehearsal import OneDirection, arm_of, paced, ready, words_of
+
+_REST = 10
+"""Ticks without a command after which it rests."""
+_LEFT = 1.0
+"""After which silence of a master another may come [s]."""
+_SPEED_UP = 0.5
+"""Highest change of the commanded speed [m/s^2] on a stop."""
+
+
+@dataclass
+class Master:
+    """Who moves the arm."""
+
+    address: Any
+    session: int
+    heard: float
+    number: int = 0
+    speed: float = 0.0
+    ticks: int = 0
+    sent: int = 0
+
+
+def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
+    """Run at real time until the seconds are over.
+
+    Args:
+        arm: the simulated arm.
+        listening: a bound UDP socket.
+        seconds: of the arm's time.
+    """
+    listening.setblocking(False)
+    master, speed = None, 0.0
+    for _ in paced(arm, seconds):
+        master = _heard(listening, master, arm.arm.rate)
+        wanted = 0.0
+        if master is not None:
+            master.ticks += 1
+            wanted = master.speed if master.ticks <= _REST else 0.0
+        step = _SPEED_UP * arm.world.tick
+        speed = wanted if wanted else speed - min(max(speed, -step), step)
+        arm.tick(speed)
+        if master is not None:
+            body = protocol.state(master.sent, arm.time, arm.reading())
+            master.sent += 1
+            _send(listening, protocol.packed(protocol.STATE, master.session, body), master.address)
+
+
+def _heard(listening: socket.socket, master: Master | None, rate: float) -> Master | None:
+    """Take all that came; a second master is told that the arm is busy."""
+    now = time.monotonic()
+    while True:
+        try:
+            data, address = listening.recvfrom(512)
+        except BlockingIOError:
+            return master
+        except OSError:  # a master that has gone
+            continue
+        found = protocol.unpacked(data)
+        if found is None:
+            continue
+        kind, session, body = found
+        if kind == protocol.HELLO:
+            if master is not None and master.session != session and now - master.heard < _LEFT:
+                _send(listening, protocol.packed(protocol.BUSY, session), address)
+                continue
+            if master is None or master.session != session:
+                master = Master(address, session, now)
+            _send(listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(rate)), address)
+        elif master is not None and (address, session) == (master.address, master.session):
+            master.heard = now
+            _obey(master, kind, body)
+
+
+def _obey(master: Master, kind: int, body: bytes) -> None:
+    if kind == protocol.STOP:
+        master.speed, master.heard = 0.0, master.heard - _LEFT
+    found = protocol.read_move(body) if kind == protocol.MOVE else None
+    if found is not None and found[0] > master.number:
+        master.number, master.speed, master.ticks = found[0], -found[1][2], 0
+
+
+def _send(listening: socket.socket, data: bytes, address: Any) -> None:
+    try:
+        listening.sendto(data, address)
+    except OSError:
+        return
+
+
+def main() -> None:
+    """Read the words, bind, say where, and serve."""
+    words = words_of("sim_arm", __doc__)
+    words.add_argument("--bias", type=float, nargs=3, default=(1.0, -0.5, 2.0), help="of the sensor, N")
+    words.add_argument("--seed", type=int, default=0, help="of the sensor's noise")
+    words.add_argument("--port", type=int, default=0, help="UDP, on 127.0.0.1; 0 picks a free one")
+    told = words.parse_args()
+    listening = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    listening.bind(("127.0.0.1", told.port))
+    arm = arm_of(told, tuple(told.bias), told.seed)
+    ready(f"sim:127.0.0.1:{listening.getsockname()[1]}")
+    serve(arm, listening, told.seconds)
+
+
+if __name__ == "__main__":
+    main()

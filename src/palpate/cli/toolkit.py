@@ -1,0 +1,37 @@
+"""Parts of commands, for those of other distributions too: output, progress, the answer as JSON."""
+
+from __future__ import annotations
+
+from palpate.cli._answer import print_answer
+from palpate.cli._program import command
+from palpate.cli._terminal import (
+    COMPILING,
+    STYLE,
+    bar,
+    confirmed,
+    console,
+    counted,
+    head,
+    place,
+    print_lines,
+    say,
+    show_answer,
+    show_table,
+)
+
+__all__ = [
+    "COMPILING",
+    "STYLE",
+    "bar",
+    "command",
+    "confirmed",
+    "console",
+    "counted",
+    "head",
+    "place",
+    "print_answer",
+    "print_lines",
+    "say",
+    "show_answer",
+    "show_table",
+]

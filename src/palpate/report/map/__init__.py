@@ -1,1 +1,0 @@
-"""A stiffness map on a terminal and on a page."""

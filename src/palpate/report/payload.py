@@ -1,0 +1,105 @@
+"""A weighed tool: on a terminal, in Python, in a notebook, and on a page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.contact_frame import Weighed
+from palpate.contact_frame.weighing import Estimated
+from palpate.report import style
+from palpate.report.numbers import as_html, as_text
+from palpate.report.page import Table, embedded, render
+from palpate.report.svg import svg
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NAMES = {
+    "mass": "mass",
+    "centre": "centre of mass, tool's axes",
+    "weight": "weight, base's axes",
+    "bias": "bias of the force, tool's axes",
+    "drift": "drift of the bias",
+    "torque_bias": "bias of the torque, tool's axes",
+    "inertia": "inertial mass",
+}
+
+
+def table(found: Weighed) -> Table:
+    """Each number with its 95 % interval."""
+    rows = [
+        (_NAMES[name] + axis, f"{value:.4g}", _half(half), one.unit)
+        for name, one in found.parameters.items()
+        for axis, value, half in _parts(one)
+    ]
+    return Table("", ("", "value", "+- 95 %", "unit"), rows)
+
+
+def sentence(found: Weighed) -> str:
+    """The answer in one sentence."""
+    if found.payload is None:
+        return "The poses do not determine the tool's mass: " + "; ".join(found.lacking) + "."
+    mass = found.parameters["mass"]
+    return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
+
+
+def line(found: Weighed) -> str:
+    """The answer in one line."""
+    return printable(sentence(found))
+
+
+def text(found: Weighed) -> str:
+    """The sentence and the table of `palpate payload`."""
+    return as_text(sentence(found), [table(found).head, *table(found).rows])
+
+
+def html(found: Weighed) -> str:
+    """The same for a notebook."""
+    rows = [table(found).head, *table(found).rows]
+    return as_html(sentence(found), rows, [note["text"] for note in found.notes])
+
+
+def page(found: Weighed, title: str = "a record") -> str:
+    """The page of `palpate payload --report`."""
+    return render(
+        "page.html",
+        title=f"Payload of the sensor, from {title}",
+        about=sentence(found),
+        notes=[note["text"] for note in found.notes] + found.lacking,
+        tables=[table(found)],
+        figures=[
+            {
+                "source": embedded(svg(draw(found)), "image/svg+xml"),
+                "caption": "The force in each orientation: measured (dots) and predicted from tool and bias (rings)",
+            }
+        ],
+        source="" if found.payload is None else found.payload.to_toml(),
+        command=f"palpate payload {title}",
+    )
+
+
+def _parts(one: Estimated) -> list[tuple[str, float, float]]:
+    values, halves = np.atleast_1d(one.value), np.atleast_1d(one.half)
+    axes = [""] if len(values) == 1 else [", x", ", y", ", z"]
+    return [(a, float(v), float(h)) for a, v, h in zip(axes, values, halves, strict=True)]
+
+
+def _half(half: float) -> str:
+    return f"{half:.2g}" if np.isfinite(half) else "not told"
+
+
+def draw(found: Weighed) -> Figure:
+    """The force in each orientation, measured (dots) and of tool and bias (rings)."""
+    with style.inked():
+        figure, (axis,) = style.figure(height=2.8)
+        places = np.arange(1, len(found.shown) + 1)
+        for i, (name, colour) in enumerate(zip("xyz", style.SERIES[:3], strict=True)):
+            axis.plot(places, found.shown[:, 0, i], ".", color=colour, label=name)
+            axis.plot(places, found.shown[:, 1, i], "o", mfc="none", color=colour, markersize=8)
+        axis.set_xlabel("orientation")
+        axis.set_ylabel("force in the tool's axes [N]")
+        style.legend(axis)
+    return figure

@@ -1,1 +1,0 @@
-"""A weighed tool: its table and page, its looks in Python."""

@@ -1,1 +1,0 @@
-"""A press of a simulated arm: its page, with a film."""
