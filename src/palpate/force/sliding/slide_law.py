@@ -284,7 +284,8 @@ def command(law, s, desired, force, direction):
         press_again(law, s, n, LOST)
         return ZERO3
     felt = max(normal, size / sqrt(1.0 + law.mu_max * law.mu_max))
-    if s[TROUBLE] == FINE and abs(s[FORCE] - desired) > BAND * desired:
+    likely = 2.0 * sqrt(max(variance(s, FORCE, FORCE), 0.0))
+    if s[TROUBLE] == FINE and abs(s[FORCE] - desired) + likely > BAND * desired:
         s[TROUBLE] = AWAY
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
