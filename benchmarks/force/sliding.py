@@ -21,8 +21,9 @@ from msgspec.structs import replace
 from palpate.force.arm import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
+from palpate.force.sliding.ground import ground_of
 from palpate.force.sliding.slide_domain import obeys, slide_terms
-from palpate.force.sliding.slide_world import LAWS, directions, figures_of, ground_of, simulate
+from palpate.force.sliding.slide_world import LAWS, directions, figures_of, simulate
 
 SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)

@@ -14,9 +14,10 @@ from palpate.force import Gains, SlidingLoop, load_arm, load_gains
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_state as places
+from palpate.force.sliding.ground import ground_of
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from
-from palpate.force.sliding.slide_world import directions, figures_of, ground_of, simulate
+from palpate.force.sliding.slide_world import directions, figures_of, simulate
 from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, begin, correct, predict
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -30,6 +31,12 @@ def tuned(arm: str = "ur5e", force: float = 15.0, speed: float = 0.03, **others:
 @pytest.fixture(scope="module")
 def loop() -> SlidingLoop:
     return SlidingLoop(tuned())
+
+
+@pytest.fixture(scope="module", params=[0.0, 0.01])
+def any_loop(request) -> SlidingLoop:
+    """Without touches and with them."""
+    return SlidingLoop(tuned(touches=request.param))
 
 
 def in_a_slide(loop: SlidingLoop, normal: np.ndarray) -> None:
@@ -81,19 +88,21 @@ def test_misalignment_and_friction_scale_the_gain_within_the_certificates_shares
     assert m[near].max() < 1.13
 
 
-def test_no_command_is_faster_than_the_approach_before_a_force_was_felt(loop: SlidingLoop) -> None:
-    rng = np.random.default_rng(3)
+def test_no_command_is_faster_than_the_approach_before_a_force_was_felt(any_loop: SlidingLoop) -> None:
+    loop, rng = any_loop, np.random.default_rng(3)
     loop.reset()
     for k in range(3000):
         v = loop.update(rng.normal(0.0, 0.05, 3), k * 1e-5 * DOWN, rng.normal(size=3))
         assert np.linalg.norm(v) <= loop.gains.approach * (1.0 + 1e-12)
 
 
-def test_hostile_streams_leave_only_finite_velocities_within_the_limit(loop: SlidingLoop) -> None:
-    rng = np.random.default_rng(4)
+def test_hostile_streams_leave_only_finite_velocities_within_the_limit(any_loop: SlidingLoop) -> None:
+    loop, rng = any_loop, np.random.default_rng(4)
     odd = [np.nan, np.inf, -np.inf, 0.0, 1e300, -1e300, 99.9, 1e-300]
     for start in range(20):
         loop.reset() if start % 2 else in_a_slide(loop, DOWN)
+        if start % 4 == 1:
+            loop._state[places.PHASE], loop._state[places.TOUCHES] = places.MOVE, 1.0 + start % 3
         for _ in range(300):
             f, p, d = (rng.normal(0.0, size, 3) for size in (20.0, 1e-3, 1.0))
             for v in (f, p, d):

@@ -1,9 +1,11 @@
 """Laws in C that several tests compile."""
 
 import pytest
+from msgspec.structs import replace
 
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
+from palpate.force.slide_table import Slide
 from palpate.native.exporting import LawRequest, exported_law
 
 
@@ -17,6 +19,14 @@ def gains(tmp_path_factory):
 @pytest.fixture(scope="session")
 def force(gains):
     return exported_law(LawRequest(gains=gains))
+
+
+@pytest.fixture(scope="session")
+def slide(tmp_path_factory):
+    path = tmp_path_factory.mktemp("gains") / "slide.toml"
+    gains = gains_for(load_arm("ur5e"), 15.0, cap=4e4)
+    path.write_text(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)).to_toml())
+    return exported_law(LawRequest("sliding-loop", gains=path, into=(0.1, 0.0, -1.0)))
 
 
 @pytest.fixture(scope="session")

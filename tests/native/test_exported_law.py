@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from palpate._jit import kernel, law
-from palpate._jit.elementary import log
+from palpate._jit.elementary import exp, log
 from palpate.cli import main
 from palpate.native.exporting import LawRequest, exported_law
 from palpate.native.replay import program, write_rows
@@ -23,7 +23,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["force", "squares"])
+@pytest.mark.parametrize("name", ["force", "slide", "squares"])
 def test_no_tick_differs_in_a_bit(name, request):
     assert request.getfixturevalue(name).check(20_000) == (20_000, 0)
 
@@ -70,7 +70,7 @@ def sum_of_squares(gains, state, regressor, force):
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["force", "squares"])
+@pytest.mark.parametrize("name", ["force", "slide", "squares"])
 def test_the_strictest_compiler_finds_nothing(name, request, tmp_path):
     exported = request.getfixturevalue(name)
     exported.write(tmp_path / "law", "0", replace=False)
@@ -126,6 +126,11 @@ def test_the_example_presses_with_the_desired_force(force, tmp_path):
     assert all(abs(float(row.split()[2]) - 20.0) < 1.0 for row in rows[3:])
     assert "locked" in rows[-1]
     assert 3000.0 < float(last.split()[1]) < 6000.0
+
+
+def test_a_certificate_of_a_press_says_nothing_of_a_slide(slide):
+    assert "// law: " not in slide.sources.header
+    assert "// gains: " in slide.sources.header
 
 
 def test_the_state_has_four_kilobytes_at_most(force):
@@ -225,7 +230,7 @@ def equality():
     return module
 
 
-@pytest.mark.parametrize("name", ["force", "squares"])
+@pytest.mark.parametrize("name", ["force", "slide", "squares"])
 @pytest.mark.parametrize("compiler", ["clang", "aarch64-linux-gnu-gcc", "arm-none-eabi-gcc, Cortex-M7"])
 def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, request, tmp_path):
     bench, law = equality(), request.getfixturevalue(name)
@@ -301,12 +306,30 @@ def test_the_operators_of_python_are_those_of_c(tmp_path):
     """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
     from palpate.native.translation import OPERATORS
 
-    values = [0.0, -0.0, 1.0, -1.0, 2.5, -7.5, 1e300, -1e-300, 3.0, float("inf"), float("-inf"), float("nan")]
+    values = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        2.5,
+        -7.5,
+        1e300,
+        -1e-300,
+        3.0,
+        0.1,
+        0.3,
+        21.0,
+        2.0**52 + 1.0,
+        2.0**53,
+        1e15,
+    ]
+    values += [1.0 - 2.0**-53, 7.0 * (1.0 + 2.0**-52), float("inf"), float("-inf"), float("nan")]
     compiled = {"modulo": remainder, "floored": quotient, "larger": larger, "smaller": smaller}
     cases = [(name, a, b) for name in compiled for a in values for b in values]
     calls = "".join(f'    printf("%a\\n", {name}({spelled(a)}, {spelled(b)}));\n' for name, a, b in cases)
     functions = "".join(OPERATORS[name, "double"].group() for name in compiled)
-    text = f"#include <math.h>\n#include <stdio.h>\n{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
+    headers = "#include <math.h>\n#include <stdint.h>\n#include <stdio.h>\n"
+    text = f"{headers}{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
     (tmp_path / "operators.c").write_text(text)
     words = ["cc", "-std=c99", "-ffp-contract=off", "operators.c", "-lm", "-o", "operators"]
     subprocess.run(words, cwd=tmp_path, check=True)
@@ -340,6 +363,14 @@ def larger(a, b):
 @kernel
 def smaller(a, b):
     return min(a, b)
+
+
+@pytest.mark.parametrize("span", [1.0, 700.0, 745.0])
+def test_the_exponential_of_both_languages_is_right_to_a_unit_in_the_last_place(span):
+    for x in np.linspace(-span, min(span, 709.78), 4001).tolist():
+        assert abs(exp(x) - math.exp(x)) <= math.ulp(math.exp(x)), x
+    assert (exp(0.0), exp(-math.inf), exp(math.inf), exp(709.79)) == (1.0, 0.0, math.inf, math.inf)
+    assert math.isnan(exp(math.nan))
 
 
 def test_the_logarithm_of_both_languages_is_right_to_a_unit_in_the_last_place():

@@ -1,6 +1,6 @@
 """Elementary functions that are the same to the last bit in Python, compiled and in C: arithmetic alone."""
 
-from math import inf, nan
+from math import floor, inf, nan
 
 from palpate._jit.registry import law
 
@@ -37,3 +37,45 @@ def log(x):
     for i in range(11):
         tail = z * (_SERIES[10 - i] + tail)
     return exponent * _LN2_HIGH + (f - (s * (f - tail) - exponent * _LN2_LOW))
+
+
+_REMAINDER = (
+    1.66666666666666019037e-01,
+    -2.77777777770155933842e-03,
+    6.61375632143793436117e-05,
+    -1.65339022054652515390e-06,
+    4.13813679705723846039e-08,
+)
+"""Coefficients in r^2 of r (e^r + 1)/(e^r - 1) - 2 for |r| <= ln 2/2, by Remez (fdlibm, e_exp.c)."""
+_HIGHEST, _LOWEST = 709.782712893384, -745.1332191019411
+"""Largest x with a finite e^x, and smallest with one that is not 0."""
+_FAR = 2.0**64.0
+"""Of powers of two that are beyond the sum of `_HALVINGS`, or near it."""
+
+
+@law
+def exp(x):
+    """e^x, to a unit in the last place; inf above the largest number, and NaN of what is no number."""
+    if not x <= _HIGHEST:
+        return inf if x > 0.0 else nan
+    if x < _LOWEST:
+        return 0.0
+    exponent = float(floor(x / (_LN2_HIGH + _LN2_LOW) + 0.5))
+    high, low = x - exponent * _LN2_HIGH, exponent * _LN2_LOW
+    r = high - low
+    z = r * r
+    tail = 0.0
+    for i in range(5):
+        tail = z * (_REMAINDER[4 - i] + tail)
+    c = r - tail
+    power = 1.0 - ((low - r * c / (2.0 - c)) - high)
+    if abs(exponent) > 900.0:
+        power, exponent = (
+            (_FAR * power, exponent - 64.0) if exponent > 0.0 else (power / _FAR, exponent + 64.0)
+        )
+    for i in range(10):
+        if exponent >= _HALVINGS[i]:
+            power, exponent = power * _POWERS[i], exponent - _HALVINGS[i]
+        elif -exponent >= _HALVINGS[i]:
+            power, exponent = power / _POWERS[i], exponent + _HALVINGS[i]
+    return power

@@ -6,9 +6,13 @@ To name each of a hundred numbers in a kernel costs the compiler as much as the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import repeat
 from typing import Any, get_type_hints
 
 from palpate._jit.registry import stored
+
+_known: set[Callable[..., Any]] = set()
+"""Those that Numba knows."""
 
 
 def places(part: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
@@ -32,7 +36,7 @@ def reader(part: type) -> Callable[[Any], Any]:
     def read(a: Any) -> Any:
         return _made(part, iter(a))
 
-    stored.append((read, part, True))
+    stored[read] = part, True
     return read
 
 
@@ -43,7 +47,7 @@ def writer(part: type) -> Callable[[Any, Any], None]:
         for i, number in enumerate(leaves(value)):
             a[i] = number
 
-    stored.append((write, part, False))
+    stored[write] = part, False
     return write
 
 
@@ -52,19 +56,23 @@ def _made(part: type, numbers: Iterator[Any]) -> Any:
     return part(*(float(next(numbers)) if kind is float else _made(kind, numbers) for kind in kinds))
 
 
+def kind_of(part: type) -> Any:
+    """Numba's type of a part of numbers and parts of them."""
+    import numba
+
+    return numba.typeof(_made(part, repeat(0.0)))
+
+
 def hand_over() -> None:
     """Tells Numba what those registered since the last time do: a load, or a store, of the whole part."""
-    from itertools import repeat
-
-    import numba
     from numba.extending import overload
 
     from palpate._jit.inline_compiler import inside
 
-    while stored:
-        function, part, reads = stored.pop()
-        kind = numba.typeof(_made(part, repeat(0.0)))
-        meaning = _reading(_load(kind)) if reads else _writing(_store(kind))
+    for function in [one for one in stored if one not in _known]:
+        part, reads = stored[function]
+        _known.add(function)
+        meaning = _reading(_load(kind_of(part))) if reads else _writing(_store(kind_of(part)))
         overload(function, strict=False, jit_options=inside())(meaning)
 
 

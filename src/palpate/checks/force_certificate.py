@@ -116,11 +116,13 @@ class ExactClaim:
         arm = gains["arm"]
         own, rate = inner or arm["inner"], Fraction(arm["rate"])
         self.claim, self.kind, self.tick = claim, claim["kind"], 1 / rate
-        self.torque, self.series = own["kind"] == "torque", Fraction(own["stiffness"])
+        self.torque, self.servo = own["kind"] == "torque", own["kind"] == "servo"
+        self.series = Fraction(own["stiffness"])
         self.theta, self.alpha = Fraction(gains["theta"]), Fraction(gains.get("alpha", 0.42))
         cap, relief = Fraction(gains["cap"]), Fraction(gains.get("relief", 0.0))
-        self.compliance = 1 / self.series if self.torque else Fraction(0)
-        cap = cap if self.torque else cap / (1 + cap / self.series)
+        self.yields = self.torque or self.servo
+        self.compliance = 1 / self.series if self.yields else Fraction(0)
+        cap = cap if self.yields else cap / (1 + cap / self.series)
         felt = self.compliance * cap
         lag = self.theta * (1 - relief * (felt + Fraction(1, 2)) / (felt + 1))
         self.gain = self.alpha / lag * (self.compliance + 1 / cap)
@@ -130,12 +132,15 @@ class ExactClaim:
         self.delay = most - self.unsure
         self.period = max(ceil(rate / Fraction(arm["sensor"]["sampling"]) - SMALL), 1)
         self.ends: list[tuple[Fraction, Fraction]] = []
-        if self.torque:
+        self.smooth, self.ahead = Fraction(1), Fraction(0)
+        if self.yields:
             self.mass, self.damping = Fraction(own["mass"]), Fraction(own["damping"])
         else:
             w = [2 * PI * Fraction(v) for v in own.get("bandwidth_interval") or (own["bandwidth"],) * 2]
             z = [2 * Fraction(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
             self.ends = [(w[0] ** 2, w[1] ** 2), (z[0] * w[0], z[1] * w[1])]
+        if self.servo:
+            self._lead(1 + felt)
         self.filter = polynomial(arm["sensor"].get("low_pass", "none"))
         names = ("low", "high", "least", "most")
         self.low, self.high, self.least, self.most = (Fraction(claim[name]) for name in names)
@@ -150,11 +155,23 @@ class ExactClaim:
         self.state += [f"{sent}{i}" for i in range(1, late)]
         self._sound()
 
+    def _lead(self, total: Fraction) -> None:
+        """Sets the share of a speed that the smoothed one takes up in a tick, and the ticks of lead on it."""
+        lag, rest = self.damping / self.series, 1 - 4 * self.mass * self.series / self.damping**2 * total
+        root = Fraction(isqrt(round(rest * (1 << 400))), 1 << 200) if rest > 0 else Fraction(0)
+        late = lag / 10
+        self.smooth, self.ahead = (
+            self.tick / (late + self.tick),
+            (lag / 2 / total * (1 + root) + late) / self.tick,
+        )
+
     def _sound(self) -> None:
         (young, old), (lowest, highest) = self.ages, self.shares
         adapting = self.kind == "adapting"
         fine = {
-            "kind": self.kind in ("held", "adapting") or (self.kind == "one-sided" and not self.torque),
+            "kind": self.kind == "held"
+            or (self.kind == "adapting" and not self.servo)
+            or (self.kind == "one-sided" and not self.yields),
             "shares": 0 < lowest <= highest if adapting else lowest == 1 <= highest,
             "ages": 0 <= young <= old >= self.period and (adapting or young == old) and (young or self.order),
             "intervals": 0 <= self.low <= self.high > 0 <= self.least <= self.most and 1 <= self.parts <= 100,
@@ -168,7 +185,14 @@ class ExactClaim:
         p, n = self.p, self.order
         A = np.full((p + 1, p + 1), Fraction(0), object)
         A[0, 1] = self.w0
-        if inner is None:
+        if self.servo:
+            pull, damped = self.series + K, self.damping + B
+            A[1, [0, 1, p]] = (
+                -pull / self.mass / self.w0,
+                -damped / self.mass,
+                self.series / self.mass / self.w0,
+            )
+        elif inner is None:
             A[1, [0, 1, p]] = -K / self.mass / self.w0, -B / self.mass, self.k0 / self.mass / self.w0
         else:
             A[1, [0, 1, p]] = -inner[0] / self.w0, -inner[1], inner[0] / self.w0
@@ -185,8 +209,11 @@ class ExactClaim:
         rows = {"r1": {"f1": one} if self.order else {"x": K / self.k0, "v": B * self.w0 / self.k0}}
         rows |= {f"r{i}": {f"r{i - 1}": one} for i in range(2, self.readings + 1)}
         used = {f"r{age}": one} if age else rows["r1"]
-        rows["u"] = {k: -gain * self.k0 * v for k, v in used.items()}
-        held = rows["c0"] = {"c0": one} | {k: self.tick * v for k, v in rows["u"].items()}
+        taken = {k: -self.smooth * gain * self.k0 * v for k, v in used.items()}
+        rows["u"] = taken | ({"u": 1 - self.smooth} if self.servo else {})
+        held = {"c0": one} | {k: self.tick * (1 + self.ahead) * v for k, v in rows["u"].items()}
+        held["u"] = held.get("u", 0) - self.tick * self.ahead
+        rows["c0"] = held
         name, first = ("t", 2) if self.torque else ("c", 1)
         rows |= {f"{name}{i}": {f"{name}{i - 1}": one} for i in range(first, len(self.state))}
         if self.torque:
@@ -234,7 +261,7 @@ class ExactClaim:
         """K, B, inner loop, gain and age of all extremes of a cell."""
         low, high, least, most, part, loss = box
         old, theta = self.ages[1] + self.unsure, self.theta
-        fades = self.kind == "adapting" and not self.torque and self.shares[0] < Fraction(1, 100)
+        fades = self.kind == "adapting" and not self.yields and self.shares[0] < Fraction(1, 100)
         bounds, times = dict.fromkeys((low, high)), dict.fromkeys((least, most))
         surfaces = [(b / (1 + t / theta), t * b / (1 + t / theta)) for b, t in product(bounds, times)]
         if self.kind == "adapting":
@@ -249,7 +276,7 @@ class ExactClaim:
         else:
             laws = [(s * self.gain, old - loss) for s in dict.fromkeys(self.shares)]
         inners: list[Any] = [None]
-        if not self.torque:
+        if not self.yields:
             parts = zip(divmod(part, self.parts), self.ends, strict=True)
             cut = [
                 dict.fromkeys(a + (b - a) * Fraction(i + k, self.parts) for k in (0, 1))
@@ -266,12 +293,12 @@ class ExactClaim:
         the second derivative of exp(T (M + s D)) for |dA/ds| <= D: twice the last block of one of 3 x 3 blocks.
         None where A is affine in all that varies. For a position arm x is counted from the held input: at rest it is 0.
         """
-        if not self.torque and all(a == b for a, b in self.ends):
+        if not self.yields and all(a == b for a, b in self.ends):
             return None
         low, high, least, most = box[:4]
         inners = [c[2] for c in self.corners(box)]
         rates = np.array([self.rates(*c[:3]) for c in self.corners(box)])
-        if self.torque:
+        if self.yields:
             none, of_K, of_B = (
                 self.rates(Fraction(a), Fraction(b), None) for a, b in ((0, 0), (1, 0), (0, 1))
             )
@@ -321,7 +348,7 @@ class ExactClaim:
         after = symmetric(P, Phi)
         if W is None:
             return is_positive(Ball(P.middle - after.middle, after.error))
-        if not self.torque:
+        if not self.yields:
             fed = Ball(np.vstack([fed.middle[:1] - fed.middle[-1:], fed.middle[1:]]), 2 * fed.error)
         beside = symmetric(W, fed)
         for halves in sorted(range(-60, 1), key=lambda i: abs(i - self._last)):

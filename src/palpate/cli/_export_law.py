@@ -11,6 +11,7 @@ from palpate.cli._answer import print_answer
 from palpate.cli._program import command
 from palpate.cli._terminal import console, head, place
 from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.values import vector
 from palpate.errors import InputError
 
 
@@ -22,7 +23,10 @@ class LawOptions:
     Parameters
     ----------
     law
-        force-loop, of a gains file; contact-identifier; or recursive-least-squares.
+        force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; contact-identifier; or
+        recursive-least-squares.
+    into
+        Of sliding-loop: direction into the surface, x,y,z in the base's axes.
     parameters
         Of recursive-least-squares, 3 or 4.
     forgetting
@@ -38,6 +42,7 @@ class LawOptions:
     """
 
     law: str = "force-loop"
+    into: Annotated[str, SIGNED] = "0,0,-1"
     parameters: Annotated[int, SIGNED] = 3
     forgetting: Annotated[float, SIGNED] = 1.0
     low_pass: str = "butterworth3:120"  # noqa: S105 - a filter
@@ -58,7 +63,8 @@ def export_law(gains: Path | None, options: LawOptions, output: Any) -> int:
 
     if output.out is None and not output.check:
         raise InputError("nothing to do: give --out FOLDER, or --check, or both")
-    request = LawRequest(gains=gains, **asdict(options))
+    into = vector("into", options.into, "number")
+    request = LawRequest(gains=gains, **{**asdict(options), "into": into})
     using = compiler()[0] if output.check else None
     with console(stderr=True).status("exporting") as status:
         place_of = (

@@ -21,7 +21,7 @@ from palpate.text import printable
 
 if TYPE_CHECKING:
     from palpate.force import Gains
-    from palpate.force.sliding.slide_world import Ground
+    from palpate.force.sliding.ground import Ground
 
 _SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
 
@@ -79,11 +79,11 @@ class SlideOptions:
     step: Annotated[str, SIGNED] = "0:mm"
     touches: Annotated[str, SIGNED] = "10:mm"
     gains: Path | None = None
-    seed: Annotated[int, WHOLE] = 0
+    seed: Annotated[int, WHOLE, Parameter(group=Group("Noise", sort_key=2))] = 0
 
     def ground(self) -> tuple[Ground, float]:
         """The surface, and its radius [m]."""
-        from palpate.force.sliding.slide_world import ground_of
+        from palpate.force.sliding.ground import ground_of
 
         name, _, size = self.shape.partition(":")
         radius = in_si("--shape", size, "length") if size else 0.2

@@ -89,16 +89,6 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
         """Natural period of the tip's mass on the arm's own stiffness, in the air [s]; 0 of a tip without mass."""
         return 0.0 if self.mass is None else 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
 
-    @property
-    def longest_delay(self) -> float:
-        """The upper end of what the delay may be [s]."""
-        return self.delay if self.delay_interval is None else self.delay_interval[1]
-
-    @property
-    def shortest_delay(self) -> float:
-        """The lower end of it [s]."""
-        return self.delay if self.delay_interval is None else self.delay_interval[0]
-
 
 class TorqueLoop(Table, tag="torque", tag_field="kind"):
     """A tip under K_p (x_c - x) - D xdot, which makes it a position with a spring in series."""
@@ -111,6 +101,29 @@ class TorqueLoop(Table, tag="torque", tag_field="kind"):
     """D [N s/m]."""
     delay: NotNegative
     """From reading the encoders to the torque [s]."""
+
+
+class ServoLoop(Table, tag="servo", tag_field="kind"):
+    """A tip that a servo pulls with K_s (x_c - x) - D xdot, between ticks too; its encoders show how it yields."""
+
+    mass: Positive
+    """Of the tip along the normal [kg]."""
+    stiffness: Positive
+    """K_s [N/m]."""
+    damping: Positive
+    """D [N s/m]."""
+    delay: NotNegative
+    """Between sending a command and the servo having it [s]."""
+
+    @property
+    def lag(self) -> float:
+        """D/K_s, in free motion [s]."""
+        return self.damping / self.stiffness
+
+    @property
+    def inertia(self) -> float:
+        """4 m K_s/D^2: above 1 the tip swings."""
+        return 4.0 * self.mass * self.stiffness / self.damping**2
 
 
 class Sensor(Table, omit_defaults=True):
@@ -151,7 +164,7 @@ class Arm(Table):
     title: str
     rate: Annotated[float, Meta(ge=20, le=20000)]
     """Ticks a second [Hz]."""
-    inner: PositionLoop | TorqueLoop
+    inner: PositionLoop | TorqueLoop | ServoLoop
     sensor: Sensor
     limits: Limits
 
@@ -170,8 +183,8 @@ class Arm(Table):
 
     @property
     def kind(self) -> str:
-        """`position` or `torque`."""
-        return "position" if isinstance(self.inner, PositionLoop) else "torque"
+        """`position`, `torque` or `servo`."""
+        return str(self.inner.__struct_config__.tag)
 
     @property
     def tick(self) -> float:
@@ -191,14 +204,13 @@ class Arm(Table):
     @property
     def longest_delay(self) -> float:
         """The inner loop's delay, at most [s]."""
-        return self.inner.longest_delay if isinstance(self.inner, PositionLoop) else self.inner.delay
+        return (getattr(self.inner, "delay_interval", None) or (0.0, self.inner.delay))[1]
 
     @property
     def unsure_ticks(self) -> int:
         """Whole ticks by which the delay may be shorter than `delay_ticks`."""
-        if not isinstance(self.inner, PositionLoop) or self.inner.delay_interval is None:
-            return 0
-        return self.delay_ticks - math.floor(self.inner.shortest_delay * self.rate + 1e-9)
+        ends = getattr(self.inner, "delay_interval", None)
+        return 0 if ends is None else self.delay_ticks - math.floor(ends[0] * self.rate + 1e-9)
 
     @property
     def sensor_ticks(self) -> int:

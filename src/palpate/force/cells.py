@@ -17,7 +17,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.force.arm import PositionLoop
-from palpate.force.sampled_loop import Law, SampledLoop
+from palpate.force.sampled_loop import Law, SampledLoop, law_for
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -74,7 +74,7 @@ class Prover:
         theta: of the law [s].
         gains: g of a tick may be anything between these two [m/(s N)]; if `relative`, g theta K_eff(K + B/theta) may.
         younger: ticks by which a reading may be younger than the oldest, from tick to tick.
-        kept: of the command's low-pass.
+        bound: K_u where the gain is constant, on which a servo's lead depends [N/m].
         relative: see `gains`.
         fading: what may come near to nothing within a cell, "gain" or "surface"; empty if neither does.
         parts: into how many parts w^2 and 2 z w of an inner loop known to intervals are cut, each.
@@ -85,7 +85,7 @@ class Prover:
     theta: float
     gains: tuple[float, float]
     younger: int = 0
-    kept: float = 0.0
+    bound: float = 0.0
     relative: bool = False
     fading: Literal["", "gain", "surface"] = ""
     parts: int = 1
@@ -100,7 +100,7 @@ class Prover:
         return isinstance(inner, PositionLoop) and len(inner.corners) == 1
 
     def inner(self, part: int) -> list[tuple[float, float] | None]:
-        """Corners of a part of what the inner loop may be; of a torque arm, its own."""
+        """Corners of a part of what the inner loop may be; its own but for a position arm."""
         inner = self.loop.arm.inner
         if not isinstance(inner, PositionLoop):
             return [None]
@@ -120,7 +120,8 @@ class Prover:
         if self.fading == "gain":
             low, high = low / (1.0 + box.most / self.theta), high / (1.0 + box.least / self.theta)
         losses = range(self.younger + 1) if self.relative else (box.loss,)
-        return [(Law(g, self.kept), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
+        lead = law_for(self.loop.arm, 0.0, self.bound)
+        return [(replace(lead, gain=g), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
 
     def corners(self, box: Box) -> list[tuple[float, float]]:
         """(K, B) of the corners; where the gain fades, of a fixed K, since g K alone counts and rest has to be one."""
@@ -154,8 +155,8 @@ class Prover:
     def equilibrium(self, box: Box) -> Array:
         """The matrix without what fades: the command stands still."""
         if self.fading == "surface":
-            return self.loop.phi(0.0, 0.0, Law(self.gains[0], self.kept), box.loss)
-        return self.loop.phi(box.high, 0.0, Law(0.0, self.kept))
+            return self.loop.phi(0.0, 0.0, Law(self.gains[0]), box.loss)
+        return self.loop.phi(box.high, 0.0, Law(0.0))
 
     def _of(self, key: tuple[float, ...], loop: SampledLoop, laws: list[tuple[Law, int]]) -> list[Array]:
         """Of one corner, which neighbouring cells share."""
@@ -234,7 +235,7 @@ def _with_rest(turned: Array, rests: Array, alone: float) -> float:
 def curved(prover: Prover, box: Box) -> Array:
     """How far E = exp(T A) may lie from the multilinear function through its corners, by element, shape (p, p + 1).
 
-    The parameters are K + B/theta and 1/(1 + B/(K theta)) for a torque arm, w^2 and 2 z w for a position arm: A is
+    The parameters are w^2 and 2 z w for a position arm, K + B/theta and 1/(1 + B/(K theta)) for others: A is
     affine in each alone, so that the distance is at most sum of h^2/8 |E''|, and |E''| at most twice the last block of
     the exponential of [[M, |D|, 0], [0, M, |D|], [0, 0, M]], where M has the largest sizes of A's elements, and on its
     diagonal their largest values: |exp(t A)| <= exp(t M), since |1 + t a/n| = 1 + t a/n for all large n.

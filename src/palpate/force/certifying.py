@@ -33,9 +33,9 @@ PART = 0.06
 def exact_interval(gains: Gains, damping_time: float = 0.0) -> tuple[float, float]:
     """K + B/theta, as felt, on which the loop with K_u = cap is stable, for B/K of this size [N/m].
 
-    Exact for a position arm. For a torque arm the upper end is the cap: its gain is chosen for all below it.
+    Exact for a position arm. For others the upper end is the cap: its gain is chosen for all below it.
     """
-    if gains.arm.kind == "torque":
+    if gains.arm.kind != "position":
         return 0.0, gains.seen_cap
     cap = gains.seen_cap
     K = cap / (1.0 + damping_time / gains.theta)
@@ -124,7 +124,7 @@ def _felt(
         return low, high
     cap = gains.seen_cap
     ends = [exact_interval(gains, t)[1] for t in np.linspace(0.0, most, 9).tolist()]
-    share = 1.0 if gains.arm.kind == "torque" else EXACT_SHARE / margin
+    share = 1.0 if gains.arm.kind != "position" else EXACT_SHARE / margin
     return SOFTEST * cap, float(share * min(ends))
 
 
@@ -169,7 +169,7 @@ def _starts(prover: Prover, box: Box, edge: float) -> list[Box]:
         return [box]
     if box.low == box.high:
         return _rings(box, prover.theta, RINGS)
-    if prover.loop.arm.kind == "torque" or box.most == 0.0 or box.high <= 0.5 * edge:
+    if prover.loop.arm.kind != "position" or box.most == 0.0 or box.high <= 0.5 * edge:
         return _decades(box)
     soft = _decades(replace(box, high=0.5 * edge)) if box.low < 0.5 * edge else []
     return soft + _graded(replace(box, low=max(box.low, 0.5 * edge)), prover.theta, edge)

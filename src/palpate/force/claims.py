@@ -18,6 +18,7 @@ from palpate.force.sampled_loop import SampledLoop
 SHARES = {
     "position": ((0.05, (2.0, 1.5, 1.2), 0), (1e-4, (1.5, 1.2), 1)),
     "torque": ((0.05, (2.0, 1.5, 1.2), 0),),
+    "servo": (),
 }
 """g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; ticks by which its
 readings may be later than the jitter that is asked for.
@@ -113,7 +114,10 @@ class Claim(Table):
         if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
             fading = "gain"
         relative = self.kind == "adapting"
-        return Prover(loop, gains.theta, ends, younger, relative=relative, fading=fading, parts=self.parts)
+        return Prover(
+            loop, gains.theta, ends, younger, bound=gains.seen_cap,
+            relative=relative, fading=fading, parts=self.parts,
+        )  # fmt: skip
 
     def tiled(self, box: Box) -> bool:
         """Whether the cells cover one of its boxes: every rectangle between two neighbouring edges lies in a cell."""

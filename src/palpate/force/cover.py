@@ -95,7 +95,7 @@ class Search:
         """Whether a long search is due: always where it finds what the short one does not."""
         self._boxes += 1
         if (
-            self.prover.loop.arm.kind == "torque"
+            self.prover.loop.arm.kind != "position"
             and len(self.prover.laws(box)) == 1
             and self._boxes < PATIENCE
         ):

@@ -16,6 +16,7 @@ UNCOVERED = (
     "limits of speed and torque",
     "loss of contact while the gain changes or within a tick, and of a torque arm",
     "readings between ticks (their age counts in whole ticks)",
+    "the adapting law of a servo",
     "the arm's compliance between encoders and tip together with damping of the surface; the tip's mass on it",
     "a surface that curves, except by the range of its tangent stiffness",
     "the peak on a surface that stiffens under the tip: the gain is the old one for a lag",
@@ -28,7 +29,7 @@ def bounds(claim: Claim, gains: Gains) -> tuple[float, float]:
     The gain falls with K_u, since rho is below 2/3. For a position arm the shares tell it; for a torque arm it depends
     on the stiffness, and the worst of a grid is taken.
     """
-    if gains.arm.kind == "position":
+    if gains.arm.kind != "torque":
         return 1.0 / claim.shares[1], 1.0 / claim.shares[0]
     times = np.geomspace(1e-3, 1e3, 6001)
     least, most = times[0], times[-1]

@@ -15,7 +15,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import read_text
-from palpate.force.arm import Arm, PositionLoop, Positive, Table, from_toml
+from palpate.force.arm import Arm, PositionLoop, Positive, ServoLoop, Table, from_toml
 from palpate.force.lag import lag_of
 from palpate.force.law import Cautious
 from palpate.force.sampled_loop import filter_of
@@ -51,6 +51,9 @@ _DIGIT = 1e-5
 _TOUCH = 0.5
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; on a surface with a damping ratio of 1
 the damping's 2 v sqrt(K m) is then F_d."""
+_LEANING = 2.0 / 3.0
+"""Share of F_d that a servo may lean on a surface with by its own damper, D v, as it touches: half as much again
+is left for the swing of its tip."""
 _BRISK = 1.15
 """Of the speed that the law itself asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
 (benchmarks/force/first_touches.py)."""
@@ -172,11 +175,13 @@ class Gains(Table):
         low_pass = arm.low_pass
         memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
         swing = SWING * arm.inner.swing if isinstance(arm.inner, PositionLoop) else 0.0
+        servo = arm.inner if isinstance(arm.inner, ServoLoop) else None
         E, e0, e1, c = followed(arm)
         step = arm.sensor.resolution or 0.0
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
-            "relief": self.relief, "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
+            "relief": self.relief, "lead": servo.lag if servo else 0.0, "inertia": servo.inertia if servo else 0.0,
+            "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
             "approach": self.approach, "level": 2.0 * self.level, "bias": self.bias, "drift": self.drift,
             "noise": arm.sensor.noise, "resolution": step,
             "least": max((0.25 * arm.sensor.noise) ** 2, step**2 / 12.0, (_DIGIT * self.force) ** 2),
@@ -289,6 +294,8 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
     """
     speed = min(arm.limits.speed, _BRISK * alpha * force / (theta * arm.seen(cap)))
     mass = arm.inner.mass
+    if isinstance(arm.inner, ServoLoop):
+        speed = min(speed, _LEANING * force / arm.inner.damping)
     return speed if mass is None else min(speed, _TOUCH * force / float(np.sqrt(cap * mass)))
 
 

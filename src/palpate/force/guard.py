@@ -193,7 +193,7 @@ def renewed(law, state):
         law.period / law.tick, w.steepest,
     )  # fmt: skip
     return CautiousState(
-        s.ticks, s.desired, watch, s.follow, s.stage, s.known, s.starts, s.bound, state.backstop
+        s.ticks, s.desired, watch, s.follow, s.stage, s.known, s.starts, s.bound, state.backstop, s.pace
     )
 
 
@@ -204,5 +204,5 @@ def after_gap(state):
     known = Learned(k.slow, k.fast, 0.0, k.origin, k.shown, k.found, k.std)
     return CautiousState(
         state.ticks, state.desired, state.watch, state.follow, state.stage, known, state.starts, state.bound,
-        state.backstop,
+        state.backstop, state.pace,
     )  # fmt: skip

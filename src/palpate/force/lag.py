@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.boundary import stable_between
-from palpate.force.sampled_loop import Law, SampledLoop
+from palpate.force.sampled_loop import SampledLoop, law_for
 
 SOFTEST = 1.0
 """From where on stiffnesses are looked at [N/m]; below it a torque arm's loop does not change any more."""
@@ -21,18 +21,17 @@ STRUCTURE = 0.05
 """Damping ratio of a drive train's own spring, typical of strain-wave gears."""
 
 
-def ultimate_gain(loop: SampledLoop, stiffness: float, damping: float = 0.0, kept: float = 0.0) -> float:
-    """g K_eff at which the loop on this surface starts to grow [1/s].
+def ultimate_gain(loop: SampledLoop, stiffness: float, damping: float = 0.0) -> float:
+    """g K_eff at which the loop on this surface starts to grow [1/s], with a servo's lead for its stiffness.
 
     Args:
         loop: of the arm.
         stiffness: K; for a position arm K_eff [N/m].
         damping: B [N s/m].
-        kept: of the command's low-pass, see `Law`.
     """
     seen = stiffness if loop.arm.kind == "position" else loop.arm.seen(stiffness)
-    start = loop.phi(stiffness, damping, Law(0.0, kept))
-    found = stable_between(start, loop.phi(stiffness, damping, Law(1.0 / seen, kept)))
+    start, unit = (law_for(loop.arm, g, stiffness) for g in (0.0, 1.0 / seen))
+    found = stable_between(loop.phi(stiffness, damping, start), loop.phi(stiffness, damping, unit))
     if not found or found[0][0] > 0.0:
         raise InputError(
             f"{loop.arm.title}: its own loop is not stable on a surface of {stiffness:g} N/m; "
@@ -70,7 +69,7 @@ def swinging(arm: Arm, lag: float) -> float:
     w: Array = np.geomspace(0.1, 100.0, 20_000) / lag  # half a turn of a delay is at pi/2
     s = 1j * w
     square, rate = inner.squared
-    late = inner.longest_delay + 0.5 / arm.sensor.sampling + 1.5 * arm.tick
+    late = arm.longest_delay + 0.5 / arm.sensor.sampling + 1.5 * arm.tick
     rigid = square / (s * s + rate * s + square) * arm.low_pass.at(w) * np.exp(-late * s) / s
     damping = 2.0 * STRUCTURE * sqrt(own * m)
     stiffnesses = np.geomspace(1e-3 * own, arm.limits.stiffness, _POINTS)

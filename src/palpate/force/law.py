@@ -12,7 +12,7 @@ operators: compiled in `ForceLoop`, in the simulator and on the bench, plain in 
 from typing import NamedTuple
 
 from palpate._jit import law, part
-from palpate._vector import ZERO3, Mat3, Vec3
+from palpate._vector import ZERO3, Mat3, Vec3, sqrt
 from palpate.force.backstop import MOST, Backstop, guarded
 from palpate.force.contact_evidence import AIR, Steepest, Watch, behind, listened, retared, watched, white
 from palpate.force.learned import Learned, begun, taken
@@ -20,6 +20,10 @@ from palpate.force.onset import NO_STARTS, Starts
 from palpate.force.regression import NOTHING, Fit
 from palpate.force.stage import STEP, Stage, is_false, staged
 from palpate.force.stiffness_bound import Bound, Sure, bounded
+
+SMOOTHING = 0.1
+"""Of a servo's lag in free motion, by which its lead is smoothed: the usual filter of a PID controller's derivative,
+N = 10 (Astrom and Haegglund, *PID Controllers*)."""
 
 
 @part
@@ -33,6 +37,8 @@ class Cautious(NamedTuple):
         compliance: of the spring between commanded and measured position [m/N]; 0 where the measured position is
             the one before it.
         relief: rho, see `relief_of`; 0 for a position arm.
+        lead: lag D/K_s of a servo that yields, in free motion [s]; 0 for other arms.
+        inertia: 4 m K_s/D^2 of the same, above 1 where its tip swings; 0 for other arms.
         cap: largest K + B/theta that there may be, as the measured position feels it [N/m].
         floor: lowest K_u that is used [N/m].
         speed: the arm's limit [m/s].
@@ -63,6 +69,8 @@ class Cautious(NamedTuple):
     alpha: float
     compliance: float
     relief: float
+    lead: float
+    inertia: float
     cap: float
     floor: float
     speed: float
@@ -104,6 +112,7 @@ class Cautious(NamedTuple):
             NO_STARTS,
             Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0)),
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            self.approach,
         )
 
     def step(self, state, desired, force, position):
@@ -116,8 +125,8 @@ class Cautious(NamedTuple):
         stage = staged(self, state, watch, desired, before, false)
         if false:
             watch = retared(self, watch)
-        known = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
-        known = taken(self, known, state, stage, watch, follow, force)
+        start = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
+        known = taken(self, start, state, stage, watch, follow, force)
         bound = bounded(self, state.bound, stage, known, watch, follow)
         backstop = guarded(self, state.backstop, state.stage, stage, watch, desired, before)
         u = backstop.care * gain(self, bound.used) * (desired - (force - watch.rest))
@@ -128,8 +137,9 @@ class Cautious(NamedTuple):
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == AIR:
             speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
+        speed, pace = leading(self, state.pace, speed, bound.used, limit)
         return speed, CautiousState(
-            state.ticks + 1.0, desired, watch, follow, stage, known, starts, bound, backstop
+            state.ticks + 1.0, desired, watch, follow, stage, known, starts, bound, backstop, pace
         )  # fmt: skip
 
     def stiffness_bound(self, state):
@@ -159,6 +169,25 @@ class CautiousState(NamedTuple):
     starts: Starts
     bound: Bound
     backstop: Backstop
+    pace: float  # smoothed speed, which a servo's command leads [m/s]
+
+
+@law
+def leading(law, pace, speed, bound, limit):
+    """Speed of the command, and the smoothed speed, both of which are the law's own speed but for a servo [m/s].
+
+    A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
+    m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
+    that it stays the speed that the tip can have.
+    """
+    if law.lead == 0.0:
+        return speed, speed
+    total = 1.0 + law.compliance * bound
+    lead = 0.5 * law.lead / total * (1.0 + sqrt(max(1.0 - law.inertia * total, 0.0)))
+    ahead = (lead + SMOOTHING * law.lead) / law.tick
+    after = pace + (speed - pace) / (1.0 + SMOOTHING * law.lead / law.tick)
+    sent = max(min(after + ahead * (after - pace), limit), -limit)
+    return sent, (sent + ahead * pace) / (1.0 + ahead)
 
 
 @law

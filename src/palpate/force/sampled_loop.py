@@ -9,7 +9,8 @@ from math import pi
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.force.arm import Arm, PositionLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
+from palpate.force.law import SMOOTHING
 from palpate.signals.low_pass import LowPass
 
 
@@ -20,18 +21,30 @@ class Law:
     Args:
         gain: g [m/(s N)].
         kept: share of the low-passed command that stays from tick to tick, tau/(tau + T).
+        ahead: ticks by which the command is ahead of that low-pass, x_c = x_c + T (u + ahead (u - u of before)).
     """
 
     gain: float
     kept: float = 0.0
+    ahead: float = 0.0
+
+
+def law_for(arm: Arm, gain: float, bound: float) -> Law:
+    """The law with a gain g [m/(s N)] at K_u = bound [N/m]: with a servo's lead, as `law.leading` has it."""
+    inner = arm.inner
+    if not isinstance(inner, ServoLoop):
+        return Law(gain)
+    total, late = 1.0 + bound / inner.stiffness, SMOOTHING * inner.lag
+    lead = 0.5 * inner.lag / total * (1.0 + np.sqrt(max(1.0 - inner.inertia * total, 0.0)))
+    return Law(gain, late / (late + arm.tick), float(lead + late) * arm.rate)
 
 
 @dataclass(frozen=True)
 class SampledLoop:
     """x_(k+1) = Phi x_k for the loop of v = LP_tau(g (F_d - F_m)) on a surface F = K x + B xdot.
 
-    The surface is what the arm feels: for a position arm K_eff and B_eff; for a torque arm the surface's own, since
-    there the spring in series is part of the dynamics. Delays are whole ticks, rounded up; within a tick the command
+    The surface is what the arm feels: for a position arm K_eff and B_eff; for others the surface's own, since there the
+    spring in series is part of the dynamics. Delays are whole ticks, rounded up; within a tick the command
     is held and everything else is continuous (matrix exponential).
 
     The state, in this order: x, xdot/w0, force/k0 through the sensor's low-pass, the readings on their way,
@@ -74,7 +87,7 @@ class SampledLoop:
     @cached_property
     def lines(self) -> tuple[int, int]:
         """How many readings and how many commands, or torques beside a command, are kept."""
-        commands = max(self.delay, 1) if self.arm.kind == "position" else self.delay + 1
+        commands = self.delay + 1 if self.arm.kind == "torque" else max(self.delay, 1)
         return self.arm.sensor_ticks + self.arm.unsure_ticks + self.extra, commands
 
     @cached_property
@@ -98,7 +111,7 @@ class SampledLoop:
         return (
             "x", "v", *(f"f{i + 1}" for i in range(len(self.low_pass[1]))),
             *(f"r{i + 1}" for i in range(readings)), "u", "c0",
-            *(f"c{i}" if self.arm.kind == "position" else f"t{i}" for i in sent),
+            *(f"t{i}" if self.arm.kind == "torque" else f"c{i}" for i in sent),
         )  # fmt: skip
 
     @cached_property
@@ -109,7 +122,7 @@ class SampledLoop:
         return {"w0": self.rate_unit, "k0": self.force_unit, "wf": rate ** (1.0 / order)}
 
     def rates(self, stiffness: float, damping: float) -> tuple[Array, Array]:
-        """Between ticks: zdot = A z + b u of tip and sensor; u is the position or the torque that is held."""
+        """Between ticks: zdot = A z + b u of tip and sensor; u is the command or the torque that is held."""
         F, f, _ = self.low_pass
         n, w = len(f), self.rate_unit
         A, b = np.zeros((2 + n, 2 + n)), np.zeros(2 + n)
@@ -118,6 +131,9 @@ class SampledLoop:
         if isinstance(inner, PositionLoop):
             square, rate = inner.squared if self.inner is None else self.inner
             A[1, 0], A[1, 1], b[1] = -square / w, -rate, square / w
+        elif isinstance(inner, ServoLoop):
+            K, D, m = inner.stiffness, inner.damping, inner.mass
+            A[1, 0], A[1, 1], b[1] = -(K + stiffness) / m / w, -(D + damping) / m, K / m / w
         else:
             A[1, 0], A[1, 1] = -stiffness / inner.mass / w, -damping / inner.mass
             b[1] = self.force_unit / inner.mass / w  # the held torque is counted in k0 too
@@ -170,14 +186,15 @@ class SampledLoop:
             Phi[filtered, p + readings - 1 - loss] = fed
         else:  # of this very tick
             Phi[filtered, :p] = fed * reading
-        # x_c = x_c + T y, the new y.
-        Phi[command] = tick * Phi[filtered]
+        # x_c = x_c + T y, the new y, and what it is ahead of that.
+        Phi[command] = tick * (1.0 + law.ahead) * Phi[filtered]
+        Phi[command, filtered] -= tick * law.ahead
         Phi[command, command] += 1.0
         for i in range(1, self.lines[1]):
             Phi[command + i, command + i - 1] = 1.0
         # What acts during this tick: the command sent `delay` ticks ago; with none, the one of this tick.
         acting = Phi[command] if delay == 0 else np.eye(self.size)[command + delay - 1]
-        if not isinstance(inner, PositionLoop):
+        if isinstance(inner, TorqueLoop):
             k, d = inner.stiffness / self.force_unit, inner.damping * self.rate_unit / self.force_unit
             acting = k * acting  # torque of a tick: K_p (x_c - x) - D xdot as read at this tick
             if delay:

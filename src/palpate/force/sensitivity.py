@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.force.arm import Arm
 from palpate.force.boundary import rank_one
-from palpate.force.sampled_loop import Law, SampledLoop
+from palpate.force.sampled_loop import SampledLoop, law_for
 
 PEAK = 1.66
 """Of the sensitivity 1/(1 + L): what alpha 0.48 comes to where all of the lag is delay."""
@@ -27,7 +27,7 @@ def sensitivity(loop: SampledLoop, gain: float, stiffness: float, damping: float
         stiffness: K, for a position arm as felt [N/m].
         damping: B [N s/m].
     """
-    start, closed = (loop.phi(stiffness, damping, Law(g)) for g in (0.0, gain))
+    start, closed = (loop.phi(stiffness, damping, law_for(loop.arm, g, stiffness)) for g in (0.0, gain))
     if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
         return inf
     b, c = rank_one(closed - start)
@@ -43,14 +43,14 @@ def relief_of(arm: Arm, theta: float, alpha: float) -> float:
 
     Most of a torque arm's lag is its spring and damper, K_s and D, not delay, and the stiffer the surface beside the
     spring, the shorter it is. The largest share that keeps the sensitivity below `PEAK` on every stiffness; 0 for a
-    position arm, whose tip does not feel the surface.
+    position arm, whose tip does not feel the surface, and for a servo, whose lead takes its place.
 
     Args:
         arm: what moves.
         theta: [s].
         alpha: gain in units of 1/theta.
     """
-    if arm.kind == "position":
+    if arm.kind != "torque":
         return 0.0
     loop, found = SampledLoop(arm), MOST
     for K in np.geomspace(0.01 * arm.series, arm.limits.stiffness, _STIFFNESSES).tolist():

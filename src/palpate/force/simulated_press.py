@@ -10,11 +10,11 @@ import numpy as np
 
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
-from palpate.force.arm import Arm, PositionLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.sampled_loop import filter_of, held
 from palpate.force.touching import Surface, World, compiled_touch
 
-STEP = {"position": 2e-4, "torque": 5e-5}
+STEP = {"position": 2e-4, "torque": 5e-5, "servo": 5e-5}
 """Of the physics [s]."""
 ENCODER = 1e-6
 """Resolution of the measured position [m]."""
@@ -41,7 +41,8 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0, resolution: float = 
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return World(
-        torque=float(arm.kind == "torque"),
+        torque=float(not isinstance(inner, PositionLoop)),
+        yields=float(isinstance(inner, ServoLoop)),
         first=float(first),
         second=float(second),
         stiffness=float(inner.stiffness),

@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.force.boundary import rank_one
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
-from palpate.force.sampled_loop import Law, SampledLoop
+from palpate.force.sampled_loop import SampledLoop, law_for
 
 BAND = 0.05
 """Of F_d, within which a press counts as settled."""
@@ -68,8 +68,9 @@ def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
         held: K_u in use; the surface's own K if left out [N/m].
     """
     loop = SampledLoop(gains.arm)
-    g = gains.gain_at(bound if held is None else held)
-    Phi = loop.phi(bound, 0.0, Law(g))
+    used = bound if held is None else held
+    g = gains.gain_at(used)
+    Phi = loop.phi(bound, 0.0, law_for(gains.arm, g, used))
     reading = np.zeros(loop.size)
     reading[0] = bound / loop.force_unit
     slowest = gains.theta / gains.alpha * max(gains.gain_at(bound) / g, 1.0)
@@ -83,7 +84,7 @@ def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
         x[2] = -1.0
     x[p : p + loop.lines[0]] = -1.0
     first = p + loop.lines[0] + 1
-    seen = loop.arm.seen(bound) if loop.arm.kind == "torque" else bound
+    seen = loop.arm.seen(bound) if loop.arm.kind != "position" else bound
     x[first : first + loop.lines[1]] = -loop.force_unit / seen
     if loop.arm.kind == "torque":
         x[first + 1 : first + loop.lines[1]] = -1.0
@@ -97,8 +98,8 @@ def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
 def frequency_response(gains: Gains, bound: float) -> tuple[Array, NDArray[np.complex128]]:
     """Frequencies [Hz] and the open loop on a surface of this stiffness, K_u being just that."""
     loop = SampledLoop(gains.arm)
-    start = loop.phi(bound, 0.0, Law(0.0))
-    b, c = rank_one(loop.phi(bound, 0.0, Law(gains.gain_at(bound))) - start)
+    start, closed = (loop.phi(bound, 0.0, law_for(gains.arm, g, bound)) for g in (0.0, gains.gain_at(bound)))
+    b, c = rank_one(closed - start)
     low, high = 0.01 / gains.theta / (2.0 * pi), 0.5 * gains.arm.rate
     frequencies = np.geomspace(low, high, 2000)
     z = np.exp(2j * pi * frequencies / gains.arm.rate)

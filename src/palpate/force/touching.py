@@ -49,6 +49,7 @@ class World(NamedTuple):
 
     Args:
         torque: 1 for a torque arm, 0 for a position arm.
+        yields: 1 for a servo that gives way to the force, whose spring and damper act between ticks too.
         first: w^2 of the inner loop [1/s^2]; the tip's mass [kg].
         second: 2 z w [1/s]; D [N s/m].
         stiffness: the arm's own; K_p [N/m].
@@ -67,6 +68,7 @@ class World(NamedTuple):
     """
 
     torque: float
+    yields: float
     first: float
     second: float
     stiffness: float
@@ -155,7 +157,10 @@ def moved(world, surface, body, held, t, h, noise, at, error):
             force, p, u = contact_of_heavy(world, surface, K, body.x - place, body.v, p, u, h)
         else:
             force = contact_of_mass(surface, K, body.x - place, body.v - sway)
-        v = body.v + h * (held - force) / world.first
+        pull = held
+        if world.yields > 0.0:
+            pull = world.stiffness * (held - body.x) - world.second * body.v
+        v = body.v + h * (pull - force) / world.first
         x = body.x + h * v
     else:
         v = body.v + h * (world.first * (held - body.x) - world.second * body.v)
@@ -193,7 +198,7 @@ def touch(world, surface, control, start, desired, noise, error, line, out):
     state = control.start()
     body = BodyState(start, 0.0, 0.0, 0.0, ZERO3, world.noise * noise[0] + error[0], 0.0, 0.0)
     command, h = start, world.tick / world.steps
-    line[:] = start if world.torque == 0.0 else 0.0
+    line[:] = start if world.torque == 0.0 or world.yields > 0.0 else 0.0
     for k in range(len(desired)):
         seen = body.x if world.step == 0.0 else world.step * round(body.x / world.step)
         felt = body.reading
@@ -201,7 +206,7 @@ def touch(world, surface, control, start, desired, noise, error, line, out):
         speed = min(max(speed, -world.speed), world.speed)
         command += world.tick * speed
         into = command
-        if world.torque > 0.0:
+        if world.torque > 0.0 and world.yields == 0.0:
             into = world.stiffness * (command - seen) - world.second * body.v
         held = line[0] if world.delay > 0 else into
         for i in range(world.delay - 1):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop, TorqueLoop
+from palpate.force.arm import Arm, PositionLoop
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval
 from palpate.force.expected import OVERSHOOT, RISES, STIFFENING_AT, rise, settling_bound, softest, stiffening
@@ -60,8 +60,9 @@ class Tuning(Result, shown_by="palpate.report.tuning.page"):
         """Force to expect at the touch [N], by the linear loop; a formula, not a bound."""
         gains = self.gains
         peak = gains.force * (1.0 + self.overshoot)
-        if isinstance(gains.arm.inner, TorqueLoop):
-            peak = max(peak, gains.approach * float(np.sqrt(gains.cap * gains.arm.inner.mass)))
+        inner = gains.arm.inner
+        if not isinstance(inner, PositionLoop):
+            peak = max(peak, gains.approach * float(np.sqrt(gains.cap * inner.mass)))
         return peak
 
     @cached_property
@@ -137,7 +138,7 @@ class Tuning(Result, shown_by="palpate.report.tuning.page"):
                     "gain_share": list(adapting.shares),
                     "damping_time": [adapting.least, adapting.most],
                     "stiffness": list(self.surface_stiffness("adapting") or ())
-                    if arm.kind == "torque"
+                    if arm.kind != "position"
                     else "every",
                 },
             },
@@ -155,7 +156,7 @@ class Tuning(Result, shown_by="palpate.report.tuning.page"):
 
 def surface_ends(arm: Arm, low: float, high: float) -> tuple[float, float]:
     """Stiffness of the surfaces [N/m] that together with a position arm's own have these; at most `RIGID`."""
-    return (low, high) if arm.kind == "torque" else (arm.surface(low), min(arm.surface(high), RIGID))
+    return (low, high) if arm.kind != "position" else (arm.surface(low), min(arm.surface(high), RIGID))
 
 
 def _number(value: float) -> float | None:

@@ -10,10 +10,11 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder
-from palpate.native.laws import FORCE, IDENTIFIER, LAWS, force_module, identifier_module, squares_module
+from palpate.force.sliding.sliding_loop import DOWN
+from palpate.native import laws, recording
+from palpate.native.laws import FORCE, IDENTIFIER, LAWS, SLIDING
 from palpate.native.module import Module, Sources, sources_of
 from palpate.native.package import files_of, write_folder
-from palpate.native.recording import Recording, of_force_loop, of_identifier, of_least_squares
 from palpate.native.replay import unequal_ticks
 
 TICKS = 1_000_000
@@ -28,7 +29,8 @@ class LawRequest:
 
     Args:
         law: one of `LAWS`.
-        gains: file of `palpate tune`, of a force loop.
+        gains: file of `palpate tune`, of a force loop or a sliding loop.
+        into: direction into the surface of a sliding loop, in the base's axes, shape (3,).
         parameters: of least squares, 3 or 4.
         forgetting: of least squares, in (0, 1].
         low_pass: of the force sensor, of an identifier.
@@ -39,6 +41,7 @@ class LawRequest:
 
     law: str = FORCE
     gains: Path | None = None
+    into: tuple[float, float, float] = DOWN
     parameters: int = 3
     forgetting: float = 1.0
     low_pass: str = "butterworth3:120"  # noqa: S105 - a filter
@@ -49,9 +52,10 @@ class LawRequest:
     def __post_init__(self) -> None:
         if self.law not in LAWS:
             raise unknown("law", self.law, LAWS)
-        if self.law == FORCE and self.gains is None:
-            raise InputError("a force loop is of gains: give the file of palpate tune, or another --law")
-        if self.law != FORCE and self.gains is not None:
+        of_gains = self.law in (FORCE, SLIDING)
+        if of_gains and self.gains is None:
+            raise InputError(f"a {self.law} is of gains: give the file of palpate tune, or another --law")
+        if not of_gains and self.gains is not None:
             raise InputError(f"--law {self.law} takes no gains file; leave out {self.gains}")
 
 
@@ -68,7 +72,7 @@ class ExportedLaw:
 
     module: Module
     sources: Sources
-    recording: Recording
+    recording: recording.Recording
     desired: float = 0.0
 
     def write(self, out: Path, version: str, *, replace: bool) -> None:
@@ -102,21 +106,26 @@ def exported_law(request: LawRequest, progress: Callable[[str], None] = lambda _
     Raises:
         InputError: gains of another version, numbers that no law takes, a law outside the subset.
     """
-    from palpate.force import ForceLoop, load_gains
+    from palpate.force import ForceLoop, SlidingLoop, load_gains
     from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 
     progress("compiling the law for Python")
     if request.gains is not None:
         gains = load_gains(request.gains)
-        module, recording, desired = force_module(gains), of_force_loop(ForceLoop(gains)), gains.force
+        desired = gains.force
+        if request.law == FORCE:
+            module, ticks = laws.force_module(gains), recording.of_force_loop(ForceLoop(gains))
+        else:
+            module = laws.sliding_module(gains, request.into)
+            ticks = recording.of_sliding_loop(SlidingLoop(gains, request.into))
     elif request.law == IDENTIFIER:
         identifier = ContactIdentifier(request.low_pass, request.rate, request.lag, sampling=request.sampling)
-        module, recording, desired = identifier_module(identifier), of_identifier(identifier), 0.0
+        module, ticks, desired = laws.identifier_module(identifier), recording.of_identifier(identifier), 0.0
     else:
         n = request.parameters
         if n not in (3, 4):
             raise InputError(f"C has least squares of 3 or 4 parameters, got --parameters {n}")
         estimator = RecursiveLeastSquares(np.zeros(n), _VAGUE * np.eye(n), request.forgetting)
-        module, recording, desired = squares_module(estimator), of_least_squares(estimator), 0.0
+        module, ticks, desired = laws.squares_module(estimator), recording.of_least_squares(estimator), 0.0
     progress("translating the law to C")
-    return ExportedLaw(module, sources_of(module), recording, desired)
+    return ExportedLaw(module, sources_of(module), ticks, desired)

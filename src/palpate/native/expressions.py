@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate._jit.registry import parts
+from palpate._jit.registry import parts, stored
+from palpate._jit.stored import kind_of
 from palpate.native.source import refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members, plain
+from palpate.native.structs import by_pointer, c_name, is_struct, members, plain, result_places, value_type
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""
@@ -45,28 +46,42 @@ class Value(NamedTuple):
         type: Numba's.
         rank: how tightly it binds.
         place: "" for a value, "named" for one that has an address, "pointer" for the address of a struct.
+        fields: of a struct that is made here.
+        call: of a function that writes large structs, @ for the address of each.
     """
 
     text: str
     type: Any
     rank: int = ATOM
     place: str = ""
+    fields: tuple[Value, ...] = ()
+    call: str = ""
 
     def at(self, rank: int) -> str:
         """The text where C binds as tightly as `rank`."""
-        text, own = (f"*{self.text}", UNARY) if self.place == "pointer" else (self.text, self.rank)
+        text, own = (f"*{self._within(UNARY)}", UNARY) if self.place == "pointer" else (self.text, self.rank)
         return text if own >= rank else f"({text})"
+
+    def _within(self, rank: int) -> str:
+        return self.text if self.rank >= rank else f"({self.text})"
 
     def member(self, name: str, kind: Any) -> Value:
         """A field of the struct."""
-        if self.place == "pointer":
-            return Value(f"{self.text}->{name}", kind, ATOM, "named")
-        return Value(f"{self.at(ATOM)}.{name}", kind, ATOM, self.place)
+        pointer = self.place == "pointer"
+        text = f"{self._within(ATOM)}{'->' if pointer else '.'}{name}"
+        return Value(text, kind, ATOM, "named" if pointer else self.place)
 
     @property
     def address(self) -> str:
-        """Where a struct is that has a place."""
-        return self.text if self.place == "pointer" else f"&{self.at(UNARY)}"
+        """Where a struct is."""
+        return self.text if self.place == "pointer" else f"&{self._within(UNARY)}"
+
+
+def with_addresses(call: str, *addresses: str) -> str:
+    """A call of a function that writes structs, with their addresses."""
+    for address in addresses:
+        call = call.replace("@", address, 1)
+    return call
 
 
 def number(value: float | bool) -> str:
@@ -143,12 +158,7 @@ class Expressions:
         return getattr(module, node.attr) if isinstance(module, ModuleType) else None
 
     def _literal(self, value: Any, node: Any) -> Value:
-        kinds = {
-            bool: self.whole.boolean,
-            int: self.whole.integer,
-            float: self.whole.real,
-            np.float64: self.whole.real,
-        }
+        kinds = self.whole.kinds
         self.need(type(value) in kinds, node, f"a {type(value).__name__}", "use a number or a truth")
         return Value(number(value), kinds[type(value)], UNARY if number(value).startswith("-") else ATOM)
 
@@ -185,9 +195,9 @@ class Expressions:
 
     def struct(self, values: list[Value], kind: Any, node: Any) -> Value:
         """A struct made of its fields."""
-        inner = zip(values, members(kind), strict=True)
-        texts = (self.cast(value, one, node).at(CHOICE) for value, (_, one) in inner)
-        return Value(f"({self.whole.structs.name(kind)}){{{', '.join(texts)}}}", kind)
+        fields = [self.cast(value, one, node) for value, (_, one) in zip(values, members(kind), strict=True)]
+        text = ", ".join(one.at(CHOICE) for one in fields)
+        return Value(f"({self.whole.structs.name(kind)}){{{text}}}", kind, fields=tuple(fields))
 
     def _subscript(self, node: ast.Subscript) -> Value:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
@@ -237,12 +247,14 @@ class Expressions:
 
     def _field(self, base: Value, node: ast.Subscript) -> Value:
         inner = members(base.type)
+        self.need(
+            value_type(base.type) == base.type, node, "a field of a tuple with parts", "unpack it into names"
+        )
         if isinstance(node.slice, ast.Constant):
             return base.member(*inner[self._field_number(node.slice)])
         alike = all(kind == inner[0][1] for _, kind in inner)
         self.need(alike, node, "a field of a part by a variable", "name the field")
-        text = f"{self.whole.selector(base.type)}({self.argument(base)}, {self._index(node.slice).text})"
-        return Value(text, inner[0][1])
+        return self._call_of(self.whole.selector(base.type), [base, self._index(node.slice)], inner[0][1])
 
     def _binop(self, node: ast.BinOp) -> Value:
         if isinstance(node.op, ast.Pow):
@@ -313,6 +325,8 @@ class Expressions:
         a, b = self.expression(node.body, alone=True), self.expression(node.orelse, alone=True)
         kind = a.type if a.type == b.type else plain(self.whole.typing.unify_types(a.type, b.type) or a.type)
         a, b = self.cast(a, kind, node), self.cast(b, kind, node)
+        if by_pointer(kind):
+            return Value(f"{test.at(OR)} ? {a.address} : {b.address}", kind, CHOICE, "pointer")
         return Value(f"{test.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", kind, CHOICE)
 
     def _call(self, node: ast.Call) -> Value:
@@ -330,9 +344,21 @@ class Expressions:
             kinds = tuple(value.type for value in values)
             made = self.whole.typing.resolve_function_type(types.NamedTupleClass(callee), kinds, {})
             return self.struct(values, plain(made.return_type), node)
+        if callee in stored:
+            return self._storage(*stored[callee], node)
         if inspect.isfunction(callee):
             return self._calling_overload(callee, self._arguments(callee, node, 0), node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
+
+    def _storage(self, part: type, reads: bool, node: ast.Call) -> Value:
+        """A part read from the beginning of an array; or the array's beginning as the part that is written there."""
+        values = [self.expression(one) for one in node.args]
+        name, kind = self.whole.storage(plain(kind_of(part)), reads), plain(kind_of(part))
+        if reads:
+            return self._call_of(name, values, kind)
+        self.need(id(node) in self._alone, node, "writing a part in an expression", "write it in a statement")
+        self.writes |= values[0].text not in self.scratch
+        return self._call_of(name, values, self.whole.none)
 
     def _arguments(self, callee: Any, node: ast.Call, known: int) -> list[Value]:
         """Values of a call in the order of the function's parameters, defaults where none is given."""
@@ -351,7 +377,7 @@ class Expressions:
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
         kinds, first = tuple(value.type for value in values), values[0] if values else None
-        casts = {int: self.whole.integer, float: self.whole.real, bool: self.whole.boolean}
+        casts = self.whole.kinds
         if callee is abs and first and is_struct(first.type):
             return self._calling_overload(abs, values, node)
         if callee is len and first:
@@ -395,10 +421,16 @@ class Expressions:
         self.need(not known.writes or id(node) in self._alone, node, fault, "assign its value to a name")
         arrays = [value for value in values if getattr(value.type, "ndim", 0) or is_struct(value.type)]
         self.writes |= known.writes and any(value.text not in self.scratch for value in arrays)
-        return Value(f"{known.name}({', '.join(self.argument(value) for value in values)})", known.result)
+        return self._call_of(known.name, values, known.result)
 
-    def argument(self, value: Value) -> str:
-        """A value as the argument of a function: itself, or the address of a large struct."""
-        if not by_pointer(value.type):
-            return value.at(CHOICE)
-        return value.address if value.place else f"({self.whole.structs.name(value.type)}[1]){{{value.text}}}"
+    def _call_of(self, name: str, values: list[Value], kind: Any) -> Value:
+        """A call in C; a large struct is written where the last argument points to."""
+        texts = [value.address if by_pointer(value.type) else value.at(CHOICE) for value in values]
+        places = result_places(kind)
+        if not places:
+            return Value(f"{name}({', '.join(texts)})", kind)
+        call = f"{name}({', '.join([*texts, *('@' for _ in places)])})"
+        return Value(
+            with_addresses(call, *(f"&({self.whole.structs.name(one)}){{0}}" for _, one in places)),
+            kind, place="pointer", call=call,
+        )  # fmt: skip

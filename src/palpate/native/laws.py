@@ -1,8 +1,11 @@
-"""The laws that become C, each with its functions: force loop, contact identifier, recursive least squares."""
+"""The laws that become C, each with its functions: force loop, sliding loop, contact identifier, least squares."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate._jit import law, part
 from palpate.arrays import Array
@@ -11,6 +14,10 @@ from palpate.force.contact_evidence import AIR
 from palpate.force.force_loop import PHASES, SurfaceEstimate, surface_estimate
 from palpate.force.gains import Gains
 from palpate.force.guard import QUIET, TROUBLES, GuardedState, safe_step
+from palpate.force.sliding import slide_state
+from palpate.force.sliding.slide_law import slide_step
+from palpate.force.sliding.slide_state import put_vector, vector_at
+from palpate.force.sliding.sliding_loop import slide_estimate, sliding
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 from palpate.identifiers.kernels import contact_state, contact_stream
 from palpate.identifiers.kernels.contact_stream import take_tick
@@ -19,8 +26,9 @@ from palpate.identifiers.kernels.least_squares import error_covariance_in
 from palpate.identifiers.recursive_least_squares import absorb
 from palpate.native.module import Argument, Entry, Module
 
-FORCE, IDENTIFIER, SQUARES = "force-loop", "contact-identifier", "recursive-least-squares"
-LAWS = (FORCE, IDENTIFIER, SQUARES)
+FORCE, SLIDING, IDENTIFIER = "force-loop", "sliding-loop", "contact-identifier"
+SQUARES = "recursive-least-squares"
+LAWS = (FORCE, SLIDING, IDENTIFIER, SQUARES)
 CERTAIN, AT_CONTACT, AT_SUMS = contact_state.CERTAIN, contact_stream.AT_CONTACT, contact_stream.AT_SUMS
 
 
@@ -66,6 +74,66 @@ def force_module(gains: Gains, notes: tuple[str, ...] = ()) -> Module:
     return Module(
         "palpate_force", "presses with a desired force", gains.cautious(), force_init, entries, words, head
     )
+
+
+@law
+def slide_init(gains, state):
+    """In free motion, knowing nothing but a direction into the surface."""
+    gains.start(state)
+
+
+@law
+def slide_update(gains, state, desired, force, position, direction, missed, velocity):
+    """One tick of a slide: the velocity [m/s]."""
+    work = np.empty(10)
+    v = slide_step(
+        gains,
+        state,
+        work,
+        desired,
+        vector_at(force, 0),
+        vector_at(position, 0),
+        vector_at(direction, 0),
+        missed,
+    )
+    put_vector(velocity, 0, v)
+
+
+@law
+def slide_known(gains, state):
+    """The surface as it is known."""
+    return slide_estimate(state)
+
+
+@law
+def slide_sliding(gains, state):
+    """Whether the force was held and the tip slides."""
+    return state[slide_state.PHASE] == slide_state.SLIDE
+
+
+def sliding_module(gains: Gains, into: ArrayLike, notes: tuple[str, ...] = ()) -> Module:
+    """The sliding loop of gains that have numbers for a slide."""
+    axes = ", x, y, z in the base's axes"
+    arguments = (
+        Argument("desired", "F_d, the normal force to hold [N]"),
+        Argument("force", f"on the surface{axes} [N]", (3,)),
+        Argument("position", f"of the tip by the arm's encoders{axes} [m]", (3,)),
+        Argument(
+            "direction", f"in which to slide{axes}: a unit vector, or a shorter one for a slower slide", (3,)
+        ),
+        Argument("missed", "ticks that were lost since the last call"),
+        Argument("velocity", f"of the commanded position{axes} [m/s]", (3,), out=True),
+    )
+    entries = (
+        Entry("update", slide_update, "One tick: the velocity of the commanded position.", arguments, True),
+        Entry("estimate", slide_known, "The surface; zeros, but for the normal, before a slide."),
+        Entry("is_sliding", slide_sliding, "Whether the force was held and the tip slides."),
+    )
+    words = {"trouble": ((f"numbers[{slide_state.TROUBLE}]",), slide_state.SLIDING_TROUBLES)}
+    head = (f"law of the press: {gains.law}", f"gains: {gains.digest}", *notes)
+    title = "holds a force along an unknown curved surface"
+    numbers = sliding(gains, into)
+    return Module("palpate_slide", title, numbers, slide_init, entries, words, head, slide_state.SIZE)
 
 
 @part

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.native.expressions import number
-from palpate.native.structs import by_pointer, is_struct, leaves, members, plain
+from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
 from palpate.native.translation import Translation
 
 WIDTH = 118
@@ -57,12 +57,14 @@ class Entry:
             its fields back behind the value.
         meaning: of it and of its value.
         arguments: beside gains and state.
+        writes: whether it has no value, but the last argument.
     """
 
     name: str
     law: Callable[..., Any]
     meaning: str
     arguments: tuple[Argument, ...] = ()
+    writes: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,11 @@ class Module:
         name: of the files and the functions, as `palpate_force`.
         title: what it is, in words.
         gains: numbers of the law, a part.
-        start: the law that makes the state of the gains, or the numbers of the first state.
+        start: the law that makes the state of the gains, or fills a flat one; or the numbers of the first state.
         entries: functions in the header.
         words: of a number of the state, by the function's name: the way to it, and a text for each of its values.
         notes: lines at the head of both files: version, hashes.
+        size: numbers of a flat state that `start` fills.
     """
 
     name: str
@@ -86,6 +89,12 @@ class Module:
     entries: tuple[Entry, ...]
     words: Mapping[str, tuple[tuple[str, ...], Mapping[float, str]]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    size: int = 0
+
+    @property
+    def flat(self) -> int:
+        """Numbers of a state that is an array; 0 for one of parts."""
+        return len(self.start) if isinstance(self.start, np.ndarray) else self.size
 
 
 @dataclass(frozen=True)
@@ -120,7 +129,6 @@ class _Writer:
 
         self.module, self.whole = module, Translation(module.name)
         self.kind = plain(numba.typeof(module.gains))
-        self.flat = isinstance(module.start, np.ndarray)
         for _, inner in members(self.kind):
             self._publish(inner)
         self.gains = f"{module.name}_gains"
@@ -137,15 +145,16 @@ class _Writer:
         from numba import types
 
         structs = self.whole.structs
-        if isinstance(self.module.start, np.ndarray):
-            kind, count = types.Array(types.float64, 1, "C"), len(self.module.start)
+        start, count = self.module.start, self.module.flat
+        if count or isinstance(start, np.ndarray):
+            kind = types.Array(types.float64, 1, "C")
             structs.name(kind)
             structs.header.append(
                 f"/* All that is remembered; {self.module.name}_init writes it. */\n"
                 f"typedef struct {{\n    double numbers[{count}];\n}} {self.state};"
             )
             return kind, count
-        kind = plain(self.whole.rules.result(self.module.start, (self.kind,)))
+        kind = plain(self.whole.rules.result(start, (self.kind,)))
         structs.publish(kind, self.state)
         return kind, leaves(kind)
 
@@ -173,8 +182,14 @@ class _Writer:
                 f"{_runs(name, self.module.start)}\n\n{head} {{\n{_FILL.format(name=name)}}}"
             )
             return
-        start = self.whole.function(self.module.start, (self.kind,))
-        self.functions.append(f"{head} {{\n    *state = {start.name}(gains);\n}}")
+        flat = self.module.flat
+        start = self.whole.function(self.module.start, (self.kind, self.state_kind)[: 1 + (flat > 0)])
+        body = f"{start.name}(gains, {self._numbers() if flat else 'state'})"
+        self.functions.append(f"{head} {{\n    {body};\n}}")
+
+    def _numbers(self) -> str:
+        """A flat state as laws see it."""
+        return f"(array1){{(double *)state->numbers, {{{self.numbers}}}}}"
 
     def _entry(self, entry: Entry) -> None:
         from numba import types
@@ -187,32 +202,34 @@ class _Writer:
         kinds = [self.kind, self.state_kind, *kinds]
         result = plain(self.whole.rules.result(entry.law, tuple(kinds)))
         inner = members(result) if is_struct(result) else []
-        fields = [] if self.flat else members(self.state_kind)
+        fields = [] if self.module.flat else members(self.state_kind)
         changes = bool(fields) and [kind for _, kind in inner[1:]] == [kind for _, kind in fields]
+        changes = changes and len(result_places(result)) == len(fields)
         public = structs.publish(inner[0][1] if changes else result)
         known = self.whole.function(entry.law, tuple(kinds))
         values = ["gains" if by_pointer(self.kind) else "*gains"]
-        values.append(f"(array1){{(double *)state->numbers, {{{self.numbers}}}}}" if self.flat else "state")
+        values.append(self._numbers() if self.module.flat else "state")
         values += [
             f"({structs.name(kind)}){{{'' if a.out else '(double *)'}{a.name}, {{{', '.join(map(str, a.shape))}}}}}"
             if a.shape
             else a.name
             for a, kind in zip(entry.arguments, kinds[2:], strict=True)
         ]
-        call = f"{known.name}({', '.join(values)})"
-        constant = "" if changes or (known.writes and self.flat) else "const "
+        places = result_places(known.result)
+        zero = (f"&({structs.name(kind)}){{0}}" for _, kind in places)
+        call = f"{known.name}({', '.join([*values, *([f'&{to}' for to, _ in places] if changes else zero)])})"
+        constant = "" if changes or (known.writes and self.module.flat) else "const "
         arguments = [f"const {self.gains} *gains", f"{constant}{self.state} *state"]
         arguments += [argument.text for argument in entry.arguments]
         head = f"{public} {self.module.name}_{entry.name}({', '.join(arguments)})"
         self._declare(head, entry.meaning, entry.arguments)
         if changes:
-            of = structs.name(known.result)
-            pairs = zip(fields, inner[1:], strict=True)
-            body = f"    const {of} value = {call};\n"
-            body += "".join(f"    state->{field} = value.{at};\n" for (field, _), (at, _) in pairs)
-            body += "    return value.v0;"
+            lines = [f"{structs.name(kind)} {to};" for to, kind in places]
+            lines += [f"const {structs.name(value_type(known.result))} value = {call};"]
+            lines += [f"state->{field} = {to};" for (field, _), (to, _) in zip(fields, places, strict=True)]
+            body = "\n".join(f"    {line}" for line in [*lines, "return value;"])
         else:
-            body = f"    {'' if public == 'void' else 'return '}{call};"
+            body = f"    {'' if public == 'void' else 'return '}{'*' if places else ''}{call};"
         self.functions.append(f"{head} {{\n{body}\n}}")
 
     def _words(self, name: str, way: tuple[str, ...], texts: Mapping[float, str]) -> None:
@@ -256,7 +273,8 @@ class _Writer:
     def _source(self, table: str) -> str:
         parts = [
             self._head(f"{self.module.name}.c"),
-            f'#include "{self.module.name}.h"\n\n#include <float.h>\n#include <math.h>\n#include <stddef.h>',
+            f'#include "{self.module.name}.h"',
+            "\n".join(f"#include <{one}.h>" for one in ("float", "math", "stddef", "string")),
             _IEEE,
             *self.whole.structs.definitions,
             *self.whole.constants.definitions,
@@ -312,10 +330,7 @@ def _pieces(line: str) -> list[str]:
     indent = line[: len(line) - len(line.lstrip())]
     pieces, more = [], indent + "    "
     while len(line) > WIDTH:
-        places = [
-            line.rfind(sign, len(more) + 8, WIDTH)
-            for sign in (", ", " && ", " || ", " + ", " ? ", " : ", " /* ", " = ")
-        ]
+        places = [line.rfind(sign, len(more) + 8, WIDTH) for sign in _BREAKS]
         strong = max(places[:3])
         place = strong if strong > WIDTH // 2 else max(places)
         if place < 0:

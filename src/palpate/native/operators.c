@@ -32,7 +32,12 @@ static int64_t floored(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a 
 
 /* a % b with Python's sign, that of b. */
 static double modulo(double a, double b) {
-    double rest = fmod(a, b);
+    double rest;
+    if (a > 0.0 && a < 9007199254740992.0 && a == (double)(int64_t)a && b >= 1.0 && b < 9007199254740992.0
+        && b == (double)(int64_t)b) {
+        return a - b * (double)(int64_t)(a / b); /* of whole numbers below 2^53: exact */
+    }
+    rest = fmod(a, b);
     if (b == 0.0) {
         return rest;
     }
@@ -44,7 +49,11 @@ static double modulo(double a, double b) {
 
 /* a // b of Python: rounded down. */
 static double floored(double a, double b) {
-    double rest = fmod(a, b), whole = (a - rest) / b, down;
+    double rest, whole = a / b, down;
+    if (whole > 0.0 && whole < 1e15 && whole != (double)(int64_t)whole) {
+        return (double)(int64_t)whole; /* the quotient lies between two whole numbers, so its rounded value does */
+    }
+    rest = fmod(a, b), whole = (a - rest) / b;
     if (b == 0.0) {
         return a / b;
     }

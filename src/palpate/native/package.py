@@ -168,7 +168,7 @@ def files_of(
         "README.md": _READ.format(name=name, title=module.title, notes=notes),
         "test/replay.c": program(module, recording.inputs),
     }
-    if module.words:
+    if name == "palpate_force":
         texts["example/press.c"] = _EXAMPLE % repr(desired)
         texts["example/ros2_controller.cpp"] = _ROS % repr(desired)
     return texts

@@ -11,7 +11,7 @@ import numpy as np
 from palpate._jit import kernel
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force import ForceLoop, Gains
+from palpate.force import ForceLoop, Gains, SlidingLoop
 from palpate.identifiers import ContactIdentifier, RecursiveLeastSquares
 
 PRESS = 4000
@@ -35,19 +35,19 @@ class Recording:
     Args:
         inputs: numbers of a tick that the law is given.
         every: ticks between two digests of the whole state.
-        press: the rows of a press, given how many ticks and a generator of random numbers: whether the state begins
+        press: the rows of a press, given whether it is the first, its ticks and a generator: whether the state begins
             anew, the inputs, the value, and the digest of the state behind the tick or 0, shape (ticks, inputs + 3).
     """
 
     inputs: int
     every: int
-    press: Callable[[int, np.random.Generator], Array]
+    press: Callable[[bool, int, np.random.Generator], Array]
 
     def presses(self, ticks: int, seed: int) -> Iterator[Array]:
         """Rows of so many ticks, a press at a time."""
         for number in range(-(-ticks // PRESS)):
             rng = np.random.default_rng([seed, number])
-            yield self.press(min(PRESS, ticks - number * PRESS), rng)
+            yield self.press(number == 0, min(PRESS, ticks - number * PRESS), rng)
 
 
 @kernel
@@ -66,7 +66,7 @@ def digest_of(state: Array) -> float:
 
 def of_force_loop(loop: ForceLoop) -> Recording:
     """Presses of a force loop on surfaces from soft to beyond its cap."""
-    return Recording(4, 100, lambda ticks, rng: _force_press(loop, ticks, rng))
+    return Recording(4, 100, lambda _, ticks, rng: _force_press(loop, ticks, rng))
 
 
 def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array:
@@ -120,10 +120,44 @@ def _reading(gains: Gains, fault: int, left: int, reading: float) -> float:
     return 1.01 * gains.force_limit if fault == LIMITED else reading
 
 
+def of_sliding_loop(loop: SlidingLoop) -> Recording:
+    """Slides over spheres, bowls and planes, with friction from none to beyond mu_max, steps and lost contacts."""
+    return Recording(11, 100, lambda _, ticks, rng: _slide(loop, ticks, rng))
+
+
+def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
+    gains, tick = loop.gains, loop.gains.arm.tick
+    K, mu = gains.cap * 10.0 ** rng.uniform(-2.5, 0.2), rng.uniform(0.0, 1.0)
+    bend, wall, rate = rng.uniform(-30.0, 30.0), 0.1 * gains.approach * tick * ticks, rng.uniform(0.1, 5.0)
+    n, noise = loop.normal + rng.normal(0.0, 0.1, 3), gains.arm.sensor.noise * rng.standard_normal((ticks, 3))
+    kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < RARE
+    x, v, fault, force, out = np.zeros(3), np.zeros(3), 0, np.zeros(3), np.zeros((ticks, 14))
+    loop.reset()
+    for k in range(ticks):
+        fault = kinds[k] if begins[k] else fault * (k % 100 > 0)
+        across, along, axis = x - (x @ n) * n, v - (v @ n) * n, k % 3
+        wall += {RECEDES: 2e-6, STEPPED: 1e-3 * (k % 100 == 50)}.get(fault, 0.0)
+        if fault != STUCK:
+            slip = mu * along / (np.linalg.norm(along) + 1e-4)
+            force = K * max(x @ n - wall - bend * (across @ across), 0.0) * (n + slip) + noise[k]
+            force[axis] = _reading(gains, fault, k, force[axis])
+        place = x + (np.nan if fault == LOST else 0.0)
+        way = np.array([np.cos(rate * k * tick), np.sin(rate * k * tick), 0.0])
+        way *= np.nan if fault == UNASKED else float(k % 9 > 0)
+        missed = {LATE: float(k % 40), LATER: np.nan}.get(fault, 0.0)
+        v = loop.update(force, place, way, missed)
+        state = digest_of(loop._state) if k % 100 == 99 else 0.0
+        out[k] = [k == 0, loop.desired, *force, *place, *way, missed, digest_of(v), state]
+        x = x + tick * v
+    return out
+
+
 def of_least_squares(estimator: RecursiveLeastSquares) -> Recording:
     """Samples of a linear model whose parameters change, with rest, outliers and numbers that are none."""
     first = estimator._state.copy()
-    return Recording(len(estimator.names) + 1, 100, lambda ticks, rng: _samples(estimator, first, ticks, rng))
+    return Recording(
+        len(estimator.names) + 1, 100, lambda _, ticks, rng: _samples(estimator, first, ticks, rng)
+    )
 
 
 def _samples(estimator: RecursiveLeastSquares, first: Array, ticks: int, rng: np.random.Generator) -> Array:
@@ -158,10 +192,12 @@ def _samples(estimator: RecursiveLeastSquares, first: Array, ticks: int, rng: np
 def of_identifier(identifier: ContactIdentifier) -> Recording:
     """Approaches and touches of a moving tip, with readings that are missing, jump and saturate."""
     first = identifier._state.copy()
-    return Recording(2, PRESS, lambda ticks, rng: _touches(identifier, first, ticks, rng))
+    return Recording(2, PRESS, lambda new, ticks, rng: _touches(identifier, first, new, ticks, rng))
 
 
-def _touches(identifier: ContactIdentifier, first: Array, ticks: int, rng: np.random.Generator) -> Array:
+def _touches(
+    identifier: ContactIdentifier, first: Array, new: bool, ticks: int, rng: np.random.Generator
+) -> Array:
     state, time = identifier._state, np.arange(ticks) / identifier.rate
     swing = 10.0 ** rng.uniform(-4.0, -2.5)
     x = swing * (
@@ -180,7 +216,7 @@ def _touches(identifier: ContactIdentifier, first: Array, ticks: int, rng: np.ra
     gap = int(rng.integers(0, ticks))
     x[gap : gap + int(rng.integers(0, 60))] = np.nan
     out = np.zeros((ticks, 5))
-    fresh = bool(rng.random() < 0.2)
+    fresh = bool(rng.random() < 0.2) or new
     if fresh:
         state[:] = first
     out[0, 0], out[:, 1], out[:, 2] = float(fresh), x, force

@@ -5,14 +5,15 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from palpate.native.expressions import SUM, Expressions, Value
+from palpate._jit.registry import parts
+from palpate.native.expressions import SUM, Expressions, Value, with_addresses
 from palpate.native.source import comments_of, refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members
+from palpate.native.structs import by_pointer, c_name, is_struct, members, result_places, value_type
 
 STEP = "    "
 
@@ -43,6 +44,7 @@ class FunctionBody(Expressions):
         self._blocks: dict[str, list[ast.stmt]] = {}
         self._block_now: list[ast.stmt] = body
         self._first: list[str] = []
+        self._slots: dict[str, Value] = {}
         self._temporaries = 0
 
     def text(self, name: str) -> str:
@@ -57,8 +59,13 @@ class FunctionBody(Expressions):
                 self._first.append(f"(void){own};")
             parameters.append(given)
             self.variables[argument], self._blocks[argument] = Value(own, kind, place=place), self.tree.body
+        self._slots = self._places_in_result() if result_places(self.result) else {}
         lines = self._block(self.tree.body)
-        head = f"static {self.whole.structs.name(self.result)} {name}({', '.join(parameters) or 'void'}) {{"
+        of = self.whole.structs.name(value_type(self.result))
+        parameters += [f"{self.whole.structs.name(kind)} *{to}" for to, kind in result_places(self.result)]
+        if by_pointer(value_type(self.result)):
+            of = f"const {of} *"
+        head = f"static {of} {name}({', '.join(parameters) or 'void'}) {{".replace("* ", "*")
         return "\n".join([head, *(STEP + line for line in self._first), *lines, "}"])
 
     def _block(self, block: list[ast.stmt]) -> list[str]:
@@ -127,9 +134,61 @@ class FunctionBody(Expressions):
         if node.value is None:
             return ["return;"]
         if isinstance(node.value, ast.Tuple) and is_struct(self.result):
-            values = [self.expression(one, alone=True) for one in node.value.elts]
-            return [f"return {self.struct(values, self.result, node).text};"]
-        return [f"return {self.cast(self.expression(node.value, alone=True), self.result, node).at(0)};"]
+            value = self.struct(
+                [self.expression(one, alone=True) for one in node.value.elts], self.result, node
+            )
+        else:
+            value = self.cast(self.expression(node.value, alone=True), self.result, node)
+        places = [Value(to, kind, place="pointer") for to, kind in result_places(self.result)]
+        if not places:
+            return [f"return {value.at(0)};"]
+        if value.call:
+            return [f"return {with_addresses(value.call, *(place.text for place in places))};"]
+        if value_type(self.result) == self.result:
+            return [*self._fill(places[0], value), "return to;"]
+        self.need(value.fields, node, "a tuple with parts by its name", "return its fields")
+        small = next(one for one in value.fields if not by_pointer(one.type))
+        pairs = zip(places, (one for one in value.fields if by_pointer(one.type)), strict=True)
+        return [line for place, one in pairs for line in self._fill(place, one)] + [f"return {small.at(0)};"]
+
+    def _fill(self, place: Value, value: Value) -> list[str]:
+        """Writes a value into a place that it does not read: a large struct field by field, or by the function."""
+        if value.text == place.text:
+            return []
+        if value.call:
+            return [f"{with_addresses(value.call, place.address)};"]
+        if not (value.fields and by_pointer(value.type)):
+            return [f"{place.at(0)} = {value.at(0)};"]
+        pairs = zip(members(value.type), value.fields, strict=True)
+        return [line for field, one in pairs for line in self._fill(place.member(*field), one)]
+
+    def _places_in_result(self) -> dict[str, Value]:
+        """Large variables that stand in the result from the beginning: those that every return has at one place."""
+        places: dict[str, set[Value | None]] = {}
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Return) and node.value:
+                bare = dict(self._elements(node.value, Value("to", self.result, place="pointer")))
+                for name in _names([node.value]):
+                    places.setdefault(name, set()).add(bare.get(name))
+        ways = [_way(one) for found in places.values() for one in found if one]
+        single = {name: one for name, (one, *more) in places.items() if one and not more}
+        return {
+            name: one for name, one in single.items() if name not in self.variables
+            and sum(way.startswith(_way(one)) or _way(one).startswith(way) for way in ways) == 1
+        }  # fmt: skip
+
+    def _elements(self, node: ast.expr, place: Value) -> Iterator[tuple[str, Value]]:
+        """Names in an expression of a struct that are its fields, or fields of fields, and their places."""
+        if isinstance(node, ast.Name) and by_pointer(place.type):
+            yield node.id, place
+        inner: list[ast.expr] = getattr(node, "elts", [])
+        if isinstance(node, ast.Call) and not node.keywords:
+            inner = node.args if self.function.__globals__.get(getattr(node.func, "id", "")) in parts else []
+        if is_struct(place.type):
+            for one, field in zip(inner, members(place.type), strict=False):
+                whole = place.text == "to" and value_type(self.result) != self.result
+                own = Value(f"to{field[0][1:]}", field[1], place="pointer") if whole else place.member(*field)
+                yield from self._elements(one, own)
 
     def _augassign(self, node: ast.AugAssign) -> list[str]:
         target, value = self.expression(node.target), self.expression(node.value, alone=True)
@@ -146,10 +205,16 @@ class FunctionBody(Expressions):
 
     def _temporary(self, value: Value) -> tuple[list[str], Value]:
         """A constant of the value, under a name that Python does not have."""
+        lines, own = self._temporary_of(value.type)
+        return (
+            [*lines, *self._fill(own, value)] if value.call else [f"const {lines[0][:-1]} = {value.at(0)};"]
+        ), own
+
+    def _temporary_of(self, kind: Any) -> tuple[list[str], Value]:
+        """The declaration of a variable under a name that Python does not have, and its place."""
         self._temporaries += 1
-        name = f"value{self._temporaries}_"
-        line = f"const {self.whole.structs.name(value.type)} {name} = {value.at(0)};"
-        return [line], Value(name, value.type, place="named")
+        own = Value(f"value{self._temporaries}_", kind, place="named")
+        return [f"{self.whole.structs.name(kind)} {own.text};"], own
 
     def _store_value(self, target: Any, node: Any) -> list[str]:
         """Assigns an expression; of a tuple each element, and none before all are read that another's place is in."""
@@ -192,44 +257,88 @@ class FunctionBody(Expressions):
     def _unpack(self, target: ast.Tuple, value: Value) -> list[str]:
         good = is_struct(value.type) and len(members(value.type)) == len(target.elts)
         self.need(good, target, f"unpacking {value.type}", "give as many names as it has fields")
-        lines, value = ([], value) if value.place else self._temporary(value)
+        if value.call and value_type(value.type) != value.type:
+            return self._unpack_call(target, value)
+        lines, value = ([], value) if value.place and not value.call else self._temporary(value)
         for one, field in zip(target.elts, members(value.type), strict=True):
             if getattr(one, "id", "") != "_":
                 lines += self._store(one, value.member(*field))
         return lines
 
+    def _unpack_call(self, target: ast.Tuple, value: Value) -> list[str]:
+        """Unpacks a tuple whose large fields the function writes: new variables at once, others by a temporary."""
+        before, after, places = [], [], []
+        for one, (_, kind) in zip(target.elts, members(value.type), strict=True):
+            name = getattr(one, "id", "_")
+            if not by_pointer(kind):
+                small = one
+                continue
+            new = name != "_" and name not in self.variables
+            lines, place = self._new(name, kind) if new else self._temporary_of(kind)
+            before += lines
+            after += [] if new or name == "_" else self._store(one, place)
+            places.append(place)
+        call = Value(with_addresses(value.call, *(place.address for place in places)), value_type(value.type))
+        stored = [f"{call.text};"] if getattr(small, "id", "") == "_" else self._store(small, call)
+        return [*before, *stored, *after]
+
+    def _new(self, name: str, kind: Any) -> tuple[list[str], Value]:
+        """A variable where it is first assigned: its declaration if it has one here, and its place."""
+        known, slot, of = self.variables.get(name), self._slots.get(name), self.whole.structs.name(kind)
+        if known is None and slot is not None and slot.type == kind:
+            self.variables[name] = slot
+            return [], slot
+        block, text = self._block_now, c_name(name) if known is None else f"{c_name(name)}_{of}"
+        self._blocks[name], own = block, Value(text, kind, place="named")
+        self.variables[name] = own
+        if known is not None or _names(block)[name] == self._uses[name]:
+            return [f"{of} {text};"], own
+        self._first.append(f"{of} {text} = {'{0}' if is_struct(kind) or hasattr(kind, 'ndim') else '0'};")
+        return [], own
+
     def _store_name(self, target: ast.Name, value: Value) -> list[str]:
-        known, name = self.variables.get(target.id), c_name(target.id)
-        of = self.whole.structs.name(value.type)
+        known = self.variables.get(target.id)
         if known is not None and (known.type, value.type) == (self.whole.real, self.whole.integer):
             value = self.cast(value, known.type, target)
-        if known is not None and known.place == "pointer" and known.type == value.type:
-            return [f"{known.text}_ = {value.at(0)};", f"{known.text} = &{known.text}_;"]
         if known is not None and known.type == value.type:
-            return [] if known.text == value.text else [f"{known.at(0)} = {value.at(0)};"]
-        block, own = self._block_now, _names(self._block_now)[target.id] == self._uses[target.id]
+            return self._store_again(known, value, target.id in self._slots)
         if known is not None:
             fault = f"{target.id} as {value.type} and as {known.type}"
-            same = self._blocks[target.id] is block
+            same = self._blocks[target.id] is self._block_now
             self.need(same, target, fault, "give it one type, as 0.0 for 0")
-            name, own = f"{name}_{of}", True
-        self._blocks[target.id], self.variables[target.id] = block, Value(name, value.type, place="named")
-        if own and by_pointer(value.type) and self._stores[target.id] == 1 and self._stays(value):
-            self.variables[target.id] = Value(name, value.type, place="pointer")
-            return [f"const {of} *{name} = {value.address};"]
-        if own:
+        stays = by_pointer(value.type) and self._stores[target.id] == 1 and self._stays(value)
+        lines, place = self._new(target.id, value.type)
+        if stays and lines:
+            self.variables[target.id] = place._replace(place="pointer")
+            return [f"const {lines[0].removesuffix(place.text + ';')}*{place.text} = {value.address};"]
+        if lines and not (value.call or any(one.call for one in value.fields)):
+            of = self.whole.structs.name(value.type)
             text = value.at(0).removeprefix(f"({of})") if is_struct(value.type) else value.at(0)
-            return [f"{of} {name} = {text};"]
-        empty = "{0}" if is_struct(value.type) or hasattr(value.type, "ndim") else "0"
-        self._first.append(f"{of} {name} = {empty};")
-        return [f"{name} = {value.at(0)};"]
+            return [f"{of} {place.text} = {text};"]
+        return [*lines, *self._fill(place, value)]
+
+    def _store_again(self, known: Value, value: Value, in_result: bool) -> list[str]:
+        """Assigns to a variable; an argument by pointer then points to a struct of the function's own."""
+        if known.text == value.text:
+            return []
+        pointer = known.place == "pointer" and not in_result
+        place = Value(f"{known.text}_", known.type, place="named") if pointer else known
+        reads = re.search(rf"(?<![\w>.]){re.escape(known.text)}\b", value.text)
+        lines = [f"{place.at(0)} = {value.at(0)};"] if reads else self._fill(place, value)
+        return [*lines, f"{known.text} = &{place.text};"] if pointer else lines
 
     def _stays(self, value: Value) -> bool:
         """Whether a struct has a place, in a name that is never assigned again."""
-        root = re.sub(r"\W.*", "", value.text)
-        pythons = [name for name, known in self.variables.items() if known.text == root]
+        pythons = [
+            name
+            for name, known in self.variables.items()
+            if re.match(rf"{re.escape(known.text)}\b", value.text)
+        ]
         given = {argument.arg for argument in self.tree.args.args}
-        return bool(value.place) and all(self._stores[name] <= (name not in given) for name in pythons)
+        fixed = pythons or re.fullmatch(r"\w+", value.text)
+        return bool(value.place and not value.call and fixed) and all(
+            self._stores[name] <= (name not in given) for name in pythons
+        )
 
     def _new_array(self, target: Any, call: ast.Call) -> list[str]:
         """An array of a known size, on the stack."""
@@ -248,6 +357,11 @@ class FunctionBody(Expressions):
             f"double {own}_numbers[{np.prod(lengths)}] = {{0}};",  # type: ignore[arg-type]
             f"const {self.whole.structs.name(kind)} {own} = {{{own}_numbers, {{{shape}}}}};",
         ]
+
+
+def _way(place: Value) -> str:
+    """The fields that lead to a place in the result, each behind a dot."""
+    return f"{place.text}.".replace("->", ".")
 
 
 def _may_read(node: ast.expr, stored: ast.expr) -> bool:

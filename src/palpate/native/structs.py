@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -59,13 +60,29 @@ def by_pointer(kind: Any) -> bool:
     return is_struct(kind) and leaves(kind) > LARGE
 
 
+def result_places(kind: Any) -> list[tuple[str, Any]]:
+    """Places that a function with such a result writes: a large struct, or of a tuple all but its one small field."""
+    large = (
+        [(f"to{name[1:]}", one) for name, one in members(kind) if by_pointer(one)] if is_struct(kind) else []
+    )
+    if not hasattr(kind, "fields") and large and len(large) == len(kind.types) - 1:
+        return large
+    return [("to", kind)] if by_pointer(kind) else []
+
+
+def value_type(kind: Any) -> Any:
+    """The type of a function's value in C: of a tuple whose large fields it writes, the small field."""
+    split = result_places(kind) not in ([], [("to", kind)])
+    return next(one for _, one in members(kind) if not by_pointer(one)) if split else kind
+
+
 _OF_THE_LANGUAGE = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false
 """
 _OF_ITS_LIBRARY = """
     main exp log pow sin cos sqrt floor fmod fabs isnan isfinite copysign y0 y1 yn j0 j1 jn gamma signal index memset
-    nan NAN INFINITY I
+    nan NAN INFINITY I memcpy larger smaller square cube root modulo floored
 """
 
 
@@ -73,6 +90,7 @@ def c_name(name: str, field: bool = False) -> str:
     """A name of Python as one of C: no leading underscore, none that the language or its library has."""
     bare = name.strip("_") or "unnamed"
     taken = bare in _OF_THE_LANGUAGE.split() or (not field and bare in _OF_ITS_LIBRARY.split())
+    taken = taken or re.fullmatch(r"to\d*", bare) is not None
     return f"{bare}_" if taken or bare != name else bare
 
 

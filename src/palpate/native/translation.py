@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from palpate._jit.typing_rules import TypingRules
 from palpate.native.constants import Constants
 from palpate.native.source import place_of, refuse, syntax_of
@@ -48,7 +50,9 @@ class Translation:
 
         self.rules = TypingRules()
         self.typing = self.rules.context
-        self.real, self.integer, self.boolean = types.float64, types.int64, types.boolean
+        self.real, self.integer = types.float64, types.int64
+        self.boolean, self.none = types.boolean, types.none
+        self.kinds = {bool: self.boolean, int: self.integer, float: self.real, np.float64: self.real}
         self.structs = Structs(prefix)
         self._claimed: set[str] = set()
         self.constants = Constants(self.structs, self._claim)
@@ -99,6 +103,19 @@ class Translation:
             own, found = self._claim(name, f"of_{key[1].removesuffix('_t')}"), OPERATORS[key]
             self._helpers[key] = own
             self.definitions.append(f"/* {found['says']} */\nstatic {key[1]} {own}{found['body'].rstrip()}")
+        return self._helpers[key]
+
+    def storage(self, kind: Any, reads: bool) -> str:
+        """The name of a function that reads a part from the beginning of an array, or writes it there."""
+        of = self.structs.name(kind)
+        key = (of, "read" if reads else "write")
+        if key not in self._helpers:
+            own = self._helpers[key] = self._claim(f"{'read' if reads else 'write'}_{of}", "again")
+            says = f"A {of} {'from' if reads else 'to'} the beginning of an array."
+            given, to, source = (f"{of} *to", "to", "a.at") if reads else (f"const {of} *v", "a.at", "v")
+            body = f"    memcpy({to}, {source}, sizeof({of}));\n" + ("    return to;\n" if reads else "")
+            kind_in_c = f"const {of} *" if reads else "void "
+            self.definitions.append(f"/* {says} */\nstatic {kind_in_c}{own}(array1 a, {given}) {{\n{body}}}")
         return self._helpers[key]
 
     def selector(self, kind: Any) -> str:

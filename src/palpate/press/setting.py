@@ -11,7 +11,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, held
 from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
@@ -130,6 +130,10 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
 
 def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL) -> Cell:
     """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
+    if isinstance(loop.inner, ServoLoop):
+        raise InputError(
+            f"{loop.title}: a press of a servo is not simulated; give gains of kind position or torque, or --wire"
+        )
     elastic = isinstance(loop.inner, PositionLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if elastic else arm.chain
     J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)

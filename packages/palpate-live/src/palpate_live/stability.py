@@ -191,7 +191,7 @@ def _encode(gains: Gains) -> bytes:
 
 def _ends(claim: Claim, gains: Gains) -> tuple[float, float]:
     """A claim's surfaces by their own K + B/theta [N/m]; one that the arm's own spring hides is at the cap."""
-    if gains.arm.kind == "torque":
+    if gains.arm.kind != "position":
         return claim.low, claim.high
     return gains.arm.surface(claim.low), min(gains.arm.surface(claim.high), gains.cap)
 

@@ -243,7 +243,8 @@ def learn(law, s, work, late, desired, force):
     friction = variance(s, F1, F1) + variance(s, F2, F2)
     curved = N * N * slope * (friction + slope)
     w1, w2 = -N * s[F1] / s[STIFF], -N * s[F2] / s[STIFF]
-    if abs(correct(s, FORCE, 1.0, G1, w1, G2, w2, f - N, noise + curved, GATE, work)) > GATE:
+    jump = correct(s, FORCE, 1.0, G1, w1, G2, w2, f - N, noise + curved, GATE, work)
+    if abs(jump) > GATE:
         halt(s, n, STEPPED)
         return
     angle, w = noise / (f * f) * max(1.0, s[ROUGH]), 1.0 / s[STIFF]
@@ -283,7 +284,8 @@ def command(law, s, desired, force, direction):
         press_again(law, s, n, LOST)
         return ZERO3
     felt = max(normal, size / sqrt(1.0 + law.mu_max * law.mu_max))
-    if s[TROUBLE] == FINE and abs(s[FORCE] - desired) > BAND * desired:
+    likely = 2.0 * sqrt(max(variance(s, FORCE, FORCE), 0.0))
+    if s[TROUBLE] == FINE and abs(s[FORCE] - desired) + likely > BAND * desired:
         s[TROUBLE] = AWAY
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
@@ -343,10 +345,10 @@ def followed_tip(c, s, position):
     origin, q = vector_at(s, ORIGIN), vector_at(s, POSITION)
     p = position - origin
     put_vector(s, POSITION, p)
-    return (
-        Vec3(axis(c, s, AXIS, q.x, p.x), axis(c, s, AXIS + 3, q.y, p.y), axis(c, s, AXIS + 6, q.z, p.z))
-        + origin
-    )
+    x = axis(c, s, AXIS, q.x, p.x)
+    y = axis(c, s, AXIS + 3, q.y, p.y)
+    z = axis(c, s, AXIS + 6, q.z, p.z)
+    return Vec3(x, y, z) + origin
 
 
 @law

@@ -40,8 +40,8 @@ SLIDING_TROUBLES = TROUBLES | {
     STEPPED: "the force jumped: a step, an edge or a hole in the surface; the tip stops until the force is held again, "
     "then slides on at half the speed (give the height of steps that are expected as --step)",
     JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
-    AWAY: "the force is off by more than a tenth: a step or an edge, friction that changes, or a normal that is not "
-    "yet known; slide more slowly",
+    AWAY: "the force may be off by more than a tenth: a step or an edge, friction that changes, or a normal that "
+    "is not yet known; slide more slowly",
     LOST: "contact was lost: the tip stopped sliding, and approaches again",
     FRAMES: "the force is not along the direction into the surface: force and position need the same axes, those of "
     "the base; the tip was held",

@@ -1,7 +1,7 @@
 """Slides simulated and judged: an arm with lags, a curved surface with friction, a sensor, and a law, compiled.
 
-The surface's own axes are x and y along it at its first point and z out of it. Nothing of the filter is in here:
-friction is a bristle that sticks until mu N (Coulomb) and weakens with speed (Stribeck), shapes are distance functions.
+Nothing of the filter is in here: friction is a bristle that sticks until mu N (Coulomb) and weakens with speed
+(Stribeck), shapes are distance functions.
 """
 
 from dataclasses import dataclass
@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law, part
-from palpate._vector import ZERO3, Vec3, cos, exp, sin, sqrt
+from palpate._vector import ZERO3, Vec3, exp, sqrt
 from palpate.arrays import Array
-from palpate.errors import InputError, unknown
+from palpate.errors import unknown
 from palpate.force.flat import flattened
 from palpate.force.gains import Gains
 from palpate.force.law import gain
 from palpate.force.simulated_press import world_of
+from palpate.force.sliding.ground import Ground, outside
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import (
     BOUND,
@@ -41,11 +42,6 @@ from palpate.force.sliding.tangent_filter import (
     variance,
 )
 
-PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP = (float(i) for i in range(8))
-SHAPES = {
-    "plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES,
-    "eggs": EGGS, "step": STEP,
-}  # fmt: skip
 OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
 LAWS = {
     "sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE,
@@ -56,77 +52,6 @@ COLUMNS = (
 )  # fmt: skip
 """Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
 speed commanded along the surface [m/s], reading [N], friction as it acts."""
-ELASTIC = 0.85
-"""Tangential over normal stiffness of the simulated contact if none is given."""
-
-
-@part
-class Ground(NamedTuple):
-    """A surface and its friction.
-
-    Args:
-        shape: one of `SHAPES`.
-        radius: of curvature; of waves at their crest [m].
-        period: of waves; place of a step [m].
-        height: of a step, downwards if negative [m].
-        stiffness: K [N/m].
-        damping: B [N s/m].
-        friction: mu at speed.
-        sticking: mu of a contact at rest, at least `friction`.
-        creep: speed over which one becomes the other [m/s].
-        ratio: tangential over normal stiffness.
-    """
-
-    shape: float
-    radius: float
-    period: float
-    height: float
-    stiffness: float
-    damping: float
-    friction: float
-    sticking: float
-    creep: float
-    ratio: float
-
-
-@law
-def outside(ground, p):
-    """Distance of a point from the surface [m], negative inside, and the direction out of it."""
-    R, shape = ground.radius, ground.shape
-    up = Vec3(0.0, 0.0, 1.0)
-    if shape == PLANE:
-        return p.z, up
-    if shape == SPHERE:
-        away = p + R * up
-        return sqrt(away @ away) - R, unit(away, up)
-    if shape == BOWL:
-        away = R * up - p
-        return R - sqrt(away @ away), unit(away, up)
-    if shape == CYLINDER:
-        away = Vec3(p.x, 0.0, p.z + R)
-        return sqrt(away @ away) - R, unit(away, up)
-    h, hx, hy = height_at(ground, p.x, p.y)
-    size = sqrt(1.0 + hx * hx + hy * hy)
-    return (p.z - h) / size, Vec3(-hx, -hy, 1.0) / size
-
-
-@law
-def height_at(ground, x, y):
-    """Height of a surface that is one over the plane [m], and its slopes."""
-    R, k = ground.radius, 6.283185307179586 / ground.period
-    if ground.shape == SADDLE:
-        return 0.5 * (x * x - y * y) / R, x / R, -y / R
-    if ground.shape == EGGS:
-        a = 1.0 / (R * k * k)
-        return (
-            a * (cos(k * x) * cos(k * y) - 1.0),
-            -a * k * sin(k * x) * cos(k * y),
-            -a * k * cos(k * x) * sin(k * y),
-        )
-    if ground.shape == WAVES:
-        return (cos(k * x) - 1.0) / (R * k * k), -sin(k * x) / (R * k), 0.0
-    u = min(max((x - ground.period) / 2e-3 + 0.5, 0.0), 1.0)  # the tip's radius rounds an edge over 2 mm
-    return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
 
 
 @part
@@ -408,26 +333,3 @@ def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
         float(np.mean(np.abs(c["stiffness"][judged] - true) < Z_95 * c["stiffness_std"][judged])),
         bool(c["trouble"][judged].any()),
     )  # fmt: skip
-
-
-def ground_of(shape: str, radius: float, stiffness: float, **others: float) -> Ground:
-    """A surface; `others` as `Ground` has them.
-
-    Raises:
-        InputError: no such shape, or a number out of range.
-    """
-    if shape not in SHAPES:
-        raise unknown("shape", shape, SHAPES)
-    friction = others.get("friction", 0.0)
-    numbers = {
-        "radius": radius, "period": 2.0 * radius, "height": 0.0, "stiffness": stiffness, "damping": 0.0,
-        "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC, **others,
-    }  # fmt: skip
-    low = [f"{name} of {value:g}" for name, value in numbers.items() if value < 0.0 and name != "height"]
-    if low or not radius > 0.0 or not stiffness > 0.0:
-        raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
-    if numbers["sticking"] < numbers["friction"]:
-        raise InputError(
-            f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"
-        )
-    return Ground(SHAPES[shape], **{name: float(value) for name, value in numbers.items()})

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import kernel, law, reader
+from palpate._jit import kernel, law, part, reader
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -20,7 +21,7 @@ from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
-from palpate.force.sliding.tangent_filter import BASE, COVARIANCE, G1, MU, STATES, STIFF
+from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
 from palpate.results import Readable
 
 CHI2_95 = sqrt(5.991)
@@ -71,6 +72,40 @@ def flat_slide(numbers, s, work, desired, force, position, direction, missed, ve
 
 
 _slide = kernel(flat_slide)
+
+
+@part
+class SlideEstimate(NamedTuple):
+    """The surface as a slide knows it.
+
+    Args:
+        normal: into the surface; before contact the direction that was given.
+        cone: half-angle of the cone about it that holds the true one with 95 % [rad].
+        friction: its coefficient; 0 before a slide.
+        friction_std: its standard deviation.
+        stiffness: as the measured position feels it [N/m]; 0 before a slide.
+        stiffness_std: its standard deviation [N/m].
+    """
+
+    normal: Vec3
+    cone: float
+    friction: float
+    friction_std: float
+    stiffness: float
+    stiffness_std: float
+
+
+@law
+def slide_estimate(s):
+    """The surface as it is known."""
+    normal = vector_at(s, places.NORMAL)
+    if s[places.PHASE] != places.SLIDE:
+        return SlideEstimate(normal, CHI2_95 * s[places.SLOPE], 0.0, 0.0, 0.0, 0.0)
+    a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
+    larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
+    friction, stiff = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, STIFF, STIFF), 0.0))
+    cone = CHI2_95 * sqrt(max(larger, 0.0)) / s[STIFF]
+    return SlideEstimate(normal, cone, s[MU], friction, s[BASE] * s[STIFF], s[BASE] * stiff)
 
 
 class Uncertain(float):
@@ -182,35 +217,28 @@ class SlidingLoop(Readable):
     @property
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
-        if not self.sliding:
-            return CHI2_95 * float(self._state[places.SLOPE])
-        at = COVARIANCE + G1 * (STATES + 1)
-        a, b, c = self._state[at], self._state[at + 1], self._state[at + STATES + 1]
-        larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
-        return CHI2_95 * sqrt(max(larger, 0.0)) / float(self._state[STIFF])
+        return float(slide_estimate(self._state).cone)
 
     @property
     def friction(self) -> Uncertain | None:
         """Coefficient of friction; None before a slide."""
         if not self.sliding:
             return None
-        return self._at(MU)
+        now = slide_estimate(self._state)
+        return Uncertain(float(now.friction), float(now.friction_std))
 
     @property
     def stiffness(self) -> Uncertain | None:
         """Stiffness as the measured position feels it [N/m]; None before a slide."""
         if not self.sliding:
             return None
-        return self._at(STIFF, float(self._state[BASE]))
+        now = slide_estimate(self._state)
+        return Uncertain(float(now.stiffness), float(now.stiffness_std))
 
     @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
-
-    def _at(self, i: int, unit: float = 1.0) -> Uncertain:
-        variance = float(self._state[COVARIANCE + i * (STATES + 1)])
-        return Uncertain(unit * float(self._state[i]), unit * sqrt(max(variance, 0.0)))
 
 
 def _three(name: str, values: ArrayLike) -> Array:

@@ -17,7 +17,8 @@ again.
 """
 
 from palpate._jit import law
-from palpate._vector import exp, sqrt
+from palpate._jit.elementary import exp
+from palpate._vector import sqrt
 
 FORCE, G1, G2, C11, C12, C22, STIFF, MU, F1, F2 = range(10)
 """Places of the state; K, K g and K H in units of K at the beginning."""

@@ -1,0 +1,94 @@
+"""A servo that yields: its model, its lead, what is proved, and a press."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from palpate.checks.force_certificate import RefusedError, check
+from palpate.force.arm import Arm, Limits, Sensor, ServoLoop, parse_arm
+from palpate.force.boundary import radius
+from palpate.force.certifying import certify
+from palpate.force.gains import gains_for
+from palpate.force.law import leading
+from palpate.force.sampled_loop import SampledLoop, law_for
+from palpate.force.simulated_press import pressed, surface, world_of
+
+
+@pytest.fixture(scope="module")
+def gains():
+    arm = Arm(
+        title="a servo", rate=500.0, inner=ServoLoop(mass=6.6, stiffness=4800.0, damping=480.0, delay=0.008),
+        sensor=Sensor(low_pass="butterworth3:120", sampling=480.0, noise=0.1, full_scale=100.0),
+        limits=Limits(speed=0.25, stiffness=2e5),
+    )  # fmt: skip
+    return gains_for(arm, 15.0)
+
+
+def test_a_tick_is_what_the_differential_equation_makes_of_it(gains):
+    loop, inner, K, B = SampledLoop(gains.arm), gains.arm.inner, 8e3, 90.0
+    law = law_for(gains.arm, 1e-4, K)
+    z = np.random.default_rng(0).normal(size=loop.size)
+    w, first = loop.rate_unit, loop.state.index("c0")
+    held = z[first + loop.delay - 1]
+
+    def motion(t, y):
+        pull = inner.stiffness * (held - y[0]) - inner.damping * y[1] - K * y[0] - B * y[1]
+        return [y[1], pull / inner.mass]
+
+    after = loop.phi(K, B, law) @ z
+    flow = solve_ivp(motion, (0.0, gains.arm.tick), [z[0], w * z[1]], rtol=1e-11, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose([after[0], w * after[1]], flow, rtol=1e-8)
+
+
+def test_the_matrix_and_the_law_have_the_same_lead(gains):
+    loop, numbers, K = SampledLoop(gains.arm), gains.cautious(), 3e3
+    Phi = loop.phi(K, 0.0, law_for(gains.arm, 1e-4, K))
+    z = np.random.default_rng(1).normal(size=loop.size) * 1e-3
+    pace, command = loop.state.index("u"), loop.state.index("c0")
+    speed = -1e-4 * loop.force_unit * z[pace - 1]
+    sent, after = leading(numbers, z[pace], speed, K, np.inf)
+    assert (Phi @ z)[command] == pytest.approx(z[command] + gains.arm.tick * sent, rel=1e-9)
+    assert (Phi @ z)[pace] == pytest.approx(after, rel=1e-9)
+
+
+def test_it_is_proved_up_to_the_cap_by_both_checks_and_a_forgery_is_refused(gains, tmp_path):
+    proof = certify(gains)
+    claim = proof.claims[0]
+    assert (claim.kind, claim.high) == ("held", gains.cap)
+    assert proof.check().holds
+    proof.save(tmp_path / "proof.json")
+    text = (tmp_path / "proof.json").read_text()
+    assert check(text) == len(claim.cells)
+    with pytest.raises(RefusedError):
+        check(
+            text.replace('"damping": 480.0', '"damping": 48.0').replace('"damping":480.0', '"damping":48.0')
+        )
+
+
+def test_no_surface_inside_grows(gains):
+    loop, rng = SampledLoop(gains.arm), np.random.default_rng(2)
+    law = law_for(gains.arm, gains.gain, gains.cap)
+    for _ in range(200):
+        total, time = np.exp(rng.uniform(np.log(200.0), np.log(2e5))), rng.uniform(0.0, gains.theta)
+        K = total / (1.0 + time / gains.theta)
+        assert radius(loop.phi(K, time * K, law)) < 1.0
+
+
+@pytest.mark.parametrize("K", [1e3, 5e3, 4e4, 2e5])
+def test_a_press_settles_with_little_overshoot(gains, K):
+    world = world_of(gains.arm, noise=0.1)
+    force = pressed(world, surface(K), gains.cautious(), 0.003, np.full(2000, 15.0), 0)[:, 0]
+    touch = int(np.argmax(force > 0.0))
+    assert force.max() < 1.1 * 15.0
+    assert np.abs(force[touch + 250 :] - 15.0).max() < 0.05 * 15.0
+
+
+def test_other_arms_have_no_lead(gains):
+    assert leading(gains.cautious()._replace(lead=0.0), 0.3, 0.1, 1e3, 0.05) == (0.1, 0.1)
+
+
+def test_it_is_read_from_a_file(gains):
+    text = gains.to_toml().split("[arm]")[1].replace("[arm.", "[")
+    assert parse_arm(text, "here").kind == "servo"
