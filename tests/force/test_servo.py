@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
 from palpate.checks.force_certificate import RefusedError, check
-from palpate.force.arm import Arm, Limits, Sensor, ServoLoop, parse_arm
+from palpate.errors import InputError
+from palpate.force import ForceLoop, SlidingLoop
+from palpate.force.arm import Arm, Sensor, ServoLoop, parse_arm
+from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius
 from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.law import leading
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
+from palpate.force.slide_table import Slide
+from palpate.wires import Limits, Task, checked
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +27,7 @@ def gains():
     arm = Arm(
         title="a servo", rate=500.0, inner=ServoLoop(mass=6.6, stiffness=4800.0, damping=480.0, delay=0.008),
         sensor=Sensor(low_pass="butterworth3:120", sampling=480.0, noise=0.1, full_scale=100.0),
-        limits=Limits(speed=0.25, stiffness=2e5),
+        limits=ArmLimits(speed=0.25, stiffness=2e5),
     )  # fmt: skip
     return gains_for(arm, 15.0)
 
@@ -92,3 +98,11 @@ def test_other_arms_have_no_lead(gains):
 def test_it_is_read_from_a_file(gains):
     text = gains.to_toml().split("[arm]")[1].replace("[arm.", "[")
     assert parse_arm(text, "here").kind == "servo"
+
+
+def test_what_does_not_cover_a_servo_refuses_it(gains):
+    with pytest.raises(InputError, match="a slide of a servo is not covered"):
+        SlidingLoop(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)))
+    task = Task(force=15.0, direction=(0.0, 0.0, -1.0), hold=1.0, retreat=0.01)
+    with pytest.raises(InputError, match="the adapting gain of a servo is not proved"):
+        checked(ForceLoop(gains), task, Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0))

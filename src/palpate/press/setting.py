@@ -132,7 +132,7 @@ def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool:
     """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
     if isinstance(loop.inner, ServoLoop):
         raise InputError(
-            f"{loop.title}: a press of a servo is not simulated; give gains of kind position or torque, or --wire"
+            f"{loop.title}: a press of a servo is not simulated; give gains of kind position or torque"
         )
     elastic = isinstance(loop.inner, PositionLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if elastic else arm.chain

@@ -127,6 +127,11 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
         InputError: what does not fit, and what to do.
     """
     gains = loop.gains
+    if gains.arm.kind == "servo":
+        raise InputError(
+            f"{gains.arm.title}: the adapting gain of a servo is not proved, and no press over a wire has tried it;"
+            " give gains of kind position or torque"
+        )
     size = float(np.linalg.norm(task.direction))
     if not (math.isfinite(size) and size > 0.0):
         raise InputError(
