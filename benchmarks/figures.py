@@ -9,7 +9,7 @@
 decide its numbers. A command prints the figure; here it is put between its marks, with the version of palpate and a
 digest of the sources: of their syntax, so that comments, docstrings and layout change nothing. Where only the digest
 has changed and the small run still prints what it printed when the figure was made, the figure stands, and gets the new
-digest. The small run of a figure of times is compared by its words alone. Exit code 1 if a command fails, or, with
+digest. A figure of times is made again; its small run is compared by its words alone. Exit code 1 if a command fails, or, with
 `--smoke`, if a small run prints anything else than it did.
 """
 
@@ -220,7 +220,7 @@ def write(figure: Figure, body: str) -> None:
 def renew(figure: Figure, forced: bool) -> str:
     """Make a figure again, or only its digest where the small run prints what it printed; says which."""
     today = smoke(figure)
-    if not forced and stamp_of(figure) and today == kept(figure):
+    if not forced and not figure.times and stamp_of(figure) and today == kept(figure):
         write(figure, body_of(figure).replace(f"sources {stamp_of(figure)}", f"sources {digest(figure)}"))
         return "stands: the small run prints what it printed"
     put(figure, output(figure.command))
