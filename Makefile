@@ -63,8 +63,7 @@ attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an 
 	$(BIN)/python benchmarks/figures.py --only wires-faults
 
 soak: .venv/dev.stamp ## feed each on-line estimator 5e7 samples and 2e7 hostile ones, for docs/reliability.md; hours
-	$(BIN)/python benchmarks/figures.py --only soak hostile
-	$(BIN)/python benchmarks/force/hostile.py
+	$(BIN)/python benchmarks/figures.py --only soak hostile hostile-force
 
 figures: .venv/dev.stamp ## make every figure of the documents whose sources have changed; hours, resumable
 	$(BIN)/python benchmarks/figures.py
