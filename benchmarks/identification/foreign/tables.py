@@ -163,7 +163,8 @@ def markdown(scores: list[Score]) -> str:
         scores: of at least one log.
     """
     every = tables(scores)
-    parts = ["```\n" + "\n".join(summary(scores)) + "\n```"]
+    told = [line for line in summary(scores) if not line.startswith("seconds")]  # no second run has the same
+    parts = ["```\n" + "\n".join(told) + "\n```"]
     parts += [_markdown(name, every[name]) for name in ("nuisance", "surface", "motion")]
     low = flagged(every["surface x nuisance"])
     parts.append(
