@@ -9,8 +9,8 @@
 decide its numbers. A command prints the figure; here it is put between its marks, with the version of palpate and a
 digest of the sources: of their syntax, so that comments, docstrings and layout change nothing. Where only the digest
 has changed and the small run still prints what it printed when the figure was made, the figure stands, and gets the new
-digest. A figure of times is made again; its small run is compared by its words alone. Exit code 1 if a command fails, or, with
-`--smoke`, if a small run prints anything else than it did.
+digest. A figure of times is made again; its small run is compared by its words alone. Exit code 1 if a command fails,
+or, with `--smoke`, if a small run prints anything else than it did.
 """
 
 from __future__ import annotations

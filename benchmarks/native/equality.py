@@ -142,7 +142,7 @@ class Bench:
             )  # another run may have written
             self.known = {"written_by": "palpate", **self.known, **now, key: value}
             write_json(self.file, self.known)
-        print(f"{law.module.name}: {title}: {self.known[key]}", flush=True)
+        print(f"{law.module.name}: {title}: {self.known[key]}", file=sys.stderr, flush=True)
         return self.known[key]
 
     def rows(self, law: ExportedLaw, ticks: int, seed: int) -> Path:
