@@ -37,7 +37,7 @@ def spoiled_press(kind, fault, folder, where, *more):
     theta = ForceLoop.load(folder / "gains.toml").gains.theta
     arm = (
         "-m",
-        f"palpate.wires.{kind}_arm",
+        f"palpate_rehearsal.{kind}_arm",
         "--address",
         f"{OWN}.30",
         "--arm",
