@@ -24,8 +24,8 @@ UNREACHABLE = {
     "variance > 0.0 ? sqrt(variance) : UNKNOWN": "rounding leaves no variance",
     "known->std.x == 0.0 ||": "the estimate is forgotten in free motion, so the second condition decides nothing",
     "stopped": "a tip that a servo moves; the recorded presses are those of a position arm",
+    "&& known->found.x > 0.0": "likewise: the last condition of a servo's touch",
     "lead": "likewise",
-    "pace": "likewise",
     "state->law.stage.phase == 2.0": "there is no fourth phase",
 }
 """Branches that no press takes, by their function or a piece of their line, and why."""

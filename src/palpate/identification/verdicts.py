@@ -137,7 +137,7 @@ def against_octave(found: Answer, point: WorkingPoint | None) -> Answer:
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
-    if found.fit.model.nonlinear or point.source == "press":
+    if found.fit.model.nonlinear:
         shown, predicted = stiffness_of(found.problem, found.problem.force, point), _predicted(found, point)
     elif {"K", "M"} <= set(found.names):
         shown, predicted = point.stiffness.value, _dynamic_stiffness(found, point.frequency_Hz)
