@@ -217,9 +217,9 @@ LOADED = {"@arm": _load_arm, "@experiment": _load_experiment, "@study": _load_st
 
 def _by_library(words: list[str]) -> int:
     """The exit code of reading a file, with the program's edge around it."""
-    from palpate.cli._streams import guarded
+    from palpate.cli._streams import run_guarded
 
-    return guarded(lambda: LOADED[words[0]](words[1]))
+    return run_guarded(lambda: LOADED[words[0]](words[1]))
 
 
 def _columns(path: Path, columns: tuple[str, ...]) -> tuple[str, ...]:

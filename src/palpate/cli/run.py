@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._streams import noticed
-from palpate.cli._terminal import COMPILING, console, place, show_answer, simulated
+from palpate.cli._streams import notice_signals
+from palpate.cli._terminal import COMPILING, console, place, show_answer, simulation_progress
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.names import QUIET, Experiment
 from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
 from palpate.errors import InputError
-from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
+from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def run(
     from palpate.bench.build import FILES, load_any, parse_any
 
     if known.list_:
-        listed(FILES, lambda one: load_any(one).title)
+        print_names(FILES, lambda one: load_any(one).title)
         return 0
     source = source_of(FILES, name, "run", known.print_)
     if name is None or source is None:
@@ -82,7 +82,7 @@ def run(
     drawn.check()
     with (own or PluginOptions()).consent():
         experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
-        with noticed() as interrupted:
+        with notice_signals() as interrupted:
             ran = _run(_Asked(name, source, experiment, seed), folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
@@ -135,7 +135,7 @@ def _run(
         found, why = (None, "") if alone else _identify(fresh / RECORD)
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
         about = {"experiment": printable(Path(asked.name).stem), "command": command}
-        summary = signed({**about, **summarise(record), **said})
+        summary = with_author({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
         try:
@@ -197,7 +197,7 @@ def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> 
     except InputError as error:
         raise InputError(f"{asked.name}: {error}") from error
     waiting = partial(screen.print, COMPILING)
-    with simulated(screen, interrupted) as show:
+    with simulation_progress(screen, interrupted) as show:
         return bench.run(
             experiment.run.duration, asked.seed, press=experiment.run.press, progress=show, waiting=waiting
         )

@@ -16,7 +16,7 @@ from palpate.cli.options.force import with_slide
 from palpate.cli.options.names import QUIET, LoopArm
 from palpate.cli.options.values import vector
 from palpate.errors import InputError
-from palpate.files import RECORD, fresh_folder, signed, write_json
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ def slide(
     with fresh_folder(folder, replace=replace) as fresh:
         rows = simulate(gains, ground, ways, into=into or (0.0, 0.0, -1.0), seed=asked.seed)
         head = {"command": printable(command()), "seed": asked.seed, "shape": asked.shape, "path": asked.path}
-        summary: dict[str, Any] = signed({**head, **summarise(rows, gains, ground)})
+        summary: dict[str, Any] = with_author({**head, **summarise(rows, gains, ground)})
         write_report(rows, gains, summary, fresh, RECORD)
         write_json(fresh / "summary.json", summary)
     if json:

@@ -15,7 +15,7 @@ from palpate.report.answer import Answer, Card, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import Table, embedded
+from palpate.report.page import Table, data_address
 from palpate.report.svg import svg
 
 if TYPE_CHECKING:
@@ -134,15 +134,15 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         ],
         cards={"": _cards(result)},
         pairs=[
-            {"source": embedded(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
+            {"source": data_address(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
             {
-                "source": embedded(svg(interval), "image/svg+xml"),
+                "source": data_address(svg(interval), "image/svg+xml"),
                 "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
                 f"{_GOALS[result.request.goal]}.",
             },
             *(
                 {
-                    "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
+                    "source": data_address(svg(draw_field(result, name)), "image/svg+xml"),
                     "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
                     f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
                     f"{_display_unit(result, name)[1]}.",
@@ -234,7 +234,7 @@ def draw_map(result: MapResult) -> Figure:
     from matplotlib.colors import LogNorm
 
     seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
-    with style.inked(9.0):
+    with style.ink(9.0):
         figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
         bar.ax.xaxis.set_minor_formatter("{x:g}")
         if threshold is not None:
@@ -251,7 +251,7 @@ def draw_map(result: MapResult) -> Figure:
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
     half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
-    with style.inked(9.0):
+    with style.ink(9.0):
         figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
@@ -263,7 +263,7 @@ def draw_interval(result: MapResult) -> Figure:
 def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
     (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
-    with style.inked(9.0):
+    with style.ink(9.0):
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
         at = 1e3 * result.map.surface.coordinates(result.map.places[known])
@@ -316,7 +316,7 @@ def draw_cut(result: MapResult) -> Figure:
     offsets = surface.coordinates(result.map.places) - begin
     along, beside = offsets @ way, np.abs(offsets @ np.array([-way[1], way[0]]))
     near = (beside < 0.05 * length) & (along >= 0.0) & (along <= length)
-    with style.inked():
+    with style.ink():
         figure, (axis,) = style.figure(height=2.6)
         x = 1e3 * length * steps
         axis.fill_between(x, *seen.ci95.T, color=style.K, alpha=0.2, linewidth=0, label="95 %")

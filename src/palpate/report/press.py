@@ -24,7 +24,7 @@ from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import DATA, PAIRS
 from palpate.report.numbers import NONE, plain, quantity
-from palpate.report.page import Table, embedded
+from palpate.report.page import Table, data_address
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
@@ -217,7 +217,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     """Writes figures, film.svg and report.html into a folder."""
     figures = []
     for name, draw in (("touch", _touch), ("force", _force), ("torque", _torque)):
-        with style.inked():
+        with style.ink():
             drawing, caption = draw(record, asked)
             style.save(drawing, folder / f"{name}.png")
             figures.append({"panels": panels_of(drawing), "caption": caption})
@@ -228,7 +228,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     }
     halves = [
         {
-            "source": embedded(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
+            "source": data_address(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
             "caption": told,
         }
         for half, told in captions.items()

@@ -87,7 +87,7 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     units = {name: _UNITS.get(name, "1") for name in columns}
     write_record(Record(columns, units, {"command": summary["command"]}), folder / record)
-    with style.inked():
+    with style.ink():
         drawing = _drawn(rows, gains, summary)
         style.save(drawing, folder / "slide.png")
         panels = panels_of(drawing)

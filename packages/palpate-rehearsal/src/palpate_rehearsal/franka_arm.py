@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.errors import InputError
-from palpate_rehearsal.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
+from palpate_rehearsal.rehearsal import OneDirection, arm_of, loopback, ready, ticks, words_of
 
 _Q = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
 _RATE = 1000.0
@@ -94,7 +94,7 @@ def serve(arm: OneDirection, address: str, seconds: float) -> None:
     server = server_of(robot, address)
     server.init()
     ready(f"franka:{address}")
-    for _ in paced(arm, seconds):
+    for _ in ticks(arm, seconds):
         server.process_commands()
         if robot.silent > _MOST:
             server.stop_motion()

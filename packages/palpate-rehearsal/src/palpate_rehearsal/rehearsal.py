@@ -14,7 +14,7 @@ from palpate._vector import ZERO3
 from palpate.force.arm import Arm, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
-from palpate.wires.realtime import hurried
+from palpate.wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""
@@ -93,7 +93,7 @@ def ready(line: str) -> None:
     sys.stdout.flush()
 
 
-def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
+def ticks(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
     """Each tick when it is due, at real time, until the seconds of the arm are over.
 
     With real-time priority, where the system gives it: a controller is not late because the loop's computer is busy.
@@ -103,7 +103,7 @@ def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = tim
         seconds: of the arm's time.
         wait: called before each tick with the seconds that are left until it is due.
     """
-    with hurried(True):
+    with realtime_priority(True):
         begun = time.monotonic()
         while arm.time < seconds:
             left = begun + arm.time - time.monotonic()

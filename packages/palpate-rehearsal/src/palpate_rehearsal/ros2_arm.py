@@ -15,7 +15,7 @@ import numpy as np
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
 from palpate.wires.ros2 import SENT
-from palpate_rehearsal.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
+from palpate_rehearsal.rehearsal import START, OneDirection, arm_of, ready, ticks, words_of
 
 _REST = 10
 _DOWN = (1.0, 0.0, 0.0, 0.0)
@@ -115,7 +115,7 @@ class Node:
 def serve(arm: OneDirection, node: Node, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over."""
     speed, silent = 0.0, 0
-    for _ in paced(arm, seconds):
+    for _ in ticks(arm, seconds):
         heard = node.heard(arm)
         silent = 0 if heard is not None else silent + 1
         speed = heard if heard is not None else (speed if silent < _REST else 0.0)

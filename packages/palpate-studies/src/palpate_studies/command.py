@@ -17,8 +17,17 @@ from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.names import QUIET, shipped_names
 from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli.toolkit import COMPILING, confirmed, console, counted, place, print_answer, say, show_answer
+from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
+from palpate.cli.toolkit import (
+    COMPILING,
+    confirmed,
+    console,
+    place,
+    print_answer,
+    progress_of_pieces,
+    say,
+    show_answer,
+)
 from palpate.errors import InputError
 from palpate.text import printable
 
@@ -106,7 +115,7 @@ def study(
     from palpate_studies import study as studies
 
     if known.list_:
-        listed(studies.FILES, lambda one: studies.load(one).title)
+        print_names(studies.FILES, lambda one: studies.load(one).title)
         return 0
     source = source_of(studies.FILES, name, "study", known.print_)
     if name is None or source is None:
@@ -157,7 +166,7 @@ def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Fi
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if new and not asked.yes:
         _ask(planned, screen, here=where.scheduler is None)
-    with _runner(where, screen) as runner, counted(screen) as show:
+    with _runner(where, screen) as runner, progress_of_pieces(screen) as show:
         work = Work(planned, asked.source, folder, runner, lambda done: show("runs", done, len(planned)))
         frame = work.run(replace=asked.replace)
     told = printable(f"palpate study {shlex.quote(name)}")

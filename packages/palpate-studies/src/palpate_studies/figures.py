@@ -223,7 +223,7 @@ def draw(
     """
     made = {}
     for one in drawn:
-        with style.inked():
+        with style.ink():
             figure = one.draw()
             for ending in dict.fromkeys((*endings, ".png")):
                 made[style.save(figure, folder / f"{one.name}{ending}", dpi)] = one.caption

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.bench.force_input import DONE
 from palpate.bench.metrics import metric_of
-from palpate.files import signed, write_json, write_text
+from palpate.files import with_author, write_json, write_text
 from palpate.report.page import Table
 from palpate_studies import effects
 from palpate_studies.effects import charts
@@ -64,7 +64,7 @@ def present(
     ranked = [] if compared else rankings(frame, plan)
     apart = effects.effects(frame, plan)
     answer = headline(frame, plan, ranked, compared, apart)
-    told = signed(
+    told = with_author(
         {
             "command": command,
             "answer": answer,

@@ -12,7 +12,7 @@ import msgspec
 
 from palpate._jit import sources_stamp
 from palpate.errors import InputError
-from palpate.files import check_place, kept_folder, signed, write_json, write_text
+from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis import look
@@ -92,7 +92,7 @@ def _measure_study(study: Study, runs: Runs, folder: Path, written: Written) -> 
         drawing = study.plot(data)
         for ending in dict.fromkeys((".png", *written.endings)):
             style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
-        write_json(folder / f"{study.NUMBER}{PANELS}", signed({"panels": panels_of(drawing)}))
+        write_json(folder / f"{study.NUMBER}{PANELS}", with_author({"panels": panels_of(drawing)}))
     return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
 
 
@@ -150,4 +150,4 @@ def _panels(path: Path) -> list[dict[str, Any]]:
 
 
 def _write_state(state: State, folder: Path) -> None:
-    write_json(folder / STATE, signed(asdict(state)))
+    write_json(folder / STATE, with_author(asdict(state)))

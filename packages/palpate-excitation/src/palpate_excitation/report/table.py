@@ -32,7 +32,7 @@ def show(found: Design, remedies: list[Remedy], console: Console) -> None:
 
 def describe_remedy(remedy: Remedy, found: Design) -> str:
     """Whether a change would be enough, in words."""
-    to = reached(remedy.reached, found)
+    to = half_widths_reached(remedy.reached, found)
     if remedy.enough:
         return f"enough, {to}"
     later = f"; enough after {ceil(remedy.needed)} s" if remedy.needed <= LONGEST else ""
@@ -89,11 +89,11 @@ def _verdict(found: Design) -> str:
     worst = found.made.worst(found.seconds)
     asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     if found.feasible:
-        return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
-    return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. Remedies:"
+        return f"every surface to within {asked} (95 %): yes, predicted {half_widths_reached(worst, found)}"
+    return f"every surface to within {asked} (95 %): no; the best is {half_widths_reached(worst, found)}. Remedies:"
 
 
-def reached(widths: dict[str, float], found: Design) -> str:
+def half_widths_reached(widths: dict[str, float], found: Design) -> str:
     """The half-widths of what was asked for."""
     return ", ".join(f"{name} {percent(widths[name])}" for name in found.problem.precision)
 

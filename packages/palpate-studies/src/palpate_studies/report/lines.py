@@ -95,7 +95,7 @@ def grid(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     return drawing, axes[:count]
 
 
-def bounded(axis: Axes, values: Array) -> None:
+def limit_axis(axis: Axes, values: Array) -> None:
     """Where a metric is drawn: its bulk, so that the few from far away leave room for it; how many is said."""
     good = values[np.isfinite(values)]
     if not len(good):
@@ -237,7 +237,7 @@ def clouds_figure(panels: Sequence[Cloud], label: str) -> Figure:
         if panel.words:
             axis.set_yticks(range(len(panel.words)), panel.words)
         else:
-            bounded(axis, every)
+            limit_axis(axis, every)
         axis.set_ylabel(label)
         if len(panel.kinds) > 1:
             axis.legend(fontsize=8, frameon=True, framealpha=0.85, edgecolor="none")

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report.look.assets import ABSENT, CHARTS, MAPS, OUTCOMES, TABLES, data, scripts, text_of
-from palpate.report.page import Table, captioned, render
+from palpate.report.page import Table, render, with_captions
 from palpate_studies.report.lines import COLORS, Cloud, Curve, Line, Points, Scale, decades, middles
 from palpate_studies.report.maps import Heat
 
@@ -179,7 +179,7 @@ def study_page(of: StudyPage) -> str:
         tables=of.tables,
         below=of.below,
         charts=data(of.charts) if worth else "",
-        figures=captioned(of.figures),
+        figures=with_captions(of.figures),
         command=of.command,
         study=of.study,
         origin=of.origin,

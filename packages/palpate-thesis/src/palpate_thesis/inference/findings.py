@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.files import MADE, signed, write_json, write_text
+from palpate.files import MADE, with_author, write_json, write_text
 from palpate.report import style
 from palpate.report.page import Table, page
 from palpate_thesis.inference.judge import Judged
@@ -168,7 +168,7 @@ PAGE, DOCUMENT, FIGURE, FOUND = "index.html", "found.md", "posterior.png", "foun
 def present(result: Result, folder: Path, command: str) -> None:
     """Writes page, document, figure and JSON into the folder."""
     style.save(drawn_figure(result.posterior), folder / FIGURE)
-    write_json(folder / FOUND, signed(as_json(result, command)))
+    write_json(folder / FOUND, with_author(as_json(result, command)))
     notes, found = [_cross_validated(result), _worth(result.posterior)], main_tables(result)
     whole = page(
         title="The thesis' laboratory, inferred",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.files import MADE, kept_folder, signed, write_json, write_text
+from palpate.files import MADE, kept_folder, with_author, write_json, write_text
 from palpate_thesis.inference import archive, contradictions, judge, search
 from palpate_thesis.inference.contradictions import Table
 from palpate_thesis.inference.findings import present
@@ -65,7 +65,7 @@ class Inference:
             InputError: the folder holds something else, and `replace` is off.
         """
         with kept_folder(self.folder, STATE, replace=replace):
-            write_json(self.folder / STATE, signed({"command": self.command, "finished": False}))
+            write_json(self.folder / STATE, with_author({"command": self.command, "finished": False}))
             everything = self._search("all sentences", calibrating=False)
             everything.survey(self.folder / ALL)
             half = self._half()
