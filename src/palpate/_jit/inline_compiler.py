@@ -96,7 +96,7 @@ def _entry_compiler(superword: bool) -> type:
             manager.run(self._final_module, builder)
             return None
 
-    class Entry(Compiler):
+    class SameFlagsCompiler(Compiler):
         """Numba's compiler, but that what is called sees the flags of everything inside."""
 
         def __init__(
@@ -106,7 +106,7 @@ def _entry_compiler(superword: bool) -> type:
             library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
-    return Entry
+    return SameFlagsCompiler
 
 
 class _Unloaded:

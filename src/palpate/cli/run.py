@@ -83,7 +83,7 @@ def run(
     with (own or PluginOptions()).consent():
         experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
         with notice_signals() as interrupted:
-            ran = _run(_Asked(name, source, experiment, seed), folder, output, drawn, interrupted)
+            ran = _run(_RunRequest(name, source, experiment, seed), folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
     if ran.undrawn:
@@ -105,7 +105,7 @@ class _Ran:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _RunRequest:
     """The experiment to run: its name or file, the text of that, and its numbers; and the seed of the noise."""
 
     name: str
@@ -115,7 +115,7 @@ class _Asked:
 
 
 def _run(
-    asked: _Asked,
+    asked: _RunRequest,
     folder: Path,
     output: FolderOptions,
     drawn: DrawnOptions,
@@ -187,7 +187,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
         return None, printable(str(error).replace(str(record), record.name))
 
 
-def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
+def _record(screen: Console, asked: _RunRequest, interrupted: Callable[[], bool]) -> Record:
     from palpate.bench.build import build_any, check_parts
 
     experiment = asked.experiment

@@ -23,7 +23,7 @@ from palpate.results import Readable
 from palpate.signals.types import Estimate
 
 
-class Setting(NamedTuple):
+class ProbeSetting(NamedTuple):
     """For one surface, in the order displacement, velocity, acceleration.
 
     Args:
@@ -36,8 +36,8 @@ class Setting(NamedTuple):
 
 
 SETTINGS = {
-    "foam": Setting((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0)),
-    "rubber": Setting((1e4, 1e2, 1.0), (2e-4, 1e-2, 0.5)),
+    "foam": ProbeSetting((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0)),
+    "rubber": ProbeSetting((1e4, 1e2, 1.0), (2e-4, 1e-2, 0.5)),
 }
 
 
@@ -87,7 +87,7 @@ class NeuralProbe(Readable):
 
     def __init__(
         self,
-        setting: Setting,
+        setting: ProbeSetting,
         amplitude: float = 40.0,
         learning_rate: float = 1e-4,
         layers: Sequence[int] = (4,),

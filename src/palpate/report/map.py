@@ -11,7 +11,7 @@ from palpate.maps.lumps import Lump
 from palpate.maps.presses import AXES
 from palpate.maps.result import MapResult
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
@@ -124,7 +124,7 @@ def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
 def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
     """The page as HTML; a live one loads itself again."""
     field, interval = draw_map(result), draw_interval(result)
-    answer = Answer(
+    answer = PageAnswer(
         title=title,
         sentence=sentence(result),
         about=f"{len(result.map)} presses. Interpolated by a Gaussian process on the logarithm of the stiffness; "

@@ -18,7 +18,7 @@ from palpate.press.setting import Place
 from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
@@ -236,7 +236,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     loop, parameters = summary["loop"], (summary["identified"] or {}).get("parameters", {})
     contact = summary["force"] is not None
     wanted = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
-    answer = Answer(
+    answer = PageAnswer(
         title=f"A press of {asked.arm.title}{wanted}",
         sentence=sentence(summary, parameters),
         about=f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "

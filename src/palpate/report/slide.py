@@ -17,7 +17,7 @@ from palpate.force.sliding.slide_world import COLUMNS, SETTLED, figures_of
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
 
@@ -101,7 +101,7 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
         {"panels": panels[:-1], "caption": caption},
         {"panels": panels[-1:], "caption": "Speed along the path."},
     ]
-    answer = Answer(
+    answer = PageAnswer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",

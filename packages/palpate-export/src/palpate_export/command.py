@@ -13,11 +13,11 @@ from palpate_export.contact import contact_from
 from palpate_export.exporting import Request, check, prepare
 
 if TYPE_CHECKING:
-    from palpate.cli.export import GivenOptions, OutputOptions, SceneOptions
+    from palpate.cli.export import ExportOutput, GivenOptions, SceneOptions
     from palpate_export.exporting import Checked, Exported
 
 
-def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, output: OutputOptions) -> int:
+def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, output: ExportOutput) -> int:
     """Write the contact of an identified surface, and press it if that is wanted.
 
     Returns:
@@ -48,7 +48,7 @@ def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, o
     return 1 if output.check and not (verdicts and all(verdicts)) else 0
 
 
-def _check_places(places: tuple[Path, ...], output: OutputOptions, model: Path | None) -> None:
+def _check_places(places: tuple[Path, ...], output: ExportOutput, model: Path | None) -> None:
     for path in places:
         if model is not None and path.absolute() == model.absolute():
             raise InputError(f"--out {path} is the scene itself; name another file")

@@ -11,7 +11,7 @@ from palpate.cli.toolkit import console, place, print_answer, print_lines, progr
 
 if TYPE_CHECKING:
     from palpate_references.check import Score
-    from palpate_references.problem import Problem
+    from palpate_references.problem import CertifiedProblem
 
 
 def references(
@@ -59,7 +59,7 @@ def references(
     return _check(known, json=json)
 
 
-def _check(known: list[Problem], *, json: bool) -> int:
+def _check(known: list[CertifiedProblem], *, json: bool) -> int:
     from palpate.report.page import Table
     from palpate_references.check import ENOUGH, SOLVERS, scores
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.wires import sim as protocol
-from palpate_rehearsal.rehearsal import OneDirection, arm_of, ready, ticks, words_of
+from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, ready, ticks, words_of
 
 _REST = 10
 """Ticks without a command after which it rests."""
@@ -35,7 +35,7 @@ class Master:
     sent: int = 0
 
 
-def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
+def serve(arm: ToolAxisArm, listening: socket.socket, seconds: float) -> None:
     """Run at real time until the seconds are over.
 
     Args:

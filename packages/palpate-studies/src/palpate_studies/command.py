@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from palpate_studies.cluster import Cluster
-    from palpate_studies.plan import Plan
+    from palpate_studies.plan import RunPlan
     from palpate_studies.run_study import StudyRunner
     from palpate_studies.summary import Findings
 
@@ -124,7 +124,7 @@ def study(
     try:
         with (own or PluginOptions()).consent():
             found = _print_end(
-                _Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
+                _StudyRequest(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
             )
     except KeyboardInterrupt:
         kept = f"the finished runs are saved in {folder}; the same command resumes"
@@ -135,7 +135,7 @@ def study(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _StudyRequest:
     """A study's name, its text and its folder; whether to ask before a long one, and to replace what is there."""
 
     name: str
@@ -145,7 +145,7 @@ class _Asked:
     replace: bool
 
 
-def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
+def _print_end(asked: _StudyRequest, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate_studies.plan import plan
     from palpate_studies.preview import check_cases, check_parts_of
@@ -173,7 +173,7 @@ def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Fi
     return present(frame, planned, folder, asked.source, told, drawn.endings, drawn.dpi)
 
 
-def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
+def _ask(plan: RunPlan, screen: Console, *, here: bool) -> None:
     """Ask for confirmation of a very long study; for a cluster only the number of runs is known."""
     from palpate_studies.preview import MANY, seconds_a_run, too_much
 

@@ -11,7 +11,7 @@ from palpate.force.describe import UNCOVERED
 from palpate.force.steps import BAND
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
-from palpate.report.answer import Answer, Card, Extent, answer_page, log_scale
+from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
 from palpate.report.tuning.table import rows, show
@@ -41,7 +41,7 @@ def html(told: Tuning) -> str:
 def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
     """The page of `palpate tune --report`; `command` is what made it."""
     gains = told.gains
-    answer = Answer(
+    answer = PageAnswer(
         title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
         sentence=sentence(told),
         about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "

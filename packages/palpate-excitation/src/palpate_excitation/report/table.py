@@ -17,7 +17,7 @@ from palpate.records import Record
 from palpate.references import Multisine
 from palpate.report.terminal import bare_table
 from palpate_excitation import Design, HybridLoop, Remedy
-from palpate_excitation.force_loops import Prediction
+from palpate_excitation.force_loops import SurfaceResponse
 from palpate_excitation.problem import LONGEST
 
 
@@ -63,7 +63,7 @@ def _table(found: Design) -> Table:
     return table
 
 
-def _row(prediction: Prediction, found: Design) -> list[str | Text]:
+def _row(prediction: SurfaceResponse, found: Design) -> list[str | Text]:
     widths = prediction.half_widths(found.seconds)
     values = dict(zip(("K", "B", "M"), prediction.surface.values, strict=True))
     low, high = prediction.force

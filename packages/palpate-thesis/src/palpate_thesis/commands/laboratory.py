@@ -15,7 +15,7 @@ from palpate.cli.options.values import FolderOptions
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
-    from palpate_thesis.inference.result import Result
+    from palpate_thesis.inference.result import InferenceResult
     from palpate_thesis.inference.search import Runner
 
 
@@ -134,7 +134,7 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
         cluster.close()
 
 
-def _show(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
+def _show(result: InferenceResult, folder: Path, found: Mapping[str, Any] | None) -> None:
     from palpate.report.page import Table
     from palpate_thesis.inference.findings import PAGE
     from palpate_thesis.inference.result import halves, laboratories
