@@ -77,7 +77,7 @@ def test_a_map_grows_to_the_whole_one(table):
     inside = result.coarse.inside
     width = [np.mean(seen.std[inside]) for _, seen in result.film]
     assert np.all(np.diff(width) <= 0.0)
-    whole, _ = result.map.process.likeliest.predict(cdist(result.map.places, result.coarse.places))
+    whole, _ = result.map.process.likeliest.reduction.predict(cdist(result.map.places, result.coarse.places))
     assert result.film[-1][1].mean == pytest.approx(whole)
 
 
