@@ -224,8 +224,8 @@ def cost() -> str:
         times.append((between - start, time.perf_counter() - between))
     least, product = np.min(times, axis=0)
     return (
-        f"10,000 places and the next press, 100 presses: {1e3 * least:.0f} ms, {least / product:.1f} times a product of "
-        "two matrices of 1000 x 1000 (least of 60 each)"
+        f"10,000 places and the next press, 100 presses: {1e3 * least:.0f} ms, {least / product:.1f} times a product "
+        "of two matrices of 1000 x 1000 (least of 60 each)"
     )
 
 

@@ -334,7 +334,9 @@ def draw_cut(result: MapResult) -> Figure:
             axis.plot(at, values, "o", color=style.INK, markersize=4, label=label)
         if result.request.stiffer_than is not None:
             axis.axhline(result.request.stiffer_than, **style.KNOWN, label="threshold")
-        axis.set(xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]), yscale="log")
+        axis.set(
+            xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]), yscale="log"
+        )
         low = axis.get_ylim()[0]
         power = 10.0 ** np.floor(np.log10(low))
         axis.set_ylim(bottom=power * np.floor(low / power))  # on a page steps are counted from here
