@@ -100,7 +100,7 @@ class Conditioned:
 
     @cached_property
     def reduction(self) -> Reduction:
-        """What the values take off the field's variance, and what they say of its mean."""
+        """Linear rows over the values that give the field elsewhere."""
         W = solve_triangular(self.factor, np.eye(len(self.values)), lower=True, check_finite=False)
         ones = W.sum(axis=1)
         unknown = 1.0 / float(np.linalg.norm(ones))
