@@ -17,7 +17,7 @@ and the verdict that each parameter deserves. Whoever has a position and a force
 from palpate.identifiers.contact_identifier import ContactIdentifier
 from palpate.identifiers.estimator import Directional, Exponential, IdentifierTable, SIFt
 from palpate.identifiers.kalman_filter import KalmanFilter, KalmanIdentifier
-from palpate.identifiers.neural_probe import NeuralProbe, Probed, ProbeSetting, watch
+from palpate.identifiers.neural_probe import NeuralProbe, Probed, Setting, watch
 from palpate.identifiers.recursive_least_squares import LeastSquaresIdentifier, RecursiveLeastSquares
 from palpate.identifiers.restarting import RestartingIdentifier, RestartingLeastSquares
 from palpate.signals.types import Estimate
@@ -32,11 +32,11 @@ __all__ = [
     "KalmanIdentifier",
     "LeastSquaresIdentifier",
     "NeuralProbe",
-    "ProbeSetting",
     "Probed",
     "RecursiveLeastSquares",
     "RestartingIdentifier",
     "RestartingLeastSquares",
     "SIFt",
+    "Setting",
     "watch",
 ]

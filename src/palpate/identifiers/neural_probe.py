@@ -23,7 +23,7 @@ from palpate.results import Readable
 from palpate.signals.types import Estimate
 
 
-class ProbeSetting(NamedTuple):
+class Setting(NamedTuple):
     """For one surface, in the order displacement, velocity, acceleration.
 
     Args:
@@ -36,8 +36,8 @@ class ProbeSetting(NamedTuple):
 
 
 SETTINGS = {
-    "foam": ProbeSetting((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0)),
-    "rubber": ProbeSetting((1e4, 1e2, 1.0), (2e-4, 1e-2, 0.5)),
+    "foam": Setting((1e3, 1e2, 1.0), (2e-3, 1e-2, 1.0)),
+    "rubber": Setting((1e4, 1e2, 1.0), (2e-4, 1e-2, 0.5)),
 }
 
 
@@ -87,7 +87,7 @@ class NeuralProbe(Readable):
 
     def __init__(
         self,
-        setting: ProbeSetting,
+        setting: Setting,
         amplitude: float = 40.0,
         learning_rate: float = 1e-4,
         layers: Sequence[int] = (4,),
