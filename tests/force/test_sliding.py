@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,10 @@ from palpate.force.sliding.ground import ground_of
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from
 from palpate.force.sliding.slide_world import directions, figures_of, simulate
-from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, begin, correct, predict
+from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Row, begin, correct, predict
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "force"))
+from sliding_rivals import RIVALS
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -42,7 +47,7 @@ def any_loop(request) -> SlidingLoop:
 def in_a_slide(loop: SlidingLoop, normal: np.ndarray) -> None:
     """The loop in a slide with this normal and F_d held, as `press_tick` leaves it."""
     loop.reset()
-    state = loop._state
+    state = loop.state
     state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
     slide_from(loop.law, state, places.Vec3(*normal), loop.desired, 2e4, 0.1, 0.12, 0.35, 0.3)
 
@@ -58,7 +63,7 @@ def test_a_force_is_held_along_surfaces_with_friction(arm: str, shape: str) -> N
     assert found.normal < np.radians(0.5)
     assert min(found.cone, found.friction) > 0.9
     fixed = figures_of(
-        simulate(gains, ground, ways, into=[0.1, 0.05, -1.0], rival="fixed normal"), gains, ground
+        simulate(gains, ground, ways, into=[0.1, 0.05, -1.0], control=RIVALS["fixed normal"]), gains, ground
     )
     assert not fixed.obeys
 
@@ -102,7 +107,7 @@ def test_hostile_streams_leave_only_finite_velocities_within_the_limit(any_loop:
     for start in range(20):
         loop.reset() if start % 2 else in_a_slide(loop, DOWN)
         if start % 4 == 1:
-            loop._state[places.PHASE], loop._state[places.TOUCHES] = places.MOVE, 1.0 + start % 3
+            loop.state[places.PHASE], loop.state[places.TOUCHES] = places.MOVE, 1.0 + start % 3
         for _ in range(300):
             f, p, d = (rng.normal(0.0, size, 3) for size in (20.0, 1e-3, 1.0))
             for v in (f, p, d):
@@ -154,7 +159,7 @@ def test_three_touches_measure_the_normal_before_the_slide(arm: str, shape: str)
 
 def test_a_sensor_that_is_not_tared_holds_the_tip_between_touches() -> None:
     loop = SlidingLoop(tuned(touches=0.01))
-    state = loop._state
+    state = loop.state
     state[places.PHASE], state[places.TOUCHES], state[places.TICKS] = places.MOVE, 1.0, 10.0
     tip = np.array([0.0, 0.0, 0.1])
     v = loop.update([0.3, 0.1, -9.0], tip, [1.0, 0.0, 0.0])
@@ -220,10 +225,10 @@ def test_a_contact_that_sticks_tells_nothing_of_friction() -> None:
     s, work = np.zeros(COVARIANCE + STATES * STATES + 1), np.zeros(STATES)
     begin(s, 15.0, 0.1, 10.0, 5e3, 0.1, 0.35, 0.3, 0.1)
     before = s[COVARIANCE + 7 * (STATES + 1)]
-    correct(s, 1, 1.0, 8, 1.0, 9, 0.0, 0.0, 4e-5, 1e9, work)
+    correct(s, Row(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     for _ in range(10):  # 0.1 mm, a fortieth of the way on which it sticks
         predict(s, 1e-5, 0.0, 0.0, 0.85, 1e3, 0.0)
-        correct(s, 1, 1.0, 8, 1.0, 9, 0.0, 0.0, 4e-5, 1e9, work)
+        correct(s, Row(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     assert s[COVARIANCE + 7 * (STATES + 1)] > 0.9 * before
 
 

@@ -70,7 +70,7 @@ def of_force_loop(loop: ForceLoop) -> Recording:
 
 
 def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array:
-    gains, state = loop.gains, loop._state
+    gains, state = loop.gains, loop.state
     sensor, tick = gains.arm.sensor, gains.arm.tick
     K = gains.cap * 10.0 ** rng.uniform(-3.0, 0.5)
     B, wall = K * 10.0 ** rng.uniform(-4.0, -1.5), gains.approach * tick * ticks * rng.uniform(0.05, 0.3)
@@ -146,7 +146,7 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
         way *= np.nan if fault == UNASKED else float(k % 9 > 0)
         missed = {LATE: float(k % 40), LATER: np.nan}.get(fault, 0.0)
         v = loop.update(force, place, way, missed)
-        state = digest_of(loop._state) if k % 100 == 99 else 0.0
+        state = digest_of(loop.state) if k % 100 == 99 else 0.0
         out[k] = [k == 0, loop.desired, *force, *place, *way, missed, digest_of(v), state]
         x = x + tick * v
     return out
