@@ -70,7 +70,7 @@ def of_force_loop(loop: ForceLoop) -> Recording:
 
 
 def _force_press(loop: ForceLoop, ticks: int, rng: np.random.Generator) -> Array:
-    gains, state = loop.gains, loop.state
+    gains, state = loop.gains, loop._state
     sensor, tick = gains.arm.sensor, gains.arm.tick
     K = gains.cap * 10.0 ** rng.uniform(-3.0, 0.5)
     B, wall = K * 10.0 ** rng.uniform(-4.0, -1.5), gains.approach * tick * ticks * rng.uniform(0.05, 0.3)
