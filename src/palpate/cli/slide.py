@@ -43,7 +43,8 @@ class SlideOptions:
     speed
         Along the surface, as 30:mm/s.
     shape
-        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm.
+        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
+        mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms).
     surface
         K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck).
     path
@@ -87,12 +88,10 @@ class SlideOptions:
     physics: Annotated[Physics, QUIET] = "own"
     seed: Annotated[int, WHOLE, Parameter(group=Group("Noise", sort_key=2))] = 0
 
-    def ground(self) -> tuple[Ground, float]:
-        """The surface, and its radius [m]."""
+    def ground(self, ways: Array, speed: float, rate: float) -> Ground:
+        """The surface under a path."""
         from palpate.force.sliding.ground import ground_of
 
-        name, _, size = self.shape.partition(":")
-        radius = in_si("--shape", size, "length") if size else 0.2
         numbers: dict[str, float] = {}
         for part in self.surface.split(","):
             key, _, text = (word.strip() for word in part.partition("="))
@@ -102,10 +101,32 @@ class SlideOptions:
                 raise InputError(
                     f"--surface needs K=..,B=..,mu=.. as numbers, as K=20000,mu=0.3; got {self.surface!r}"
                 ) from None
-        height = {"height": radius, "period": 0.02} if name == "step" else {}
-        return ground_of(
-            name, 0.2 if name == "step" else radius, numbers.pop("stiffness", 0.0), **numbers, **height
-        ), radius
+        name, _, size = self.shape.partition(":")
+        stiffness, heights = numbers.pop("stiffness", 0.0), None
+        if name == "mesh":
+            from palpate.force.sliding.mesh import heights_of
+
+            file, _, unit = size.rpartition(":")
+            if not file:
+                raise InputError(
+                    f"--shape mesh needs a file and its unit, as mesh:part.stl:mm; got {self.shape!r}"
+                )
+            way = speed / rate * ways.cumsum(axis=0)
+            heights = heights_of(Path(file), in_si("--shape", f"1:{unit}", "length"), float(abs(way).max()))
+        height = {"height": self.radius, "period": 0.02} if name == "step" else {}
+        radius = 0.2 if name == "step" else self.radius
+        return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the shape, or its height [m]; of a plane or a mesh the smallest radius that is expected."""
+        name, _, size = self.shape.partition(":")
+        if name in {"plane", "mesh"} or not size:
+            return 0.1 if name == "mesh" else 0.2
+        radius = in_si("--shape", size, "length")
+        if not 1e-3 <= abs(radius) <= 1e4 and name != "step":
+            raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
+        return radius
 
     @cached_property
     def joints(self) -> JointedArm:
@@ -126,7 +147,7 @@ class SlideOptions:
             return simulate(gains, ground, ways, into=into, seed=self.seed)
         return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
 
-    def tuned(self, radius: float) -> Gains:
+    def tuned(self) -> Gains:
         """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
         from msgspec.structs import replace as msgspec_replace
 
@@ -140,7 +161,9 @@ class SlideOptions:
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
         gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
-        return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt, self.step, self.touches)
+        return with_slide(
+            gains, self.mu_max, self.speed, f"{abs(self.radius):g}", self.tilt, self.step, self.touches
+        )
 
 
 def slide(
@@ -171,8 +194,7 @@ def slide(
     from palpate.report.slide import sentence, summarise, write_report
 
     asked = asked or SlideOptions()
-    ground, radius = asked.ground()
-    gains = asked.tuned(abs(radius))
+    gains = asked.tuned()
     slide_numbers = numbers_of(gains)
     if not 1.0 <= asked.seconds <= 600.0:
         raise InputError(f"--seconds must be from 1 to 600, got {asked.seconds:g}")
@@ -180,6 +202,7 @@ def slide(
     if not length >= GAP:
         raise InputError(f"--length must be at least {1e3 * GAP:g} mm, got {1e3 * length:g} mm")
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, length)
+    ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
