@@ -47,7 +47,7 @@ def any_loop(request) -> SlidingLoop:
 def in_a_slide(loop: SlidingLoop, normal: np.ndarray) -> None:
     """The loop in a slide with this normal and F_d held, as `press_tick` leaves it."""
     loop.reset()
-    state = loop.state
+    state = loop._state
     state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
     slide_from(loop.law, state, places.Vec3(*normal), loop.desired, 2e4, 0.1, 0.12, 0.35, 0.3)
 
@@ -107,7 +107,7 @@ def test_hostile_streams_leave_only_finite_velocities_within_the_limit(any_loop:
     for start in range(20):
         loop.reset() if start % 2 else in_a_slide(loop, DOWN)
         if start % 4 == 1:
-            loop.state[places.PHASE], loop.state[places.TOUCHES] = places.MOVE, 1.0 + start % 3
+            loop._state[places.PHASE], loop._state[places.TOUCHES] = places.MOVE, 1.0 + start % 3
         for _ in range(300):
             f, p, d = (rng.normal(0.0, size, 3) for size in (20.0, 1e-3, 1.0))
             for v in (f, p, d):
@@ -159,7 +159,7 @@ def test_three_touches_measure_the_normal_before_the_slide(arm: str, shape: str)
 
 def test_a_sensor_that_is_not_tared_holds_the_tip_between_touches() -> None:
     loop = SlidingLoop(tuned(touches=0.01))
-    state = loop.state
+    state = loop._state
     state[places.PHASE], state[places.TOUCHES], state[places.TICKS] = places.MOVE, 1.0, 10.0
     tip = np.array([0.0, 0.0, 0.1])
     v = loop.update([0.3, 0.1, -9.0], tip, [1.0, 0.0, 0.0])

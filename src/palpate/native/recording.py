@@ -146,7 +146,7 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
         way *= np.nan if fault == UNASKED else float(k % 9 > 0)
         missed = {LATE: float(k % 40), LATER: np.nan}.get(fault, 0.0)
         v = loop.update(force, place, way, missed)
-        state = digest_of(loop.state) if k % 100 == 99 else 0.0
+        state = digest_of(loop._state) if k % 100 == 99 else 0.0
         out[k] = [k == 0, loop.desired, *force, *place, *way, missed, digest_of(v), state]
         x = x + tick * v
     return out

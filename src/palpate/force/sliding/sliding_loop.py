@@ -154,10 +154,10 @@ class SlidingLoop(Readable):
         self.gains = gains
         self.law = sliding(gains, into)
         self._desired = gains.force
-        self._numbers, self.state, self._work = flattened(self.law), np.zeros(SIZE), np.zeros(STATES)
+        self._numbers, self._state, self._work = flattened(self.law), np.zeros(SIZE), np.zeros(STATES)
         self._velocity = np.zeros(3)
         self.reset()
-        _slide(self._numbers, self.state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
+        _slide(self._numbers, self._state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
 
     @classmethod
     def load(cls, path: str | Path, into: ArrayLike = DOWN) -> SlidingLoop:
@@ -170,7 +170,7 @@ class SlidingLoop(Readable):
 
     def reset(self) -> None:
         """In free motion, knowing nothing."""
-        self.law.start(self.state)
+        self.law.start(self._state)
 
     @property
     def desired(self) -> float:
@@ -199,7 +199,7 @@ class SlidingLoop(Readable):
             missed: ticks that were lost since the last call.
         """
         _slide.compiled(
-            self._numbers, self.state, self._work, self._desired, _three("force", force),
+            self._numbers, self._state, self._work, self._desired, _three("force", force),
             _three("position", position), _three("direction", direction), missed, self._velocity,
         )  # fmt: skip
         return self._velocity.copy()
@@ -207,24 +207,24 @@ class SlidingLoop(Readable):
     @property
     def sliding(self) -> bool:
         """Whether the force was held and the tip slides."""
-        return bool(self.state[places.PHASE] == places.SLIDE)
+        return bool(self._state[places.PHASE] == places.SLIDE)
 
     @property
     def normal(self) -> Array:
         """Estimated normal, into the surface, shape (3,); before contact the direction that was given."""
-        return self.state[places.NORMAL : places.NORMAL + 3].copy()
+        return self._state[places.NORMAL : places.NORMAL + 3].copy()
 
     @property
     def normal_cone95(self) -> float:
         """Half-angle of the cone about `normal` that holds the true one with 95 % [rad]."""
-        return float(slide_estimate(self.state).cone)
+        return float(slide_estimate(self._state).cone)
 
     @property
     def friction(self) -> Uncertain | None:
         """Coefficient of friction; None before a slide."""
         if not self.sliding:
             return None
-        now = slide_estimate(self.state)
+        now = slide_estimate(self._state)
         return Uncertain(float(now.friction), float(now.friction_std))
 
     @property
@@ -232,13 +232,23 @@ class SlidingLoop(Readable):
         """Stiffness as the measured position feels it [N/m]; None before a slide."""
         if not self.sliding:
             return None
-        now = slide_estimate(self.state)
+        now = slide_estimate(self._state)
         return Uncertain(float(now.stiffness), float(now.stiffness_std))
+
+    @property
+    def state(self) -> Array:
+        """The law's state as flat numbers, shape (SIZE,), changed in place; as the C export has it."""
+        return self._state
+
+    @property
+    def bound(self) -> float:
+        """K_u of the press, by which the gain goes [N/m]; 0 before it."""
+        return float(self._state[places.BOUND])
 
     @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
-        return SLIDING_TROUBLES[float(self.state[places.TROUBLE])]
+        return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
 
 
 def _three(name: str, values: ArrayLike) -> Array:
