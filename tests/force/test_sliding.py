@@ -20,7 +20,7 @@ from palpate.force.sliding.ground import ground_of
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from
 from palpate.force.sliding.slide_world import directions, figures_of, simulate
-from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Row, begin, correct, predict
+from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Observation, begin, correct, predict
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "force"))
 from sliding_rivals import RIVALS
@@ -225,10 +225,10 @@ def test_a_contact_that_sticks_tells_nothing_of_friction() -> None:
     s, work = np.zeros(COVARIANCE + STATES * STATES + 1), np.zeros(STATES)
     begin(s, 15.0, 0.1, 10.0, 5e3, 0.1, 0.35, 0.3, 0.1)
     before = s[COVARIANCE + 7 * (STATES + 1)]
-    correct(s, Row(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
+    correct(s, Observation(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     for _ in range(10):  # 0.1 mm, a fortieth of the way on which it sticks
         predict(s, 1e-5, 0.0, 0.0, 0.85, 1e3, 0.0)
-        correct(s, Row(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
+        correct(s, Observation(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     assert s[COVARIANCE + 7 * (STATES + 1)] > 0.9 * before
 
 

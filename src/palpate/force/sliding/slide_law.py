@@ -82,7 +82,7 @@ from palpate.force.sliding.tangent_filter import (
     G2,
     MU,
     STIFF,
-    Row,
+    Observation,
     begin,
     correct,
     predict,
@@ -244,13 +244,13 @@ def learn(law, s, work, late, desired, force):
     friction = variance(s, F1, F1) + variance(s, F2, F2)
     curved = N * N * slope * (friction + slope)
     w1, w2 = -N * s[F1] / s[STIFF], -N * s[F2] / s[STIFF]
-    jump = correct(s, Row(FORCE, 1.0, G1, w1, G2, w2), f - N, noise + curved, GATE, work)
+    jump = correct(s, Observation(FORCE, 1.0, G1, w1, G2, w2), f - N, noise + curved, GATE, work)
     if abs(jump) > GATE:
         halt(s, n, STEPPED)
         return
     angle, w = noise / (f * f) * max(1.0, s[ROUGH]), 1.0 / s[STIFF]
-    one = correct(s, Row(G1, w, F1, 1.0, F2, 0.0), f1 / f - w * s[G1] - s[F1], angle, 1e9, work)
-    two = correct(s, Row(G2, w, F2, 1.0, F1, 0.0), f2 / f - w * s[G2] - s[F2], angle, 1e9, work)
+    one = correct(s, Observation(G1, w, F1, 1.0, F2, 0.0), f1 / f - w * s[G1] - s[F1], angle, 1e9, work)
+    two = correct(s, Observation(G2, w, F2, 1.0, F1, 0.0), f2 / f - w * s[G2] - s[F2], angle, 1e9, work)
     both = 0.5 * (one * one + two * two) * max(1.0, s[ROUGH])
     s[ROUGH] += 0.02 * (min(both, 100.0) - s[ROUGH])
     if s[ROUGH] > JERKY and s[TROUBLE] == FINE:

@@ -94,7 +94,7 @@ def contact(world, ground, tip, x, v, h):
 
 @part
 class Course(NamedTuple):
-    """What a run is given, and its room.
+    """Course of a run, and room for it.
 
     Args:
         start: of the tip [m].

@@ -122,7 +122,7 @@ def predict(s, d1, d2, dz, ratio, turning, noise):
 
 
 @part
-class Row(NamedTuple):
+class Observation(NamedTuple):
     """A reading that is w1 x1 + w2 x2 + w3 x3 of three states."""
 
     one: int
