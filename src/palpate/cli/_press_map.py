@@ -12,14 +12,10 @@ from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.map import MapOptions
 from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions
-<<<<<<< HEAD
-from palpate.files import fresh_folder, with_author, write_json, write_text
-=======
-from palpate.files import check_place, fresh_folder, signed, write_json, write_text
+from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
 
 if TYPE_CHECKING:
     from palpate.maps.result import MapResult
->>>>>>> main
 
 
 def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
@@ -57,14 +53,9 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
             result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
         result.write_presses(fresh / "places.csv")
         result.write_csv(fresh / "map.csv")
-<<<<<<< HEAD
         write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
-        write_text(fresh / "report.html", page.page(result, f"Phantom {phantom.map.name}", command()))
-=======
-        write_json(fresh / "summary.json", signed({"command": command(), **result.to_json()}))
         for path in filter(None, (fresh / "report.html", phantom.page)):
             write_text(path, page.page(result, title, command()))
->>>>>>> main
     if json:
         print_answer(result.to_json())
     else:

@@ -16,13 +16,8 @@ from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.force import with_slide
 from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.values import vector
-<<<<<<< HEAD
-from palpate.errors import InputError
-from palpate.files import RECORD, fresh_folder, with_author, write_json
-=======
 from palpate.errors import InputError, unknown
-from palpate.files import RECORD, fresh_folder, signed, write_json
->>>>>>> main
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -210,17 +205,11 @@ def slide(
     ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
-<<<<<<< HEAD
-        rows = simulate(gains, ground, ways, into=into or (0.0, 0.0, -1.0), seed=asked.seed)
-        head = {"command": printable(command()), "seed": asked.seed, "shape": asked.shape, "path": asked.path}
-        summary: dict[str, Any] = with_author({**head, **summarise(rows, gains, ground)})
-=======
         rows = asked.run(gains, ground, ways)
         head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
-        summary: dict[str, Any] = signed(
+        summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
->>>>>>> main
         write_report(rows, gains, summary, fresh, RECORD)
         write_json(fresh / "summary.json", summary)
     if json:
