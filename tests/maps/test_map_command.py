@@ -77,7 +77,7 @@ def test_a_map_grows_to_the_whole_one(table):
     inside = result.coarse.inside
     width = [np.mean(seen.std[inside]) for _, seen in result.film]
     assert np.all(np.diff(width) <= 0.0)
-    whole, _ = result.map.process.likeliest.predict(cdist(result.map.places, result.coarse.places))
+    whole, _ = result.map.process.likeliest.reduction.predict(cdist(result.map.places, result.coarse.places))
     assert result.film[-1][1].mean == pytest.approx(whole)
 
 
@@ -228,6 +228,7 @@ def test_logs_without_a_place_are_refused_in_one_line(tmp_path, capsys):
         ("x,y,K,half\n0,0,1000,10\n", ("--rate", "500"), "are of logs"),
         ("x,y,K,half\n0,0,1000,10\n", ("--wrench-frame", "base"), "are of logs"),
         ("x,y,K,half\n0,0,1000,10\n", ("--each-contact",), "are of logs"),
+        ("x,y,K,half\n0,0,1000,10\n", ("--start", "1,2,3:mm", "--way", "5:mm"), "has places of 2"),
     ],
 )
 def test_a_bad_table_or_option_is_one_line(tmp_path, capsys, text, words, said):

@@ -131,7 +131,7 @@ class MapResult:
         frames = []
         for k in map(int, counts):
             first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
-            mean, variance = first.predict(distance[:k])
+            mean, variance = first.reduction.predict(distance[:k])
             frames.append((k, Prediction(mean, np.sqrt(variance), np.sqrt(variance), self.request.common)))
         return frames
 
