@@ -137,6 +137,22 @@ def test_the_state_has_four_kilobytes_at_most(force):
     assert 8 * force.sources.numbers <= 4096
 
 
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_the_code_has_32_kilobytes_at_most(compiler, force, tmp_path):
+    if not (shutil.which(compiler) and shutil.which("size")):
+        pytest.skip(f"there is no {compiler}, or no size")
+    (tmp_path / "palpate_force.c").write_text(force.sources.source)
+    (tmp_path / "palpate_force.h").write_text(force.sources.header)
+    words = (
+        f"{compiler} -std=c99 -O2 -ffp-contract=off -fno-asynchronous-unwind-tables -I. -c palpate_force.c"
+    )
+    subprocess.run(words.split(), cwd=tmp_path, check=True)
+    sizes = subprocess.run(
+        ["size", "palpate_force.o"], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    assert int(sizes.stdout.split()[6]) < 32_000
+
+
 def test_the_header_names_law_and_gains(force, gains):
     from palpate.force import load_gains
 

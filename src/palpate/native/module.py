@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -14,6 +15,8 @@ from palpate.native.expressions import number
 from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
 from palpate.native.translation import Translation
 
+LINES = 8
+"""Of C, from which on a copy at each call is larger than the calls: gcc and clang give the force loop 32 kB."""
 WIDTH = 118
 """Columns of a line of C, unless a name is longer."""
 
@@ -278,7 +281,7 @@ class _Writer:
             _IEEE,
             *self.whole.structs.definitions,
             *self.whole.constants.definitions,
-            *self.whole.definitions,
+            *_one_copy(self.whole.definitions),
             table,
             *self.functions,
         ]
@@ -294,6 +297,11 @@ _IEEE = """#if defined(__FAST_MATH__) || (defined(FLT_EVAL_METHOD) && FLT_EVAL_M
 #endif
 #ifdef __clang__
 #pragma STDC FP_CONTRACT OFF
+#endif
+#ifdef __GNUC__
+#define ONE_COPY __attribute__((noinline))
+#else
+#define ONE_COPY
 #endif"""
 _FILL = """    (void)gains;
     for (size_t i = 0; i < sizeof {name}_runs / sizeof *{name}_runs; ++i) {{
@@ -302,6 +310,18 @@ _FILL = """    (void)gains;
         }}
     }}
 """
+
+
+def _one_copy(definitions: Sequence[str]) -> list[str]:
+    """Functions, marked where they are long and called twice: compilers else put a copy at each call."""
+    text = "\n".join(definitions)
+    marked = []
+    for each in definitions:
+        head = re.search(r"^static .*?(\w+)\(", each, re.MULTILINE)
+        long = head and each.count("\n", head.start()) > LINES
+        calls = len(re.findall(rf"\b{head[1]}\(", text)) - 1 if head else 0
+        marked.append(each.replace("static ", "static ONE_COPY ", 1) if long and calls > 1 else each)
+    return marked
 
 
 def _runs(name: str, numbers: Array) -> str:
