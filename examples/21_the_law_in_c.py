@@ -8,7 +8,7 @@ from pathlib import Path
 
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
-from palpate.native.exporting import LawRequest, exported_law
+from palpate_native.exporting import LawRequest, exported_law
 
 compiler = next((name for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
 if compiler is None:

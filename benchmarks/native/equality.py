@@ -27,8 +27,8 @@ from palpate.files import write_json
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate.native.exporting import ExportedLaw, LawRequest, exported_law
-from palpate.native.replay import MARK, program, write_rows
+from palpate_native.exporting import ExportedLaw, LawRequest, exported_law
+from palpate_native.replay import MARK, program, write_rows
 
 LAWS = {
     "force loop": "force", "sliding loop": "slide", "contact identifier": "identifier", "least squares of 3": "squares",

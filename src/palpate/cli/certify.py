@@ -208,7 +208,7 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
 
     certificate = Certificate.load(path)
     if gains is not None and gains.suffix == ".h":
-        from palpate.native.header import check_header
+        from palpate.force.c_header import check_header
 
         check_header(certificate, gains)
     elif gains is not None:

@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._export_law import LawOptions, export_law
 from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.written import WRITTEN, FileOptions
 from palpate.errors import InputError
@@ -57,6 +56,42 @@ class GivenOptions:
     damping: Annotated[float | None, SIGNED] = None
     mass: Annotated[float | None, SIGNED] = None
     working_point: Annotated[bool, FLAG] = False
+
+
+@Parameter(name="*", group=Group("The law, of C", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class LawOptions:
+    """A law and its numbers.
+
+    Parameters
+    ----------
+    law
+        force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; contact-identifier; or
+        recursive-least-squares.
+    into
+        Of sliding-loop: direction into the surface, x,y,z in the base's axes.
+    parameters
+        Of recursive-least-squares, 3 or 4.
+    forgetting
+        Of recursive-least-squares: its forgetting factor.
+    low_pass
+        Of contact-identifier: the force sensor's low-pass.
+    rate
+        Of contact-identifier: ticks a second in Hz.
+    lag
+        Of contact-identifier: how late the force is, its low-pass included, in s.
+    sampling
+        Of contact-identifier: samples of the force sensor a second in Hz, if not one a tick.
+    """
+
+    law: str = "force-loop"
+    into: Annotated[str, SIGNED] = "0,0,-1"
+    parameters: Annotated[int, SIGNED] = 3
+    forgetting: Annotated[float, SIGNED] = 1.0
+    low_pass: str = "butterworth3:120"  # noqa: S105 - a filter
+    rate: Annotated[float, SIGNED] = 1000.0
+    lag: Annotated[float, SIGNED] = 0.003
+    sampling: Annotated[float | None, SIGNED] = None
 
 
 @Parameter(name="*", group=WRITTEN)
@@ -107,14 +142,19 @@ def export(
     """
     given, output = given or GivenOptions(), output or ExportOutput()
     if scene.to == "c":
-        return export_law(found, law or LawOptions(), output)
-    return _scene_writer()(found, scene, given, output)
+        return _exporter("law")(found, law or LawOptions(), output)
+    return _exporter("scene")(found, scene, given, output)
 
 
-def _scene_writer() -> Callable[[Path | None, SceneOptions, GivenOptions, ExportOutput], int]:
-    """The command of the distribution that writes scenes."""
-    for entry in entry_points(group="palpate.exports", name="scene"):
+_EXPORTERS = {"scene": ("a simulator", "palpate-export"), "law": ("C", "palpate-native")}
+"""What each exporter writes, and the distribution that has it."""
+
+
+def _exporter(name: str) -> Callable[..., int]:
+    """The command of the distribution that exports a scene or a law."""
+    for entry in entry_points(group="palpate.exports", name=name):
         return entry.load()
+    to, distribution = _EXPORTERS[name]
     raise InputError(
-        "export to a simulator is of palpate-export, which is not installed: pip install palpate-export"
+        f"export to {to} is of {distribution}, which is not installed: pip install {distribution}"
     )

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.registry import parts
-from palpate.native.expressions import SUM, Expressions, Value, with_addresses
-from palpate.native.source import comments_of, refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members, result_places, value_type
+from palpate_native.expressions import SUM, Expressions, Value, with_addresses
+from palpate_native.source import comments_of, refuse, syntax_of
+from palpate_native.structs import by_pointer, c_name, is_struct, members, result_places, value_type
 
 STEP = "    "
 

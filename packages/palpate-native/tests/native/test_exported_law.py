@@ -16,8 +16,8 @@ import pytest
 from palpate._jit import kernel, law
 from palpate._jit.elementary import exp, log
 from palpate.cli import main
-from palpate.native.exporting import LawRequest, exported_law
-from palpate.native.replay import program, write_rows
+from palpate_native.exporting import LawRequest, exported_law
+from palpate_native.replay import program, write_rows
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
@@ -55,7 +55,7 @@ def test_the_c_is_of_the_law_as_it_stands(squares):
     module = dataclasses.replace(
         squares.module, entries=(dataclasses.replace(squares.module.entries[0], law=sum_of_squares),)
     )
-    from palpate.native.module import sources_of
+    from palpate_native.module import sources_of
 
     assert "total = total + regressor.at[i] * regressor.at[i]" in sources_of(module).source
 
@@ -186,14 +186,14 @@ def test_a_certificate_knows_the_header_of_its_gains(force, gains, tmp_path, cap
 @needs_compiler
 def test_the_command_writes_checks_and_answers(gains, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("palpate.native.exporting.ExportedLaw.check", lambda law: (7, 0))
+    monkeypatch.setattr("palpate_native.exporting.ExportedLaw.check", lambda law: (7, 0))
     assert main(["export", str(gains), "--to", "c", "--out", "law", "--check", "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["check"]["unequal"] == 0
     assert answer["state_bytes"] <= 4096
     assert main(["export", str(gains), "--to", "c", "--out", "law", "--replace"]) == 0
     assert (tmp_path / "law" / "palpate_force.c").is_file()
-    monkeypatch.setattr("palpate.native.exporting.ExportedLaw.check", lambda law: (7, 1))
+    monkeypatch.setattr("palpate_native.exporting.ExportedLaw.check", lambda law: (7, 1))
     assert main(["export", str(gains), "--to", "c", "--check"]) == 1
 
 
@@ -273,8 +273,8 @@ def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, reque
 def test_a_law_outside_the_subset_is_refused_with_file_line_and_remedy(function, says):
     from numba import types
 
-    from palpate.native.source import OutsideSubset
-    from palpate.native.translation import Translation
+    from palpate_native.source import OutsideSubset
+    from palpate_native.translation import Translation
 
     with pytest.raises(OutsideSubset, match=r"test_exported_law\.py:\d+: ") as refusal:
         Translation("palpate_test").function(globals()[function], (types.float64,))
@@ -320,7 +320,7 @@ def walks_over(x):
 @needs_compiler
 def test_the_operators_of_python_are_those_of_c(tmp_path):
     """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
-    from palpate.native.translation import OPERATORS
+    from palpate_native.translation import OPERATORS
 
     values = [
         0.0,

@@ -11,11 +11,11 @@ import numpy as np
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder
 from palpate.force.sliding.sliding_loop import DOWN
-from palpate.native import laws, recording
-from palpate.native.laws import FORCE, IDENTIFIER, LAWS, SLIDING
-from palpate.native.module import Module, Sources, sources_of
-from palpate.native.package import files_of, write_folder
-from palpate.native.replay import unequal_ticks
+from palpate_native import laws, recording
+from palpate_native.laws import FORCE, IDENTIFIER, LAWS, SLIDING
+from palpate_native.module import Module, Sources, sources_of
+from palpate_native.package import files_of, write_folder
+from palpate_native.replay import unequal_ticks
 
 TICKS = 1_000_000
 """Ticks of a check: some 250 presses."""

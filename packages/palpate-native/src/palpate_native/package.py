@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from palpate.native.module import Argument, Entry, Module, Sources
-from palpate.native.recording import PRESS, Recording
-from palpate.native.replay import program, write_rows
+from palpate_native.module import Argument, Entry, Module, Sources
+from palpate_native.recording import PRESS, Recording
+from palpate_native.replay import program, write_rows
 
 _CMAKE = """# Made by palpate
 cmake_minimum_required(VERSION 3.16)

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate.native.exporting import LawRequest, exported_law
+from palpate_native.exporting import LawRequest, exported_law
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ import pytest
 
 from palpate.force import guard
 from palpate.force.gains import load_gains
-from palpate.native.replay import program, write_rows
+from palpate_native.replay import program, write_rows
 
 UNREACHABLE = {
     "floored": "test_the_operators_of_python_are_those_of_c takes each branch",

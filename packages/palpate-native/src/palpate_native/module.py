@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.native.expressions import number
-from palpate.native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
-from palpate.native.translation import Translation
+from palpate_native.expressions import number
+from palpate_native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
+from palpate_native.translation import Translation
 
 LINES = 8
 """Of C, from which on a copy at each call is larger than the calls: gcc and clang give the force loop 32 kB."""

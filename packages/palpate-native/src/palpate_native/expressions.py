@@ -16,8 +16,8 @@ import numpy as np
 
 from palpate._jit.registry import parts, stored
 from palpate._jit.stored import kind_of
-from palpate.native.source import refuse, syntax_of
-from palpate.native.structs import by_pointer, c_name, is_struct, members, plain, result_places, value_type
+from palpate_native.source import refuse, syntax_of
+from palpate_native.structs import by_pointer, c_name, is_struct, members, plain, result_places, value_type
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""

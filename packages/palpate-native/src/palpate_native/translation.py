@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate._jit.typing_rules import TypingRules
-from palpate.native.constants import Constants
-from palpate.native.source import place_of, refuse, syntax_of
-from palpate.native.statements import FunctionBody
-from palpate.native.structs import Structs, by_pointer, c_name, is_struct, members, plain
+from palpate_native.constants import Constants
+from palpate_native.source import place_of, refuse, syntax_of
+from palpate_native.statements import FunctionBody
+from palpate_native.structs import Structs, by_pointer, c_name, is_struct, members, plain
 
 _OPERATOR = re.compile(r"/\* (?P<says>.*) \*/\nstatic (?P<of>\w+) (?P<name>\w+)(?P<body>(?:.+\n)+)")
 OPERATORS = {

@@ -24,7 +24,7 @@ from palpate.identifiers.kernels.contact_stream import take_tick
 from palpate.identifiers.kernels.dimension import Four, Three
 from palpate.identifiers.kernels.least_squares import error_covariance_in
 from palpate.identifiers.recursive_least_squares import absorb
-from palpate.native.module import Argument, Entry, Module
+from palpate_native.module import Argument, Entry, Module
 
 FORCE, SLIDING, IDENTIFIER = "force-loop", "sliding-loop", "contact-identifier"
 SQUARES = "recursive-least-squares"

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from palpate.native.source import field_notes, first_sentence
+from palpate_native.source import field_notes, first_sentence
 
 LARGE = 4
 """Numbers that a struct passes by value at most: two registers' worth more than a vector; larger ones go by pointer."""

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.native.expressions import Value, number
-from palpate.native.source import constant_notes
-from palpate.native.structs import Structs, c_name, is_struct, members, plain
+from palpate_native.expressions import Value, number
+from palpate_native.source import constant_notes
+from palpate_native.structs import Structs, c_name, is_struct, members, plain
 
 
 class Constants:

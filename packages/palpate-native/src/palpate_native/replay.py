@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.native.module import Module, Sources
+from palpate_native.module import Module, Sources
 
 FLAGS = "-std=c99 -O2 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror"
 MARK = "# Made by palpate: recorded ticks, rows of little-endian doubles behind this line.\n"
