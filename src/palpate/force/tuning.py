@@ -172,6 +172,7 @@ def tune(
     peak: float | None = None,
     surface_speed: float | None = None,
     prove_adapting: bool = True,
+    theta: float | None = None,
 ) -> Tuning:
     """Gains for an arm that presses with a force, and what is proved of them.
 
@@ -183,12 +184,13 @@ def tune(
         peak: highest force that is allowed at the touch [N].
         surface_speed: of a surface that moves by itself [m/s].
         prove_adapting: prove the adapting law too, which takes a torque arm some two seconds.
+        theta: whole lag of the loop [s]; the arm's own if left out.
 
     Raises:
         InputError: numbers that cannot be met, with what can.
     """
     _check(force, known, cap)
-    theta = known_lag(arm)
+    theta = known_lag(arm) if theta is None else theta
     known = None if known is None else known.beyond(arm)
     farther = () if known is None or cap is not None else _beyond_log(arm, known, force)
     stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
