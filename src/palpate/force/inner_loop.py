@@ -391,7 +391,7 @@ def _numerator(E: Array, b: Array) -> Array:
 def _errors(log_: _Log, p: Array, halves: list[Array]) -> tuple[FitErrors, Array, float]:
     """Errors of the nonlinear numbers and of log K_s, the linear numbers, and half of the interval of the gain."""
     columns = _columns(log_, p)
-    best = np.linalg.lstsq(columns, log_.position, rcond=None)[0]
+    best = np.asarray(np.linalg.lstsq(columns, log_.position, rcond=None)[0], dtype=np.float64)
     J = np.column_stack([*_slopes(log_, p, best), columns])
     # In units of their own size: numbers of metres and of seconds are far apart.
     size = np.linalg.norm(J, axis=0)
