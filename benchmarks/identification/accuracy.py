@@ -158,9 +158,8 @@ def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
             + (f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else "")
         )
     confounded = float(np.mean(["lag-damping-confounded" in t.codes for t in trials]))
-    rejected = float(np.mean(["model-rejected" in t.codes for t in trials]))
-    print(f"{'':36}lag-damping-confounded {confounded:.1%}, model-rejected {rejected:.1%}, {seconds:.0f} s")
-    return {"lines": [vars(row) for row in lines], "confounded": confounded, "rejected": rejected}
+    print(f"{'':36}lag-damping-confounded {confounded:.1%}, {seconds:.0f} s")
+    return {"lines": [vars(row) for row in lines], "confounded": confounded}
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ def test_the_table_the_figure_and_the_page(presses, capsys):
 
 
 def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):
-    known = OneLog.identified
+    known = OneLog.identification
     seen = []
 
     def third_is_interrupted(self, log):
@@ -123,7 +123,7 @@ def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):
             raise KeyboardInterrupt
         return known(self, log)
 
-    monkeypatch.setattr(OneLog, "identified", third_is_interrupted)
+    monkeypatch.setattr(OneLog, "identification", third_is_interrupted)
     assert main(["identify", str(presses), *OWN, "--json"]) == 130
     printed = capsys.readouterr()
     assert len(json.loads(printed.out)["logs"]) == 2

@@ -170,7 +170,6 @@ def test_a_mass_that_is_asked_for_where_there_is_none_spares_the_stiffness():
         identify(pressed(k=3000.0, b=60.0, seed=seed), model="kelvin-voigt-mass") for seed in range(4)
     ]
     for found in all_found:
-        assert "model-rejected" not in found.codes
         assert found.parameters["K"].verdict is Verdict.IDENTIFIED
         assert found.parameters["M"].verdict is not Verdict.IDENTIFIED
     # All four intervals of 95 % hold in 81 % of cases, three at least in 98.6 %.

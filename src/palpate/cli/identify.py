@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._terminal import KINDS, console
-from palpate.cli.one_log import OneLog, answered
+from palpate.cli.one_log import OneLog, has_number
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.force import IndenterOptions
@@ -181,7 +181,7 @@ def identify(
 
 def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
     figure, page, table = output.png(log.stem), output.page(), output.paper_table()
-    found, origin = asked.identified(log)
+    found, origin = asked.identification(log)
     if found.traces is None:
         figure = None
     if figure is not None:
@@ -198,7 +198,7 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
 
         write_table([LogRow(origin, found)], None, table)
     _print(found, origin, [path for path in (figure, page, table) if path is not None], output)
-    return 0 if answered(found) else 1
+    return 0 if has_number(found) else 1
 
 
 def _print(found: Identification, origin: Source, written: list[Path], output: OutputOptions) -> None:

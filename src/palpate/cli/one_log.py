@@ -42,7 +42,7 @@ class Fitted(Protocol):
         ...
 
 
-def answered(found: Identification) -> bool:
+def has_number(found: Identification) -> bool:
     """Whether a number is identified, at the working point or a parameter, and no unit or column is doubtful."""
     from palpate.report.identification.words import unit_warnings
 
@@ -60,16 +60,16 @@ class OneLog:
     arm: ArmOptions = _ARM
     pressed_by: IndenterOptions = _INDENTER
 
-    def identified(self, log: Path) -> tuple[Identification, Source]:
+    def identification(self, log: Path) -> tuple[Identification, Source]:
         """Read and identify a log; the result names its file.
 
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
-        found, _, source = self.identified_along(log)
+        found, _, source = self.identification_along(log)
         return found, source
 
-    def identified_along(self, log: Path) -> tuple[Identification, Record, Source]:
+    def identification_along(self, log: Path) -> tuple[Identification, Record, Source]:
         """The same, with the force and the position along the normal."""
         from palpate.contact_frame import describe
         from palpate.report.identification.words import Source, sha256_of
@@ -154,7 +154,7 @@ def many(
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
     doubtful = any(row.found and unit_warnings(row.found) for row in rows)
-    known = pooled.found or any(row.found and answered(row.found) for row in rows)
+    known = pooled.found or any(row.found and has_number(row.found) for row in rows)
     return 0 if known and not doubtful else 1
 
 
@@ -163,7 +163,7 @@ def _row(log: Path, asked: OneLog) -> LogRow:
     from palpate.report.many.table import LogRow
 
     try:
-        found, source = asked.identified(log)
+        found, source = asked.identification(log)
     except (PalpateError, OSError, MemoryError) as error:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         source = Source(str(log), asked.options, command=command(), made=now)

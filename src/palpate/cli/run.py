@@ -182,7 +182,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
     from palpate.cli.one_log import OneLog
 
     try:
-        return OneLog(ModelOptions()).identified(record)[0], ""
+        return OneLog(ModelOptions()).identification(record)[0], ""
     except InputError as error:
         return None, printable(str(error).replace(str(record), record.name))
 

@@ -106,7 +106,6 @@ class Code(Enum):
         " so K is mostly about the arm. Measure the position nearer to the surface."
     )
     LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
-    MODEL_REJECTED = "No model describes the log: its parts give different parameters, for example."
     NONLINEAR_STIFFNESS = (
         "The stiffness changes with the position; K is the slope at the middle of the motion."
     )

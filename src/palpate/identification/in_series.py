@@ -14,7 +14,6 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.budget import Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 
@@ -42,12 +41,7 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
     check(found.theta[place["K"]], series)
     new, jacobian = _linearise(found.theta, place, series)
     moved = _seen_through(found.theta, place, series + series_std) - new
-    budget = {
-        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
-        for cause, part in found.budget.items()
-    }
-    budget["series stiffness"] = Spread(moved**2)
-    return replace(found, theta=new, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+    return found.through(jacobian, new).with_cause("series stiffness", moved)
 
 
 def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
@@ -74,12 +68,7 @@ def without_swing(found: Answer, share: float, share_std: float) -> Answer:
     """
     jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
     moved = missed @ found.theta - found.theta
-    budget = {
-        cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
-        for cause, part in found.budget.items()
-    }
-    budget["tip's mass"] = Spread(moved**2)
-    return replace(found, theta=jacobian @ found.theta, cov=jacobian @ found.cov @ jacobian.T, budget=budget)
+    return found.through(jacobian, jacobian @ found.theta).with_cause("tip's mass", moved)
 
 
 def fit_without_swing(found: Fit, share: float, share_std: float) -> Fit:
@@ -102,8 +91,7 @@ def _swinging(names: tuple[str, ...], share: float) -> Array:
 
 def with_payload(found: Answer, std: float) -> Answer:
     """An answer whose mass errs by as much as that of a payload, which was taken out of the force [kg]."""
-    variance = np.where(np.array(found.names) == "M", std**2, 0.0)
-    return replace(found, budget={**found.budget, "tool's inertia": Spread(variance)})
+    return found.with_cause("tool's inertia", np.where(np.array(found.names) == "M", std, 0.0))
 
 
 def _places(names: tuple[str, ...]) -> dict[str, int]:

@@ -17,7 +17,7 @@ from palpate.arrays import Mask
 from palpate.errors import InputError
 from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.budget import TOUCH, Spread
+from palpate.identification.estimators.budget import TOUCH
 from palpate.identification.estimators.linearisation import Linearisation, lag_open
 from palpate.identification.estimators.octaves import Solution, estimate, held, segments_of, solve
 from palpate.identification.filters.state_variable import Chain
@@ -51,7 +51,7 @@ def answer(problem: Problem, model: Model) -> Answer:
         InputError: the stretches in contact are too short.
     """
     local, solution = _in_contact(problem, model)
-    plain = _with_recovery(local.answered(solution))
+    plain = _with_recovery(local.answer(solution))
     wider = None if model.nonlinear else problem.with_approach
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
@@ -72,9 +72,10 @@ def _with_recovery(found: Answer) -> Answer:
     if "K1" not in found.names or len(spans) < 2:
         return found
     gap = min(after[0] - before[1] for before, after in pairwise(spans)) * found.problem.motion.chain.dt
-    left = causes.of_recovery(dict(zip(found.names, found.theta.tolist(), strict=True)), gap)
-    variance = np.array([left.get(name, 0.0) ** 2 for name in found.names])
-    return replace(found, budget={**found.budget, "recovery": Spread(variance)})
+    left = causes.stiffness_left(found["K"], found["K1"], found["tau"], gap)
+    return found.with_cause(
+        "recovery", np.array([left if name in ("K", "K1") else 0.0 for name in found.names])
+    )
 
 
 def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
@@ -163,7 +164,7 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
         if theta["K"] <= 0:
             return None
         if theta[TOUCH] ** 2 < _FOUND**2 * solution.cov[i, i]:
-            return local.answered(solution)
+            return local.answer(solution)
         step = -theta[TOUCH] / theta["K"]
         surface += float(np.clip(step, (way.min() - surface) / 2, (way.max() - surface) / 2))
     return None

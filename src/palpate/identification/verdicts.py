@@ -9,7 +9,6 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.estimators.answer import Answer, Prediction
-from palpate.identification.estimators.budget import Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag
@@ -64,7 +63,7 @@ def verdicts(
         point: the working point, with which K must agree.
         terms: how.
     """
-    found = against_octave(choice.answer, point)
+    found = against_working_point(choice.answer, point)
     choice = replace(choice, answer=found)
     lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
@@ -125,7 +124,7 @@ def _at(found: Answer, name: str, terms: Terms) -> str:
     return f", at a penetration of {_digits(depth)} {terms.position_unit}"
 
 
-def against_octave(found: Answer, point: WorkingPoint | None) -> Answer:
+def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     """An answer with the gap between its stiffness at the working point and the log's own there as a cause.
 
     A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
@@ -138,7 +137,10 @@ def against_octave(found: Answer, point: WorkingPoint | None) -> Answer:
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
     if found.fit.model.nonlinear:
-        shown, predicted = stiffness_of(found.problem, found.problem.force, point), _predicted(found, point)
+        shown, predicted = (
+            stiffness_of(found.problem, found.problem.force, point),
+            _model_stiffness(found, point),
+        )
     elif {"K", "M"} <= set(found.names):
         shown, predicted = point.stiffness.value, _dynamic_stiffness(found, point.frequency_Hz)
     else:
@@ -151,7 +153,7 @@ def against_octave(found: Answer, point: WorkingPoint | None) -> Answer:
     power = float(slope @ along)
     gap = max(abs(own - shown) - float(np.hypot(1.96 * np.sqrt(max(power, 0.0)), shown_half)), 0.0)
     moved = along * gap / power if power > 0 else np.zeros(len(slope))
-    return replace(found, budget={**found.budget, "dynamic stiffness": Spread(moved**2)})
+    return found.with_cause("dynamic stiffness", moved)
 
 
 def _dynamic_stiffness(found: Answer, frequency: float) -> tuple[float, Array]:
@@ -162,7 +164,7 @@ def _dynamic_stiffness(found: Answer, frequency: float) -> tuple[float, Array]:
     return float(slope @ found.theta), slope
 
 
-def _predicted(found: Answer, point: WorkingPoint) -> tuple[float, Array] | None:
+def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] | None:
     """Stiffness of a model's force, read as the log's own is, and its derivatives by the parameters, shape (p,)."""
     own, problem = stiffness_of(found.problem, found.fit.force, point), found.problem
     if own is None:

@@ -210,7 +210,7 @@ def jacobian_rows(cell, body, tip):
 
 
 @law
-def answered(cell, body, tip, touch):
+def accelerations(cell, body, tip, touch):
     """Fills the joints' accelerations under drive and contact: the surface's state and the force on it [N].
 
     Args:
@@ -288,7 +288,7 @@ def tick(cell, body, touch, setpoint, k, noise):
         driven(cell, body, setpoint)
         tip = chain_motion(cell.chain, body.q, body.qd, body.room)
         joint_rows(cell, body, tip)
-        surface, force, depth = answered(cell, body, tip, touch)
+        surface, force, depth = accelerations(cell, body, tip, touch)
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
@@ -303,7 +303,7 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
     driven(cell, body, setpoint)
     jacobian_rows(cell, body, tip)
-    surface, force, depth = answered(cell, body, tip, touch)
+    surface, force, depth = accelerations(cell, body, tip, touch)
     held = held_by(cell, body, tip)
     return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 

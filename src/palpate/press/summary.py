@@ -145,11 +145,11 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
             float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
         ]
         summary["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
-        summary["identified"] = identified(record, asked)
+        summary["identified"] = identification_of(record, asked)
     return summary
 
 
-def identified(record: Record, asked: Asked) -> dict[str, Any]:
+def identification_of(record: Record, asked: Asked) -> dict[str, Any]:
     """Identification of the record's measured columns, with the known instruments."""
     loop = asked.gains.arm
     log = Record(

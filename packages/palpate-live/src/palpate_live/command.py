@@ -160,7 +160,7 @@ def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
     from palpate.logs.read import is_run
     from palpate_live.recorded_run import of_log, of_run
 
-    found, along, source = asked.identified_along(path)
+    found, along, source = asked.identification_along(path)
     if asked.source.plain and is_run(path):
         return of_run(path, found, whole=whole)
     return of_log(source.title, found, along)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.budget import Budget
+from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.models import Model, Motion
 from palpate.identification.problem import Problem
 
@@ -114,6 +114,28 @@ class Answer:
     def half_of(self, name: str) -> float:
         """The same of one parameter."""
         return float(self.half[self.names.index(name)])
+
+    def with_cause(self, cause: str, effect: Array) -> Answer:
+        """The same with one more cause of error.
+
+        Args:
+            cause: its name.
+            effect: standard deviation of each parameter by it, shape (p,).
+        """
+        return replace(self, budget={**self.budget, cause: Spread(effect**2)})
+
+    def through(self, jacobian: Array, theta: Array) -> Answer:
+        """Functions of the parameters instead, covariance and budget through their derivatives.
+
+        Args:
+            jacobian: their derivatives by the parameters, shape (p, p).
+            theta: their values, shape (p,).
+        """
+        budget = {
+            cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
+            for cause, part in self.budget.items()
+        }
+        return replace(self, theta=theta, cov=jacobian @ self.cov @ jacobian.T, budget=budget)
 
     def parts(self, name: str) -> dict[str, float]:
         """Half-width of one parameter by cause, largest first; their squares add up to that of the whole."""

@@ -173,21 +173,21 @@ def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Sp
     return Spread(np.maximum(apart, 0.0) ** 2)
 
 
-def of_recovery(theta: dict[str, float], gap: float) -> dict[str, float]:
-    """Part of a branch's force that is left of the contact before, as an error of the stiffnesses [N/m], by name.
+def stiffness_left(stiffness: float, branch: float, tau: float, gap: float) -> float:
+    """Stiffness that a relaxing branch still has of the contact before [N/m].
 
     A model's branch follows the probe into free motion. The surface does not: left alone it recovers with
     tau (1 + K1/K), the creep time of a standard linear solid.
 
     Args:
-        theta: parameters of the model, K, K1 and tau among them.
-        gap: shortest time between two contacts [s].
+        stiffness: K of the model [N/m].
+        branch: its K1 [N/m].
+        tau: of its relaxation [s].
+        gap: between two contacts [s].
     """
-    stiffness, branch = theta["K"], theta["K1"]
     if stiffness <= 0 or branch <= 0:
-        return {}
-    left = float(np.exp(-gap / (theta["tau"] * (1 + branch / stiffness))))
-    return {"K": left * branch, "K1": left * branch}
+        return 0.0
+    return branch * float(np.exp(-gap / (tau * (1 + branch / stiffness))))
 
 
 def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:

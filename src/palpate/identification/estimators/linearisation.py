@@ -161,7 +161,7 @@ class Linearisation:
         """From row to row [s]."""
         return float(np.median(np.diff(self.problem.time)))
 
-    def answered(self, solution: Solution) -> Answer:
+    def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         sensor, told = sensor_lines(
             self.problem, self.segments, self.octaves, self.use, self.system, solution

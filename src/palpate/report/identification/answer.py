@@ -88,14 +88,11 @@ _PARTS = {
 _MINOR = {"Fc", "x0"}
 """Parameters that stand in the answer only if they are identified."""
 _SHOWN_OTHERWISE = {
-    *(
-        Code.LAG_DAMPING_CONFOUNDED,
-        Code.LOW_EXCITATION,
-        Code.SERIES_COMPLIANCE,
-        Code.UNIT_GUESS,
-        Code.NO_CONTACT,
-    ),
-    Code.MODEL_REJECTED,
+    Code.LAG_DAMPING_CONFOUNDED,
+    Code.LOW_EXCITATION,
+    Code.SERIES_COMPLIANCE,
+    Code.UNIT_GUESS,
+    Code.NO_CONTACT,
 }
 
 
@@ -263,10 +260,6 @@ def _contact(found: Identification) -> str:
     explained = 100 * max(found.r2, 0.0)
     share = f"{explained:.3g} %" if explained < 99.95 else "more than 99.9 %"
     parts = _PARTS.get(found.model, found.model)
-    if Code.MODEL_REJECTED.word in found.codes:
-        return (
-            f"{start} No model explains the log; {parts[0].lower()}{parts[1:]} explain {share} of the force."
-        )
     return f"{start} {parts} explain {share} of the force ({found.model})."
 
 

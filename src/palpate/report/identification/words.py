@@ -37,7 +37,6 @@ ADVICE = {
     Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
     Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",
     Code.LOW_EXCITATION: "Press faster, deeper or more often; for a mass, shake the probe in contact.",
-    Code.MODEL_REJECTED: "Use no number here as a constant of the surface; try a part of the log (--start, --end).",
     Code.NONLINEAR_STIFFNESS: "Use K only near the mean position, and K2 and K3 with it elsewhere.",
     Code.HELD_SAMPLES: "None; a log at the sensor's own rate would be as good.",
     Code.MISSING_SAMPLES: "Check the log where readings are missing; give other marks of no reading with --missing.",
@@ -163,14 +162,13 @@ def model_line(found: Identification) -> str:
     """The verdicts of the model's parameters, in one line."""
     if not found.contacts or not found.n:
         return ""
-    start = "No model describes this log. " if Code.MODEL_REJECTED.word in found.codes else ""
     verdicts = [
         f"{listed([CALLED.get(name, name) for name in names])} {'is' if len(names) == 1 else 'are'} {verdict}"
         for verdict in Verdict
         if (names := [name for name, p in found.parameters.items() if p.verdict is verdict])
     ]
     text = "; ".join(verdicts)
-    return f"{start}By the model {found.model}, {text}."
+    return f"By the model {found.model}, {text}."
 
 
 def subtitle(found: Identification) -> str:
