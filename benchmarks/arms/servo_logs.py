@@ -1,6 +1,6 @@
 """How often the intervals of a servo hold the truth: logs of MuJoCo's UR5e and iiwa14 under position actuators.
 
-    python benchmarks/arms/servo_logs.py [--logs 200] [--seed 0]
+    python benchmarks/arms/servo_logs.py [--logs 200] [--seed 0] [--arms ur5e iiwa14]
 
 One log each: steps, or a sweep, in free motion, and one push by hand. kp and kd of MuJoCo menagerie's models, each
 times 0.5 to 2; delay of 2 to 20 ms; 500 Hz; noise of 10 um of the position, white or coloured (0.95), and of 0.1 N. The
@@ -39,9 +39,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--logs", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--arms", nargs="+", default=list(SERVOS), choices=SERVOS)
     told = parser.parse_args()
     print("| arm | " + " | ".join(NAMES) + " | refused |", "|---" * 6 + "|", sep="\n")
-    for name in SERVOS:
+    for name in told.arms:
         rows = [row(name, [told.seed, i]) for i in track(range(told.logs), name, transient=True)]
         done = [r for r in rows if r is not None]
         inside, halves = np.mean([r[0] for r in done], axis=0), np.median([r[1] for r in done], axis=0)
