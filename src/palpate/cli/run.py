@@ -115,11 +115,7 @@ class _Asked:
 
 
 def _run(
-    asked: _Asked,
-    folder: Path,
-    output: FolderOptions,
-    drawn: DrawnOptions,
-    interrupted: Callable[[], bool],
+    asked: _Asked, folder: Path, output: FolderOptions, drawn: DrawnOptions, interrupted: Callable[[], bool]
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise

@@ -31,11 +31,8 @@ _THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
 
 
 ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
-"""By which one mass misses an arm of several joints: standard deviations, as shares of the number, of the delay as a
-share of m/D.
-
-Measured by benchmarks/arms/servo_logs.py --seed 11, as what the fit's own errors leave.
-"""
+"""By which one mass misses an arm of several joints: standard deviations, as shares of the number, of the delay of m/D.
+Measured by benchmarks/arms/servo_logs.py --seed 11, as what the fit's own errors leave."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +60,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class FitErrors:
-    """Errors of log w, log z, delay [s] and, where the tip was pushed, log K_s, all of one fit.
-
-    Args:
-        covariance: by the scores of a log's blocks, shape (n, n).
-        halves: what the fits of both halves of the log differ by, shape (n,).
-    """
+    """Covariance of log w, log z, delay [s] and, of a servo, log K_s; difference of the fits of the log's halves."""
 
     covariance: Array
     halves: Array
@@ -92,16 +84,9 @@ class FitErrors:
 class InnerLoop:
     """An inner loop w^2/(s^2 + 2 z w s + w^2), late by a delay; where it yields to a force, that of a servo.
 
-    Args:
-        bandwidth: w/2 pi [Hz].
-        damping: z.
-        delay: [s].
-        lag: 2 z/w [s]; D/K_s of a servo.
-        gain: of the position measured over the one commanded; 1 where units and axes agree.
-        explained: share that the model explains of how the position lags the command.
-        rate: rows a second [Hz].
-        errors: of the fit.
-        stiffness: K_s of a servo [N/m]; None where nothing was pushed.
+    Bandwidth w/2 pi [Hz], damping z, delay [s], lag 2 z/w [s], which is D/K_s of a servo; gain of the position measured
+    over the one commanded; share explained of how the position lags the command; rows a second [Hz]; errors of the fit;
+    K_s of a servo [N/m], None where nothing was pushed.
     """
 
     bandwidth: Parameter

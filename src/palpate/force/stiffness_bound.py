@@ -11,36 +11,26 @@ from palpate.force.stage import LOCKED
 SHOWED = 3.0
 """Times the largest deviation that free motion has shown, and the largest rise within half of theta, that a surface has
 to exceed: three steps of a cable never do.
-
-Measured by benchmarks/force/free_motion.py: with 2.5 slow hums and coloured noise pass three times as often.
-"""
+Measured by benchmarks/force/free_motion.py: with 2.5 slow hums and coloured noise pass three times as often."""
 EARNED = 3.0
 """Times as fast as before the tip may be where the readings bear the stiffness out: twice as fast costs a tenth of a
 second on the softest surfaces, four times as fast lets a sensor that lies once come to twice the peak.
-
-Measured by benchmarks/force/free_motion.py.
-"""
+Measured by benchmarks/force/free_motion.py."""
 BORNE = 2.0
 """Standard deviations by which a rise that is foretold has to stand out of the noise to count as a test."""
 STOPPED = 0.75
 """Of the approach: a servo's tip that was faster, and is slower than this, is held back by a surface, stiffer than a
 third of the servo.
-
-No error of a sensor slows the tip. Measured by benchmarks/arms/servos.py and benchmarks/force/free_motion.py.
-"""
+No error of a sensor slows the tip. Measured by benchmarks/arms/servos.py and benchmarks/force/free_motion.py."""
 SURE = 4.0
 """Readings for which K_u stays where it was at a touch: what they refute was an edge, not a ramp.
-
 Measured by benchmarks/force/first_touches.py: with none a stiff surface that was felt one reading ago counts as soft,
-and is pressed 38 % too hard.
-"""
+and is pressed 38 % too hard."""
 DAMPED = 0.52
 """Least share of K + B/theta, beside the arm's own spring, that K_u has to be: above the half that the adapting law's
 proof allows.
-
 With alpha 0.42 the sensitivity is then below 1.56 for every B/K, 1.67 for a torque arm
-(tests/force/test_sensitivity.py).
-"""
+(tests/force/test_sensitivity.py)."""
 STIFFER = 1.3
 """Times K_u that the last theta has to show before a locked K_u rises: well within the half that the proof leaves."""
 SHOWN = EVIDENT**0.5

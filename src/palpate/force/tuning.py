@@ -163,6 +163,7 @@ def _number(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
+# More than seven arguments: each is a given number of the surface, the press or the proof.
 def tune(
     arm: Arm,
     force: float,
@@ -246,10 +247,8 @@ def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> floa
 
 TIMES = 2.0
 """Of the force of a log, up to which its stiffness stands for that of a press.
-
 The stiffness of a force that is a power of the depth grows no faster than the force, and the adapting law's proof bears
-one that is twice as high.
-"""
+one that is twice as high."""
 
 
 def _beyond_log(arm: Arm, known: Known, force: float) -> tuple[tuple[str, str], ...]:
