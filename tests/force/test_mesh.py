@@ -60,14 +60,10 @@ def test_heights_are_those_of_the_file(write, tmp_path: Path) -> None:
         assert (hx, hy) == pytest.approx((x / 0.15, -y / 0.15), abs=0.015)
 
 
-def test_the_slopes_are_those_of_the_heights() -> None:
-    rng = np.random.default_rng(1)
-    ground = ground_of("mesh", 0.1, 2e4, heights=1e-4 * rng.normal(size=(21, 21)))
-    for x, y in rng.uniform(-7.0, 7.0, (100, 2)) * SPACING:
-        h, hx, hy = height_at(ground, x, y)
-        step = 1e-9
-        assert hx == pytest.approx((height_at(ground, x + step, y)[0] - h) / step, abs=1e-4)
-        assert hy == pytest.approx((height_at(ground, x, y + step)[0] - h) / step, abs=1e-4)
+def test_beyond_the_grid_the_surface_goes_on() -> None:
+    ground = ground_of("mesh", 0.1, 2e4, heights=np.stack([np.ones((5, 5)), *np.zeros((2, 5, 5))]))
+    assert height_at(ground, 0.2, -0.3) == (1.0, 0.0, 0.0)
+    assert height_at(ground, 2 * SPACING, -2 * SPACING) == (1.0, 0.0, 0.0)
 
 
 def test_the_command_holds_the_force_on_a_mesh(tmp_path: Path, capsys) -> None:

@@ -22,7 +22,6 @@ from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _UNITS = dict.fromkeys(("normal_force", "fx", "fy", "fz"), "N") | dict.fromkeys(("x", "y", "z"), "m")
@@ -118,10 +117,8 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     mu, K = summary["friction"], summary["stiffness"]
     lost = summary["contact_lost"]
     low, high = (quantity(end, "N/m") for end in K["ci95"])
-    half, off = (
-        0.5 * (mu["ci95"][1] - mu["ci95"][0]),
-        f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}",
-    )
+    half = 0.5 * (mu["ci95"][1] - mu["ci95"][0])
+    off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, most = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
     true = quantity(truth["stiffness"], "N/m")
     return [
@@ -135,34 +132,29 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
 
 def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
     """Force error, normal, friction, stiffness and speed against the path."""
-    c = dict(zip(COLUMNS, rows.T, strict=True))
-    on = c["sliding"] > 0.0
-    on = on if on.any() else np.ones_like(on)
-    c = {name: values[on][:: max(int(on.sum()) // 2000, 1)] for name, values in c.items()}
+    on = rows[:, COLUMNS.index("sliding")] > 0.0
+    kept = rows[on] if on.any() else rows
+    c = dict(zip(COLUMNS, kept[:: max(len(kept) // 2000, 1)].T, strict=True))
     drawing, (force, normal, friction, stiffness, speed) = style.figure(5, height=1.7)
     step = np.linalg.norm(np.diff(np.stack([c[a] for a in "xyz"], 1), axis=0), axis=1)
-    way = 1e3 * np.concatenate([[0.0], np.cumsum(step)])
-    force.plot(way, c["normal_force"] - gains.force, color=style.F, linewidth=1.2)
-    force.axhspan(-0.05 * gains.force, 0.05 * gains.force, color=style.MEASURED, alpha=0.2, linewidth=0)
-    force.set_ylabel("force error [N]")
-    normal.plot(way, np.degrees(c["normal_error"]), color=style.INK, linewidth=1.2)
-    normal.fill_between(
-        way, 0.0, np.degrees(CHI2_95 * c["cone"]), color=style.MEASURED, alpha=0.2, linewidth=0
-    )
-    normal.set_ylabel("normal's error [deg]")
-    friction.plot(way, c["mu"], color=style.INK, linewidth=1.2)
-    _between(friction, way, c["mu"], c["mu_std"], style.MEASURED)
-    friction.axhline(summary["truth"]["friction"], **style.KNOWN)
-    friction.set_ylabel("friction [1]")
-    stiffness.plot(way, c["stiffness"], color=style.K, linewidth=1.2)
-    _between(stiffness, way, c["stiffness"], c["stiffness_std"], style.K)
-    stiffness.axhline(summary["truth"]["stiffness"], **style.KNOWN)
-    stiffness.set_ylabel("K [N/m]")
-    speed.plot(way, 1e3 * c["speed"], color=style.INK, linewidth=1.2)
-    speed.set(ylabel="speed [mm/s]", xlabel="path [mm]")
+    way, nothing = 1e3 * np.append(0.0, np.cumsum(step)), np.zeros(len(step) + 1)
+    truth, band, cone = summary["truth"], 0.05 * gains.force + nothing, np.degrees(CHI2_95 * c["cone"])
+    for axes, label, value, low, high, color in (
+        (force, "force error [N]", c["normal_force"] - gains.force, -band, band, style.F),
+        (normal, "normal's error [deg]", np.degrees(c["normal_error"]), nothing, cone, style.INK),
+        (friction, "friction [1]", c["mu"], *_interval(c, "mu"), style.INK),
+        (stiffness, "K [N/m]", c["stiffness"], *_interval(c, "stiffness"), style.K),
+        (speed, "speed [mm/s]", 1e3 * c["speed"], nothing, nothing, style.INK),
+    ):  # fmt: skip
+        axes.plot(way, value, color=color, linewidth=1.2)
+        axes.fill_between(way, low, high, color=style.MEASURED, alpha=0.2, linewidth=0)
+        axes.set_ylabel(label)
+    friction.axhline(truth["friction"], **style.KNOWN)
+    stiffness.axhline(truth["stiffness"], **style.KNOWN)
+    speed.set_xlabel("path [mm]")
     return drawing
 
 
-def _between(axes: Axes, way: Array, value: Array, std: Array, color: str) -> None:
-    low, high = np.maximum(value - Z_95 * std, 0.0), value + Z_95 * std
-    axes.fill_between(way, low, high, color=color, alpha=0.2, linewidth=0)
+def _interval(c: dict[str, Array], name: str) -> tuple[Array, Array]:
+    half = Z_95 * c[f"{name}_std"]
+    return np.maximum(c[name] - half, 0.0), c[name] + half

@@ -40,7 +40,7 @@ class Ground(NamedTuple):
         sticking: mu of a contact at rest, at least `friction`.
         creep: speed over which one becomes the other [m/s].
         ratio: tangential over normal stiffness.
-        heights: of a mesh over a grid about the first point [m], shape (n, n).
+        heights: of a mesh over a grid about the first point [m], and their slopes, shape (3, n, n).
         spacing: of the grid [m].
     """
 
@@ -101,30 +101,23 @@ def height_at(ground, x, y):
 
 
 @law
-def of_grid(heights, spacing, x, y):
-    """Height between the points of a grid and its slopes, by Catmull-Rom's cubics: the slopes are continuous."""
-    half = len(heights) // 2
-    most = len(heights) - 3.0
-    u, v = min(max(x / spacing + half, 1.0), most), min(max(y / spacing + half, 1.0), most)
-    i, j = int(u), int(v)
-    h = hx = hy = 0.0
-    for a in range(4):
-        for b in range(4):
-            (p, dp), (q, dq), z = cubic(a, u - i), cubic(b, v - j), heights[i + a - 1, j + b - 1]
-            h, hx, hy = h + p * q * z, hx + dp * q * z, hy + p * dq * z
-    return h, hx / spacing, hy / spacing
+def of_grid(grid, spacing, x, y):
+    """Height between the points of a grid and its slopes, each linear between four points."""
+    half, most = (grid.shape[1] - 1) // 2, grid.shape[1] - 2
+    u, v = x / spacing + half, y / spacing + half
+    i, j = min(max(int(u), 0), most), min(max(int(v), 0), most)
+    return (
+        between(grid, 0, i, j, u - i, v - j),
+        between(grid, 1, i, j, u - i, v - j),
+        between(grid, 2, i, j, u - i, v - j),
+    )
 
 
 @law
-def cubic(place, t):
-    """Weight of one of four points about a place between the middle two, and its derivative."""
-    if place == 0:
-        return -0.5 * t * (1.0 - t) ** 2, -0.5 * (1.0 - t) * (1.0 - 3.0 * t)
-    if place == 1:
-        return 1.0 - 2.5 * t * t + 1.5 * t**3, -5.0 * t + 4.5 * t * t
-    if place == 2:
-        return 0.5 * t + 2.0 * t * t - 1.5 * t**3, 0.5 + 4.0 * t - 4.5 * t * t
-    return 0.5 * t * t * (t - 1.0), 0.5 * t * (3.0 * t - 2.0)
+def between(grid, k, i, j, u, v):
+    """One of the numbers between four points."""
+    near, far = grid[k, i], grid[k, i + 1]
+    return (1.0 - u) * ((1.0 - v) * near[j] + v * near[j + 1]) + u * ((1.0 - v) * far[j] + v * far[j + 1])
 
 
 def ground_of(
@@ -154,5 +147,5 @@ def ground_of(
         raise InputError(
             f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"
         )
-    grid = np.zeros((4, 4)) if heights is None else heights
+    grid = np.zeros((3, 2, 2)) if heights is None else heights
     return Ground(SHAPES[shape], heights=grid, **{name: float(value) for name, value in numbers.items()})

@@ -25,7 +25,7 @@ STEEPEST = 1.75
 
 
 def heights_of(path: Path, scale: float, reach: float) -> Array:
-    """Heights of a mesh over its first point, the uppermost at the middle of its extents [m], shape (n, n).
+    """Heights over the uppermost point at the middle of a mesh [m], and their slopes, shape (3, n, n).
 
     Args:
         path: of the file.
@@ -55,7 +55,8 @@ def heights_of(path: Path, scale: float, reach: float) -> Array:
         grid,
     )
     _check(path, grid, half)
-    return np.asarray(SPACING * (grid - grid[half, half]))
+    heights = SPACING * (grid - grid[half, half])
+    return np.stack([heights, *np.gradient(heights, SPACING)])
 
 
 def _triangles(path: Path, scale: float) -> tuple[Array, Array]:

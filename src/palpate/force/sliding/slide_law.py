@@ -191,17 +191,25 @@ def press_tick(law, s, late, desired, force, position, missed):
         s[TROUBLE] = FRAMES
         return ZERO3
     if press.stage.phase == LOCKED and size > 0.5 * desired and guard.trouble == FINE:
-        stiffness = max(c.cap * press.known.found.x, c.floor)
+        stiffness, sd = stiffness_in(c, press)
         if s[TOUCHES] < ALL:
-            over, sd = press.watch.mean - press.watch.rest - desired, c.cap * press.known.std.x
+            over = press.watch.mean - press.watch.rest - desired
             enter_touch(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
             return ZERO3
         tilt = 2.0 * s[SLOPE] * s[SLOPE] * (1.0 + c.compliance * stiffness)
-        relative = min(sqrt((c.cap * press.known.std.x / stiffness) ** 2 + tilt * tilt), 0.5)
+        relative = min(sqrt((sd / stiffness) ** 2 + tilt * tilt), 0.5)
         s[PHASE], s[BOUND] = SLIDE, press.bound.used
         start = n if law.spacing > 0.0 else unit(force, n)
         slide_from(law, s, start, size, stiffness, relative, s[SLOPE], LIKELY[0], LIKELY[1])
     return speed * n
+
+
+@law
+def stiffness_in(c, press):
+    """Stiffness that a press found, and its standard deviation [N/m]; that of an even share of K_u if it found none."""
+    if press.known.std.x > 0.0:
+        return max(c.cap * press.known.found.x, c.floor), c.cap * press.known.std.x
+    return 0.5 * press.bound.used, 0.29 * press.bound.used
 
 
 # More than seven arguments: each is a number of the prior.
