@@ -1,7 +1,8 @@
 """Designed excitations on the bench: the observed spread of the estimates over the predicted one.
 
-    python benchmarks/excitation.py [RUNS]
+    python benchmarks/excitation.py             # 20 runs of each
 
+Columns: predicted standard deviation over the truth, and the observed one over the predicted.
 20 s of 15 N with 5 N to each side, on foam and on rubber; noise and phase of the force sensor's clock are drawn anew
 for each run, the lag is calibrated. The position is that of a sensor at the tip, or the one that the arm computes from
 its encoders, whose wrist is coarse.
@@ -9,7 +10,8 @@ its encoders, whose wrist is coarse.
 
 from __future__ import annotations
 
-import sys
+import argparse
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ from palpate_excitation import Budget, Design, HybridLoop, Problem, SurfaceRange
 from palpate_excitation.report.table import experiment
 
 RUNS = 20
+SURFACES, KINDS = ("foam", "rubber"), ("multisine", "chirp")
 SENSOR = LowPass.parse("butterworth3:120")
 START = (0.454, 0.0, 0.0208)
 """Brings the last link along the normal in contact: the coarse encoder of the wrist moves the tip along it little."""
@@ -68,19 +71,22 @@ def identified(run: Record, rows: NDArray[np.intp], position: NDArray[np.float64
     return told.theta[[told.names.index(name) for name in NAMES]]
 
 
-def main(runs: int) -> None:
-    """Print a row for each surface, kind and sensor: the predicted deviation, the observed one, their ratio."""
-    print(f"{'':34}" + "".join(f"{name:^32}" for name in NAMES))
-    for name in ("foam-hybrid", "rubber-hybrid"):
-        for kind in ("multisine", "chirp"):
-            made = designed(name, kind)
-            predicted = np.array([made.made.worst(made.seconds)[name] for name in NAMES]) / 1.96
-            tried = [errors(made, seed) for seed in range(runs)]
-            for at in tried[0]:
-                rms = np.sqrt(np.mean([np.square(one[at]) for one in tried], axis=0))
-                cells = (f"{a:7.2%} {b:7.2%} ratio {b / a:4.2f}" for a, b in zip(predicted, rms, strict=True))
-                print(f"{f'{name}, {kind}, {at}':34}" + "".join(f"{cell:^32}" for cell in cells))
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=RUNS)
+    parser.add_argument("--surfaces", nargs="+", default=SURFACES, choices=SURFACES)
+    asked = parser.parse_args()
+    print("| | position from | " + " | ".join(NAMES) + " |")
+    print("|---|---|" + "---|" * len(NAMES))
+    for name, kind in product(asked.surfaces, KINDS):
+        made = designed(f"{name}-hybrid", kind)
+        predicted = np.array([made.made.worst(made.seconds)[name] for name in NAMES]) / 1.96
+        tried = [errors(made, seed) for seed in range(asked.runs)]
+        for at in tried[0]:
+            rms = np.sqrt(np.mean([np.square(one[at]) for one in tried], axis=0))
+            cells = [f"{p:.2%}, {r / p:.2f}" for p, r in zip(predicted, rms, strict=True)]
+            print(f"| {name}, {kind} | the {at} | {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else RUNS)
+    main()

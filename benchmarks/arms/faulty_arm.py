@@ -105,7 +105,7 @@ CLOCKS = {
 
 def install(fault: Fault, trace) -> None:
     """Put the fault between the arm and its protocol, and keep what the arm is commanded."""
-    arm = rehearsal.OneDirection
+    arm = rehearsal.ToolAxisArm
     tick, reading = arm.tick, arm.reading
 
     def traced(self, speed):

@@ -187,7 +187,7 @@ def by_thesis(case: Case, front: str) -> Found:
 def by_network(case: Case) -> Found:
     """The thesis' neural identifier."""
     seen = network.press_of(case.record, case.material)
-    _, answers = network.learn(seen, network.Choice(), case.seed)
+    _, answers = network.learn(seen, network.NetworkChoice(), case.seed)
     late = answers[-round(network.LATE / network.TICK) :, :3].mean(axis=0)
     return dict(zip(NAMES, late.tolist(), strict=True)), _unknown()
 

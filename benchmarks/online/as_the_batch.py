@@ -118,8 +118,8 @@ class Tally:
 
 
 HEAD = (
-    "| | streams | K both | B both | M both | K | B | M | refused at the end, looks | 'another surface' |"
-    " flips | holds | confidently wrong |"
+    "| | streams | K of the batch's | B of the batch's | M of the batch's | K | B | M | refused at the end, at looks |"
+    " another surface | changes of K's verdict | 95 % intervals hold | confidently wrong |"
 )
 
 

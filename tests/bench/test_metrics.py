@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.bench.force_input import APPROACH, COLUMNS, CONTACT, LOST
-from palpate.bench.metrics import METRICS, Look
+from palpate.bench.metrics import METRICS, Window
 from palpate.records import Record
 
 TICK = 1e-3
@@ -30,7 +30,7 @@ def record(force, desired=20.0, *, phase=None, end="done", period=2.5, before=10
 
 
 def of(name, one, window=None):
-    return METRICS[name].value_in(Look(one, window))
+    return METRICS[name].value_in(Window(one, window))
 
 
 def test_names_are_those_of_the_table_and_texts_are_lines():
@@ -120,7 +120,7 @@ def test_a_window_that_a_lost_run_did_not_reach_has_no_numbers():
 def test_no_contact_has_no_numbers_but_some_zeros():
     one = record(np.zeros(100), phase=np.full(100, APPROACH), end="no contact")
     for name, metric in METRICS.items():
-        value = metric.value_in(Look(one))
+        value = metric.value_in(Window(one))
         assert value is None or (value == 0.0 and name in {"contacts_lost", "time_in_contact"}), name
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.cli._program import COMMANDS, added_commands, program
-from palpate.cli._streams import guarded
+from palpate.cli._streams import run_guarded
 from palpate.errors import InputError, PalpateError
 
 
@@ -33,16 +33,16 @@ def one_line(capsys) -> str:
 
 @pytest.mark.parametrize(("returned", "code"), [(None, 0), (0, 0), (1, 1), (2, 2)])
 def test_the_result_of_a_command_is_the_exit_code(returned, code):
-    assert guarded(lambda: returned) == code
+    assert run_guarded(lambda: returned) == code
 
 
 def test_wrong_input_is_one_line_even_when_the_message_has_several(capsys):
-    assert guarded(raising(InputError("press.csv: row 3:\n   'a' is not a number"))) == 2
+    assert run_guarded(raising(InputError("press.csv: row 3:\n   'a' is not a number"))) == 2
     assert one_line(capsys) == "palpate: press.csv: row 3: 'a' is not a number\n"
 
 
 def test_every_error_that_is_raised_on_purpose_is_one_line(capsys):
-    assert guarded(raising(PalpateError("this is\nnot for palpate"))) == 2
+    assert run_guarded(raising(PalpateError("this is\nnot for palpate"))) == 2
     assert one_line(capsys) == "palpate: this is not for palpate\n"
 
 
@@ -50,7 +50,7 @@ def test_every_error_that_is_raised_on_purpose_is_one_line(capsys):
     "number", [errno.ENOSPC, errno.EACCES, errno.EROFS, errno.ENOENT, errno.EISDIR, errno.EIO]
 )
 def test_the_system_says_no(capsys, number):
-    assert guarded(raising(OSError(number, os.strerror(number), "out/report.html"))) == 2
+    assert run_guarded(raising(OSError(number, os.strerror(number), "out/report.html"))) == 2
     line = one_line(capsys)
     assert "out/report.html" in line
     assert os.strerror(number) in line
@@ -58,12 +58,12 @@ def test_the_system_says_no(capsys, number):
 
 
 def test_an_interrupt_is_130(capsys):
-    assert guarded(raising(KeyboardInterrupt())) == 130
+    assert run_guarded(raising(KeyboardInterrupt())) == 130
     assert "interrupted" in one_line(capsys)
 
 
 def test_a_defect_keeps_its_traceback_and_is_not_mistaken_for_an_answer(capsys):
-    assert guarded(raising(ZeroDivisionError("in a law"))) == 70
+    assert run_guarded(raising(ZeroDivisionError("in a law"))) == 70
     error = capsys.readouterr().err
     assert "Traceback" in error
     assert "ZeroDivisionError: in a law" in error
@@ -154,8 +154,8 @@ def test_a_full_disk_is_one_line(words):
 
 def test_control_c_ends_a_running_command():
     code = (
-        "import time\nfrom palpate.cli._streams import guarded\nprint('up', flush=True)\n"
-        "raise SystemExit(guarded(lambda: time.sleep(60)))"
+        "import time\nfrom palpate.cli._streams import run_guarded\nprint('up', flush=True)\n"
+        "raise SystemExit(run_guarded(lambda: time.sleep(60)))"
     )
     child = subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.cli import main
-from palpate.cli._help import example, page, wrapped
+from palpate.cli._help import example, page, wrap
 from palpate.cli._program import COMMANDS, added_commands, program
 from palpate.cli.options.names import MODELS
 from palpate.identification.models import NAMES
@@ -94,14 +94,14 @@ def test_no_text_is_broken_where_its_source_was(help_of, command):
     st.lists(st.text(st.characters(categories=["L", "P"]), min_size=1, max_size=12), min_size=1, max_size=40)
 )
 def test_wrapping_loses_no_word_and_fits(words):
-    lines = wrapped(" ".join(words), 30)
+    lines = wrap(" ".join(words), 30)
     assert " ".join(lines).split() == " ".join(words).split()
     assert all(len(line) <= 30 for line in lines)
 
 
 def test_a_phrase_is_kept_whole_where_that_costs_little():
     text = "Text in columns, Parquet, a spreadsheet, a bag; or the record of a run."
-    assert wrapped(text, 44) == ["Text in columns, Parquet, a spreadsheet,", "a bag; or the record of a run."]
+    assert wrap(text, 44) == ["Text in columns, Parquet, a spreadsheet,", "a bag; or the record of a run."]
 
 
 def test_an_example_is_continued_as_a_shell_continues_it():

@@ -10,7 +10,7 @@ import pytest
 
 from cli.test_run import text_of
 from palpate.cli import main
-from palpate.cli._streams import noticed
+from palpate.cli._streams import notice_signals
 from palpate.logs import read_record
 from palpate.report.run import figures
 from palpate.report.run import page as pages
@@ -19,14 +19,14 @@ PRELUDE = """
 import os, signal, sys, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from palpate.cli import _streams
-from palpate.cli._streams import guarded
+from palpate.cli._streams import run_guarded
 _streams.keep()
 """
 
 
 def ended(code, *words):
     """A process that runs the code and then sleeps as a command does."""
-    text = f"{PRELUDE}{code}\nraise SystemExit(guarded(lambda: time.sleep(20)))"
+    text = f"{PRELUDE}{code}\nraise SystemExit(run_guarded(lambda: time.sleep(20)))"
     return subprocess.run(
         [sys.executable, "-c", text, *words], capture_output=True, text=True, check=False, timeout=60
     )
@@ -55,7 +55,7 @@ def test_one_that_falls_into_an_import_waits_for_its_end(tmp_path):
 
 
 def test_within_noticed_nothing_is_raised_and_it_is_told():
-    with noticed() as came:
+    with notice_signals() as came:
         assert not came()
         os.kill(os.getpid(), signal.SIGINT)
         deadline = time.monotonic() + 5.0
@@ -105,7 +105,7 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
 def test_within_noticed_no_signal_ends_or_halts_and_each_has_its_code(name):
     number = getattr(signal, name)
     before = signal.getsignal(number)
-    with noticed() as came:
+    with notice_signals() as came:
         assert came.reason is None
         os.kill(os.getpid(), number)
         os.kill(os.getpid(), signal.SIGTERM)  # the first one counts
@@ -116,7 +116,7 @@ def test_within_noticed_no_signal_ends_or_halts_and_each_has_its_code(name):
 
 
 def test_a_signal_without_a_name_has_its_number():
-    with noticed() as came:
+    with notice_signals() as came:
         os.kill(os.getpid(), signal.SIGRTMIN + 1)
         time.sleep(0.01)
         assert came.reason == f"stopped by the user (signal {signal.SIGRTMIN + 1})"
@@ -129,7 +129,7 @@ def test_a_hang_up_that_is_ignored_and_a_handler_of_somebody_else_are_left():
         signal.signal(signal.SIGHUP, signal.SIG_IGN),
     )
     try:
-        with noticed() as came:
+        with notice_signals() as came:
             os.kill(os.getpid(), signal.SIGHUP)
             os.kill(os.getpid(), signal.SIGUSR2)
             time.sleep(0.01)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from controllers.ideal_arm import ARM, START, task
 from palpate._vector import ZERO3, Vec3
-from palpate.controllers.self_tuning import SelfTuning, owed
+from palpate.controllers.self_tuning import SelfTuning, gradient
 from palpate.networks import network, random_layers
 from palpate.signals.types import Sense
 
@@ -96,7 +96,7 @@ def test_it_knows_what_the_force_owes_to_the_proportional_gain():
     errors, _ = closed(kf, ki, 1e-9, ticks)
     _, before = closed(kf, ki, 1e-9, ticks - 1)
     more, less = closed(kf + h, ki, 1e-9, ticks)[0], closed(kf - h, ki, 1e-9, ticks)[0]
-    by_kf = owed(errors[-1], before.by_ki.x, kf, ki)
+    by_kf = gradient(errors[-1], before.by_ki.x, kf, ki)
     assert by_kf == pytest.approx(-(more[-1] - less[-1]) / (2 * h), rel=0.02)
 
 
@@ -110,7 +110,7 @@ def test_learning_goes_down_the_gradient_of_the_squared_error():
     _, after = feel(controller, [force], state)
     change = (after[-1].network.weights - before) / rate
     e, (kf, ki, _) = 20.0 - force, after[-1].gains
-    by_kf, by_kd = owed(e, state.by_ki.x, kf, ki), owed(-after[-1].rate.x, state.by_kd.x, kf, ki)
+    by_kf, by_kd = gradient(e, state.by_ki.x, kf, ki), gradient(-after[-1].rate.x, state.by_kd.x, kf, ki)
     debts = np.array([by_kf, after[-1].by_ki.x, by_kd])
 
     def gains(weights):

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from palpate.errors import InputError
-from palpate.files import fresh_folder, kept_folder, signed, write_json
+from palpate.files import fresh_folder, kept_folder, with_author, write_json
 
 FILE, BEGUN = "summary.json", "runs.jsonl"
 OURS = '{"written_by": "palpate 0.1.0", "n": %d}'
@@ -171,7 +171,7 @@ def test_a_folder_is_kept_by_one_process_at_a_time(tmp_path):
 def test_a_kept_folder_is_gone_on_in_once_begun(tmp_path):
     """Notes that a person put beside the results stay, and hinder nobody but --replace."""
     with kept_folder(tmp_path / "study", BEGUN, replace=False):
-        write_json(tmp_path / "study" / BEGUN, signed({}))
+        write_json(tmp_path / "study" / BEGUN, with_author({}))
     (tmp_path / "study" / "notes.txt").write_text("mine")
     with kept_folder(tmp_path / "study", BEGUN, replace=False):
         assert contents(tmp_path / "study") == ["notes.txt", BEGUN]
@@ -190,7 +190,7 @@ def test_results_of_something_else_are_not_begun_in(tmp_path):
 
 def test_drafts_of_a_killed_process_are_swept(tmp_path):
     with kept_folder(tmp_path / "study", BEGUN, replace=False):
-        write_json(tmp_path / "study" / BEGUN, signed({}))
+        write_json(tmp_path / "study" / BEGUN, with_author({}))
     (tmp_path / "study" / "records").mkdir()
     (tmp_path / "study" / "records" / ".3.parquet.palpate-part").write_bytes(b"PAR1 half")
     with kept_folder(tmp_path / "study", BEGUN, replace=False):

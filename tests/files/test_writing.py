@@ -11,7 +11,7 @@ import polars
 import pytest
 
 from palpate.errors import InputError
-from palpate.files import MADE, check_place, fresh_folder, ours, signed, whole, write_json, write_text
+from palpate.files import MADE, check_place, fresh_folder, ours, whole, with_author, write_json, write_text
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.report import style
@@ -38,7 +38,7 @@ WRITERS = {
     "a.png": a_png,
     "a.html": a_page,
     "a.parquet": a_record,
-    "a.json": lambda path: write_json(path, signed({"end": "done"})),
+    "a.json": lambda path: write_json(path, with_author({"end": "done"})),
     "a.toml": lambda path: write_text(path, f"{MADE} excite.\n[run]\n"),
     "a.csv": lambda path: write_text(path, "time_s,force_desired_N\n0,1\n"),
 }

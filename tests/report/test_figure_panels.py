@@ -17,7 +17,7 @@ T = np.linspace(0.0, 4.0, 40_001)
 
 
 def drawn(panels=1):
-    with style.inked():
+    with style.ink():
         figure = Figure(layout="constrained")
         return figure, list(np.atleast_1d(figure.subplots(1, panels)))
 

@@ -22,13 +22,13 @@ from palpate.report.look.assets import (
     PAIRS,
     SERIES,
     data,
-    packed,
+    packed_column,
     policy,
+    rows_shown,
     scripts,
     style_sheet,
     styles,
     text_of,
-    thinned,
 )
 from palpate.report.page import render
 
@@ -113,21 +113,21 @@ def unpacked(column):
 
 @given(columns)
 def test_a_packed_column_is_itself_but_for_its_step(values):
-    column = packed(values)
+    column = packed_column(values)
     spread = float(values.max() - values.min())
     np.testing.assert_allclose(unpacked(column), values, rtol=1e-9, atol=spread / 65000 + 1e-12)
 
 
 def test_gaps_stay_gaps_and_places_that_a_column_lacks_stay_such():
     values = np.array([1.0, np.nan, 3.0, np.inf])
-    np.testing.assert_allclose(unpacked(packed(values)), [1.0, np.nan, 3.0, np.inf])
-    assert np.isnan(unpacked(packed(np.full(3, np.nan)))).all()
+    np.testing.assert_allclose(unpacked(packed_column(values)), [1.0, np.nan, 3.0, np.inf])
+    assert np.isnan(unpacked(packed_column(np.full(3, np.nan)))).all()
 
 
 @given(st.integers(1, 400), st.integers(4, 60), st.integers(0, 2**31))
 def test_thinning_keeps_order_ends_and_peaks(n, most, seed):
     values = np.random.default_rng(seed).standard_normal(n)
-    rows = thinned(values, most)
+    rows = rows_shown(values, most)
     assert (np.diff(rows) > 0).all()
     assert len(rows) <= max(most + 2, n if n <= most else 0)
     assert {0, n - 1} <= set(rows.tolist())
@@ -138,7 +138,7 @@ def test_thinning_keeps_order_ends_and_peaks(n, most, seed):
 def test_half_of_what_is_kept_lies_where_it_is_to_be_dense():
     dense = np.zeros(10000, dtype=bool)
     dense[5000:5500] = True
-    rows = thinned(np.sin(np.arange(10000)), 800, dense)
+    rows = rows_shown(np.sin(np.arange(10000)), 800, dense)
     assert abs(dense[rows].sum() - 400) <= 10
 
 

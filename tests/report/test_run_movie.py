@@ -23,7 +23,7 @@ def test_a_film_has_a_frame_for_each_twentieth_of_a_second(record, tmp_path):
     from PIL import Image
 
     path = movie.write_movie(record, tmp_path / "arm.gif")
-    rows, pace = movie.chosen(record)
+    rows, pace = movie.frames_of(record)
     assert ours(path)
     assert pace == 1.0
     with Image.open(path) as film:
@@ -38,7 +38,7 @@ def test_a_film_has_a_frame_for_each_twentieth_of_a_second(record, tmp_path):
 def test_a_long_run_is_shown_faster():
     t = np.arange(0.0, 120.0, 0.01)
     long = Record({"t": t, "phase": np.where(t > 5.0, 1.0, 0.0)}, {"t": "s", "phase": "1"})
-    rows, pace = movie.chosen(long)
+    rows, pace = movie.frames_of(long)
     assert len(rows) == movie.MOST
     assert pace == pytest.approx(116.0 * movie.FRAMES_PER_S / movie.MOST, rel=0.01)
     assert t[rows[0]] == pytest.approx(4.0, abs=0.02)

@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import Limits, LostError, Rows, Sense, Task, checked, press
-from palpate_rehearsal.rehearsal import OneDirection
+from palpate_rehearsal.rehearsal import ToolAxisArm
 from wires.slow_cell import cell
 
 
@@ -63,7 +63,7 @@ def folder(tmp_path_factory):
 
 def lying(folder, lie=lambda sense, first: sense, since=2.0, noise=None, hold=2.0, shown=None):
     model = load_arm(str(folder / "arm.toml"))
-    arm = OneDirection(model, surface(4000.0, 20.0), 0.002, (0.0, 0.0, 1.0), 0)
+    arm = ToolAxisArm(model, surface(4000.0, 20.0), 0.002, (0.0, 0.0, 1.0), 0)
     if noise is not None:
         arm.world = arm.world._replace(noise=noise)
     wire = FakeWire(arm, lie, since)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from palpate.wires.realtime import hurried
+from palpate.wires.realtime import realtime_priority
 
 
 def policies() -> set[int]:
@@ -22,13 +22,13 @@ def test_all_threads_have_the_priority_that_is_told_and_none_afterwards():
     other.start()
     before = policies()
     try:
-        with hurried(True) as told:
+        with realtime_priority(True) as told:
             within = policies()
     finally:
         done.set()
         other.join()
     assert within == ({os.SCHED_FIFO} if told.startswith("real-time priority") else before)
     assert policies() == {os.SCHED_OTHER}
-    with hurried(False) as told:
+    with realtime_priority(False) as told:
         assert told == "ordinary priority, as asked"
         assert policies() == {os.SCHED_OTHER}

@@ -209,14 +209,14 @@ def test_nobody_but_its_master_moves_an_arm_even_with_the_number_of_its_session(
         )
         arm.bind(("127.0.0.1", 0))
         arm.settimeout(5.0)
-        greeting = sim.packed(sim.HELLO, 7)
-        down = sim.packed(sim.MOVE, 7, sim.move(1, (0.0, 0.0, -0.01)))
+        greeting = sim.pack(sim.HELLO, 7)
+        down = sim.pack(sim.MOVE, 7, sim.move(1, (0.0, 0.0, -0.01)))
 
         def hear(sender, datagram, heard):
             sender.sendto(datagram, arm.getsockname())
             arm.recvfrom(512, socket.MSG_PEEK)
             arm.setblocking(False)
-            heard = sim_arm._heard(arm, heard, 100.0)
+            heard = sim_arm._receive(arm, heard, 100.0)
             arm.settimeout(5.0)
             return heard
 

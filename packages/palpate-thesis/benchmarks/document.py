@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from palpate_thesis.claims import Claim, count_in_words
+from palpate_thesis.claims import ThesisClaim, count_in_words
 from palpate_thesis.inference.findings import DOCUMENT, FOUND
 from palpate_thesis.inference.sentences import sentences
 
@@ -38,7 +38,7 @@ def main() -> None:
 
 def _thesis(laboratory: Path, thesis: Path) -> str:
     """How many claims `palpate thesis --laboratory inferred` reproduces, beside the bench by the same rules."""
-    claims = msgspec.json.decode((thesis / "claims.json").read_bytes(), type=list[Claim])
+    claims = msgspec.json.decode((thesis / "claims.json").read_bytes(), type=list[ThesisClaim])
     held = msgspec.json.decode((laboratory / FOUND).read_bytes())["sentences"]
     on_bench = {s.id for s in sentences() if s.enough(held[s.id][BENCH], 10)}
     there = {c.id for c in claims if not c.group and c.verdict == "reproduced"}

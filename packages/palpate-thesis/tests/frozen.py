@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from palpate_thesis.claims import Claim
+from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.measure import STATE
 
 FILE = Path(__file__).with_name("claims.json")
@@ -45,12 +45,12 @@ def parts(measured: str) -> tuple[str, list[Spread]]:
     return SPREAD.sub(r"<\g<unit>, \g<of>>", measured), spreads
 
 
-def told(claim: Claim) -> str:
+def told(claim: ThesisClaim) -> str:
     """What became of a claim, in one line."""
     return f"{claim.verdict}: {claim.measured}"
 
 
-def differences(before: Mapping[str, str], claims: Sequence[Claim]) -> Iterator[str]:
+def differences(before: Mapping[str, str], claims: Sequence[ThesisClaim]) -> Iterator[str]:
     """A line for each claim of a study that is not what it was.
 
     A number with a range over the seeds may move within it: each median lies in the other's range. Verdicts, words and
@@ -74,7 +74,7 @@ def kept() -> dict[str, dict[str, str]]:
 def main(folder: str) -> None:
     """Keep a measurement, and say what is not what it was."""
     done = json.loads((Path(folder) / STATE).read_text("utf-8"))["done"]
-    studies = {number: [Claim(**claim) for claim in one["claims"]] for number, one in done.items()}
+    studies = {number: [ThesisClaim(**claim) for claim in one["claims"]] for number, one in done.items()}
     before = kept()
     for number, claims in studies.items():
         for line in differences(before.get(number, {}), claims):

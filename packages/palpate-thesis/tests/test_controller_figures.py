@@ -20,8 +20,8 @@ from palpate_thesis.explanations.e6_friction_compensation import (
     recovery_of,
 )
 from palpate_thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
-from palpate_thesis.figures.fig_4_03 import ForceLoop
-from palpate_thesis.figures.fig_4_19 import Pair, Stray, press_with_jumps, stray
+from palpate_thesis.figures.fig_4_03 import LoopParameters
+from palpate_thesis.figures.fig_4_19 import CoupledAndDecoupled, Stray, press_with_jumps, stray
 from palpate_thesis.force_control.disturbances import (
     Disturbance,
     desired_pose,
@@ -101,7 +101,7 @@ def swings(loop, stiffness, seconds=3.0, physics=20000):
 @pytest.mark.parametrize("gains", [(1.0, 0.003), (0.25, 0.0015)])
 def test_the_linear_limit_is_where_a_stepped_loop_begins_to_swing(gains):
     """Another way to the same number: the parts of the bench, step by step, without friction."""
-    loop = ForceLoop(*gains, 60.0, 8.2)
+    loop = LoopParameters(*gains, 60.0, 8.2)
     limit = loop.limit()
     assert swings(loop, 0.85 * limit) < 1.0
     assert swings(loop, 1.15 * limit) > 1.0
@@ -132,24 +132,27 @@ def by_transfer_functions(kf, ki, damping, stiffness):
 def test_the_linear_loop_is_its_transfer_functions(case):
     """On either side of the limit; roots of order 14 near the unit circle are known to 1e-9."""
     kf, ki, damping, stiffness = case
-    (radius,) = ForceLoop(kf, ki, damping, 8.2).radius(np.array([stiffness]))
+    (radius,) = LoopParameters(kf, ki, damping, 8.2).radius(np.array([stiffness]))
     assert radius == pytest.approx(by_transfer_functions(*case), abs=1e-8)
 
 
 def test_without_gain_every_surface_is_stable():
-    assert ForceLoop(0.0, 0.0, 60.0, 8.2).limit() == np.inf
+    assert LoopParameters(0.0, 0.0, 60.0, 8.2).limit() == np.inf
 
 
 def test_damping_and_lower_gains_bear_stiffer_surfaces():
-    limits = [ForceLoop(kf, 0.003, 60.0, 8.2).limit() for kf in (2.0, 1.0, 0.5, 0.25)]
+    limits = [LoopParameters(kf, 0.003, 60.0, 8.2).limit() for kf in (2.0, 1.0, 0.5, 0.25)]
     assert limits == sorted(limits)
-    limits = [ForceLoop(1.0, 0.003, b, 8.2).limit() for b in (30.0, 60.0, 120.0, 240.0)]
+    limits = [LoopParameters(1.0, 0.003, b, 8.2).limit() for b in (30.0, 60.0, 120.0, 240.0)]
     assert limits == sorted(limits)
-    assert ForceLoop(1.0, 0.003, 60.0, 8.2, late=0.010).limit() < ForceLoop(1.0, 0.003, 60.0, 8.2).limit()
+    assert (
+        LoopParameters(1.0, 0.003, 60.0, 8.2, late=0.010).limit()
+        < LoopParameters(1.0, 0.003, 60.0, 8.2).limit()
+    )
 
 
 def test_a_hopeless_loop_has_no_limit():
-    assert np.isnan(ForceLoop(400.0, 0.003, 60.0, 8.2).limit())
+    assert np.isnan(LoopParameters(400.0, 0.003, 60.0, 8.2).limit())
 
 
 def test_without_friction_the_arm_is_the_target_spring_and_damper():
@@ -191,7 +194,7 @@ def stray_of(y=1.0, phi=1.0, force=0.01, lost=0):
     ],
 )
 def test_what_counts_as_decoupled(decoupled, angle, force):
-    pair = Pair(stray_of(), decoupled, 5200.0)
+    pair = CoupledAndDecoupled(stray_of(), decoupled, 5200.0)
     assert fig_4_19.angle_kept(pair) == angle
     assert fig_4_19.force_kept(pair) == force
 

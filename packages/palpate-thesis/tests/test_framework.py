@@ -18,9 +18,9 @@ from frozen import kept
 from palpate.bench import changed, load
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate_thesis.claims import Claim, claim, often, spread, tables, verdict_of, with_wholes
+from palpate_thesis.claims import ThesisClaim, claim, often, spread, tables, verdict_of, with_wholes
 from palpate_thesis.figure import studies, study
-from palpate_thesis.measure import STATE, Written, measure
+from palpate_thesis.measure import STATE, MeasurementFormat, measure
 from palpate_thesis.page import chapter_of
 from palpate_thesis.runs import Runs
 
@@ -65,9 +65,9 @@ def toy(number: str, done: list[str], fails: type[BaseException] | None = None) 
             raise fails
         return float(len(runs.seeds))
 
-    def check(data: float) -> list[Claim]:
+    def check(data: float) -> list[ThesisClaim]:
         return [
-            Claim(
+            ThesisClaim(
                 f"T{number.replace('.', '-')}",
                 "here",
                 "<it> holds & is told",
@@ -92,7 +92,7 @@ def toy(number: str, done: list[str], fails: type[BaseException] | None = None) 
 
 
 def measured(numbers: list, folder: Path, **options):
-    options = {"written": Written(options.pop("command", "palpate thesis")), **options}
+    options = {"written": MeasurementFormat(options.pop("command", "palpate thesis")), **options}
     return measure(numbers, Runs(options.pop("seeds", SEEDS)), folder, **options)
 
 
@@ -380,7 +380,7 @@ def test_runs_keep_the_order_of_their_cases_and_pass_errors_on():
 
 def test_a_claim_measured_in_parts_has_a_row_of_its_own():
     def claim(name, verdict):
-        return Claim(name, "sec. 1", f"says {name}", "1", "1", "none", verdict, "why")
+        return ThesisClaim(name, "sec. 1", f"says {name}", "1", "1", "none", verdict, "why")
 
     parts = [
         claim("A.K", "reproduced"), claim("A.B", "differs"), claim("B", "reproduced"), claim("B.K", "differs"),

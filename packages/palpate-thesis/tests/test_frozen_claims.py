@@ -7,13 +7,13 @@ import pytest
 
 from frozen import differences, kept, told
 from palpate.report import style
-from palpate_thesis.claims import Claim, spread
+from palpate_thesis.claims import ThesisClaim, spread
 from palpate_thesis.figure import studies, study
 from palpate_thesis.runs import Runs
 
 FROZEN = kept()
 QUICK = ("3.7",)
-ONE = Claim(
+ONE = ThesisClaim(
     "a.K",
     "here",
     "it holds",

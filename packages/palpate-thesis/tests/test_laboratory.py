@@ -17,7 +17,7 @@ from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate_studies.cluster import Cluster
-from palpate_thesis.claims import Claim, count_in_words, count_verdicts, with_wholes
+from palpate_thesis.claims import ThesisClaim, count_in_words, count_verdicts, with_wholes
 from palpate_thesis.conditions import rougher
 from palpate_thesis.figure import studies, study
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
@@ -35,7 +35,7 @@ from palpate_thesis.inference.result import (
     worth,
 )
 from palpate_thesis.inference.sampler import Settings, sample
-from palpate_thesis.inference.search import MISS, Job, Search, Threads, Workers
+from palpate_thesis.inference.search import MISS, Job, PosteriorSearch, Threads, Workers
 from palpate_thesis.inference.sentences import HOLDS, TELLING_FIRST, sentences, sentences_of_search
 from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory import laboratory
@@ -58,8 +58,8 @@ from palpate_thesis.laboratory.unknowns import (
     Unknown,
 )
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.measure import Written, measure
-from palpate_thesis.neural_identifier.network import Press
+from palpate_thesis.measure import MeasurementFormat, measure
+from palpate_thesis.neural_identifier.network import NetworkPress
 from palpate_thesis.runs import Runs
 from studies.cluster import local_cluster
 
@@ -158,7 +158,7 @@ def test_what_no_figure_had_tried_changes_the_runs(case: str, of: dict[str, floa
 def test_the_identifiers_unknowns_enter_its_answer():
     t = np.arange(4000) * 1e-3
     inputs = np.column_stack([4e-3 * t / 4.0, np.full(4000, 1e-3), np.zeros(4000)])
-    press = Press("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
+    press = NetworkPress("foam", inputs, 20.0 * t / 4.0, 5000.0, np.zeros((4000, 3)))
     base = Trial(Laboratory(start=1.0)).identifiers_answer(press)
     for of in ({"amplitude": 80.0}, {"weights": 1.5}, {"start": 2.0}):
         assert Trial(Laboratory(**{"start": 1.0, **of})).identifiers_answer(press) != base
@@ -276,12 +276,12 @@ class Stub:
 
 def test_an_interrupted_search_ends_as_one_that_was_not(tmp_path):
     of, settings = sentences_of_search(calibrating=True), Settings(16, 2, 1, 5)
-    whole = Search(of, settings, Stub()).run(tmp_path / "whole.sqlite")
+    whole = PosteriorSearch(of, settings, Stub()).run(tmp_path / "whole.sqlite")
     with pytest.raises(KeyboardInterrupt):
-        Search(of, settings, Stub(after=50)).run(tmp_path / "cut.sqlite")
+        PosteriorSearch(of, settings, Stub(after=50)).run(tmp_path / "cut.sqlite")
     path = tmp_path / "cut.sqlite"
     again = Stub()
-    resumed = Search(of, settings, again).run(path)
+    resumed = PosteriorSearch(of, settings, again).run(path)
     assert np.array_equal(whole.points, resumed.points)
     assert again.asked == len(archive.read(tmp_path / "whole.sqlite")[1]) - 50
     assert resumed.likelihood.max() >= -MISS * len(of)
@@ -289,27 +289,27 @@ def test_an_interrupted_search_ends_as_one_that_was_not(tmp_path):
 
 def test_an_archive_of_another_search_is_refused(tmp_path):
     of, path = sentences_of_search(calibrating=True), tmp_path / "some.sqlite"
-    Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+    PosteriorSearch(of, Settings(8, 2, 1, 5), Stub()).run(path)
     with pytest.raises(InputError, match="another search"):
-        Search(of, Settings(8, 2, 1, 6), Stub()).run(path)
+        PosteriorSearch(of, Settings(8, 2, 1, 6), Stub()).run(path)
     path.write_bytes(b"not ours\n")
     with pytest.raises(InputError, match="did not write it"):
-        Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+        PosteriorSearch(of, Settings(8, 2, 1, 5), Stub()).run(path)
 
 
 def test_a_damaged_archive_is_one_line_and_a_strangers_is_not_touched(tmp_path):
     of, path = sentences_of_search(calibrating=True), tmp_path / "some.sqlite"
-    Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+    PosteriorSearch(of, Settings(8, 2, 1, 5), Stub()).run(path)
     whole = path.read_bytes()
     path.write_bytes(whole[:100] + bytes(len(whole) - 100))
     with pytest.raises(InputError, match="damaged"):
-        Search(of, Settings(8, 2, 1, 5), Stub()).run(path)
+        PosteriorSearch(of, Settings(8, 2, 1, 5), Stub()).run(path)
     other = tmp_path / "other.sqlite"
     with closing(sqlite3.connect(other)) as connection:
         connection.execute("CREATE TABLE years (work)")
     before = other.read_bytes()
     with pytest.raises(InputError, match="did not write it"):
-        Search(of, Settings(8, 2, 1, 5), Stub()).run(other)
+        PosteriorSearch(of, Settings(8, 2, 1, 5), Stub()).run(other)
     assert other.read_bytes() == before
 
 
@@ -324,7 +324,7 @@ def test_a_value_is_computed_once(tmp_path):
 def test_what_one_search_tried_in_full_is_lent_to_the_other(tmp_path):
     all_, half = sentences_of_search(calibrating=False), sentences_of_search(calibrating=True)
     settings, path = Settings(8, 2, 1, 5), tmp_path / "all.sqlite"
-    one = Search(all_, settings, Stub())
+    one = PosteriorSearch(all_, settings, Stub())
     one.run(path)
     lent = search.borrow(path, one.head(), all_, half)
     full = {n: t for n, t in archive.read(path)[1].items() if len(t.verdicts) == len(all_)}
@@ -407,7 +407,7 @@ class Rule:
             yield Tried(job.number, job.shares, tuple(job.shares[int(id_)] > self.level for id_ in ids))
 
 
-def halves_apart(level: float) -> contradictions.Table:
+def halves_apart(level: float) -> contradictions.VerdictTable:
     points = np.random.default_rng(6).random((60, 8))
     points[:, 1] = np.where(points[:, 0] > level, level * points[:, 1], points[:, 1])
     rows = {i: Tried(i, tuple(p), (p[0] > level, p[1] > level)) for i, p in enumerate(points)}
@@ -455,14 +455,14 @@ def test_a_contradiction_is_called_what_is_known_of_it():
 def test_a_laboratory_is_better_only_beyond_chance():
     validation = [s.id for s in judge.validation()]
 
-    def against(only_there: int, only_here: int) -> result.Result:
+    def against(only_there: int, only_here: int) -> result.InferenceResult:
         there = dict.fromkeys((s.id for s in sentences()), 0)
         here = dict(there)
         there.update(dict.fromkeys(validation[:only_there], 10))
         here.update(dict.fromkeys(validation[only_there : only_there + only_here], 10))
         none = sampler.Sample(*([()] * 5))
         lab, bench = judge.Judged(CHOSEN, 10, there), judge.Judged(CHOSEN, 10, here)
-        return result.Result(none, None, bench, lab, lab, (), (), (), None)
+        return result.InferenceResult(none, None, bench, lab, lab, (), (), (), None)
 
     assert against(5, 4).cross_validation == (5, 4)
     assert against(5, 4).by_chance == pytest.approx(0.5)  # of nine heads or tails five or more
@@ -533,7 +533,9 @@ def test_the_best_of_a_posterior_miss_fewest_and_differ():
 
 def test_a_figure_is_measured_in_another_laboratory(tmp_path):
     runs = Runs(range(2), laboratory=Laboratory(noise=0.15))
-    (done,) = measure([study("4.4")], runs, tmp_path / "thesis", written=Written("palpate thesis 4.4"))
+    (done,) = measure(
+        [study("4.4")], runs, tmp_path / "thesis", written=MeasurementFormat("palpate thesis 4.4")
+    )
     (claim,) = done.claims
     assert claim.verdict == "differs"
     assert "noise 0.15" in claim.note
@@ -542,8 +544,8 @@ def test_a_figure_is_measured_in_another_laboratory(tmp_path):
     assert [r["group"] for r in rows] == [False]
 
 
-def row(name: str, verdict) -> Claim:
-    return Claim(name, "", "", "", "", "", verdict, "")
+def row(name: str, verdict) -> ThesisClaim:
+    return ThesisClaim(name, "", "", "", "", "", verdict, "")
 
 
 def test_claims_are_counted_without_the_rows_that_sum_them_up():

@@ -50,7 +50,7 @@ def as_press(s: dict[str, np.ndarray]) -> Record:
     return Record(columns, dict.fromkeys(columns, "1"))
 
 
-def as_window(s: dict[str, np.ndarray], **changes) -> bias.Window:
+def as_window(s: dict[str, np.ndarray], **changes) -> bias.RegressionWindow:
     values = {
         "x": s["x"],
         "counts": s["x"],
@@ -63,7 +63,7 @@ def as_window(s: dict[str, np.ndarray], **changes) -> bias.Window:
         "cutoffs": (120.0, 35.0),
         "matched": np.zeros(3),
     }
-    return bias.Window(**{**values, **changes})
+    return bias.RegressionWindow(**{**values, **changes})
 
 
 def test_a_press_begins_at_the_change_over_and_ends_where_contact_is_lost():
@@ -140,7 +140,7 @@ def test_every_condition_can_be_built_and_changes_something(experiment):
 
 def test_where_a_claim_fails_is_told(press):
     del press
-    good, bad = (press_runs.Found(*[1.0] * 8, settled, 0.0, 0.0, 200.0) for settled in (1.0, 9.0))
+    good, bad = (press_runs.PressEstimates(*[1.0] * 8, settled, 0.0, 0.0, 200.0) for settled in (1.0, 9.0))
     answers = {"friction halved": [good, good, bad], "friction doubled": [bad, bad, good]}
     assert press_runs.failing(answers, lambda f: f.settled_B < 2.0) == ["friction doubled"]
     assert "friction doubled" in press_runs.where_it_fails(["friction doubled"], 2)

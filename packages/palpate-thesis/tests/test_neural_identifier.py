@@ -9,11 +9,11 @@ from palpate_thesis import look
 from palpate_thesis.explanations import e4_probe
 from palpate_thesis.figures import fig_6_06, fig_6_08
 from palpate_thesis.neural_identifier import claims, network
-from palpate_thesis.neural_identifier.network import Answer, Choice, Press
+from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
 
 STIFFNESS = 6000.0
-GOOD = Answer(
+GOOD = NetworkAnswer(
     K=6600.0,
     B=200.0,
     M=0.1,
@@ -29,21 +29,21 @@ GOOD = Answer(
 )
 
 
-def spring(offset: float = 0.0) -> Press:
+def spring(offset: float = 0.0) -> NetworkPress:
     """A press on a spring, without noise: to 3 mm within 0.1 s, then at rest."""
     t = np.arange(4000) * network.TICK
     x = 3e-3 * np.minimum(t / 0.1, 1.0)
     v = np.where(t < 0.1, 0.03, 0.0)
     force = offset + STIFFNESS * x
     ratio = float(force[-1] / x[-1])
-    return Press("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, np.ones((len(t), 3)))
+    return NetworkPress("foam", np.column_stack([x, v, 0.0 * t]), force, ratio, np.ones((len(t), 3)))
 
 
-def grounds(nominal: list[Answer], swept: dict | None = None) -> claims.Grounds:
+def grounds(nominal: list[NetworkAnswer], swept: dict | None = None) -> claims.Grounds:
     return claims.Grounds(
         surface="foam",
         nominal=nominal,
-        swept=swept or {Choice(): nominal, Choice(thresholds=False): nominal},
+        swept=swept or {NetworkChoice(): nominal, NetworkChoice(thresholds=False): nominal},
         varied={"friction halved": nominal},
         perfect=1.2,
         starts=10,
@@ -67,7 +67,7 @@ def test_a_straight_network_through_zero_answers_the_springs_stiffness():
 
 
 def test_thresholds_that_learn_put_an_offset_into_the_stiffness():
-    found = network.answer(spring(), Choice(), start=0)
+    found = network.answer(spring(), NetworkChoice(), start=0)
     assert found.at_zero > 3.0  # a spring has none
     assert found.over > 1.15
     assert found.tangent < 0.7 * STIFFNESS
@@ -81,7 +81,7 @@ def test_where_a_press_rests_every_network_answers_force_over_displacement():
 
 
 def test_the_tangent_is_the_derivative_of_the_networks_force():
-    probe, _ = network.learn(spring(), Choice(), start=1)
+    probe, _ = network.learn(spring(), NetworkChoice(), start=1)
     hidden, output = probe.layers
     x = 2.5e-3
     signal = np.tanh((hidden[:, 0] + hidden[:, 1] * 1e3 * x) / 2)
@@ -93,7 +93,7 @@ def test_the_tangent_is_the_derivative_of_the_networks_force():
 def test_a_probe_beyond_what_was_pressed_is_warned_of():
     look = e4_probe.look(e4_probe.Toggle(displacement=2.0), spring(), 0)
     assert look.warned
-    probe, _ = network.learn(spring(), Choice(), 0)
+    probe, _ = network.learn(spring(), NetworkChoice(), 0)
     assert {code for code, _ in probe.probe(displacement=4e-3).warnings} == {"probe-outside-learned"}
 
 
@@ -138,7 +138,7 @@ def test_nine_of_ten_runs_are_enough_and_fewer_are_not():
 
 def test_a_note_names_the_part_of_the_sweep_that_agrees():
     bad = replace(GOOD, M=-1.0)
-    swept = {Choice(): [bad] * 10, Choice(60.0, 0.1, thresholds=False): [GOOD] * 10}
+    swept = {NetworkChoice(): [bad] * 10, NetworkChoice(60.0, 0.1, thresholds=False): [GOOD] * 10}
     told = claims.where(grounds([bad] * 100, swept), claims.MASS)
     assert "fixed at zero: 60 N with weights to 0.1" in told
     assert "learn: none" in told

@@ -46,7 +46,7 @@ def test_claims_of_one_verdict_are_shown(browser, index):
 
 def test_lines_of_a_figure_are_zoomed_together_and_told(browser, tmp_path):
     t = np.linspace(0.0, 10.0, 5000)
-    with style.inked():
+    with style.ink():
         figure, (above, below) = style.figure(rows=2)
         above.plot(t, 20.0 + np.sin(t), color=style.F, label="true")
         below.plot(t, np.cos(t), label="angle")

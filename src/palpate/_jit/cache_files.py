@@ -13,7 +13,7 @@ from typing import Any
 _HASH = hashlib.sha256().digest_size
 
 
-def _unpickled(data: bytes) -> Any:
+def _unpickle(data: bytes) -> Any:
     return pickle.loads(data)  # noqa: S301 - as Numba does, but only of a file that is as it was written
 
 
@@ -34,7 +34,7 @@ def hashed_files() -> type:
             """The kernel of a key; None where there is none, or its file is not as it was written."""
             name, digest = self._load_index().get(key, ("", b""))
             data = self._read(name) if name else b""
-            return _unpickled(data) if hashlib.sha256(data).digest() == digest else None
+            return _unpickle(data) if hashlib.sha256(data).digest() == digest else None
 
         def save(self, key: Any, data: Any) -> None:
             """Adds a kernel: its data first, so that no index names a file that is not there yet."""
@@ -50,10 +50,10 @@ def hashed_files() -> type:
             digest, held = data[:_HASH], data[_HASH:]
             if hashlib.sha256(held).digest() != digest:
                 return {}
-            version, dumped = _unpickled(held)
+            version, dumped = _unpickle(held)
             if version != self._version:  # another Numba's pickle may not even be readable
                 return {}
-            stamp, overloads = _unpickled(dumped)
+            stamp, overloads = _unpickle(dumped)
             return dict(overloads) if stamp == self._source_stamp else {}
 
         def _save_index(self, overloads: dict[Any, tuple[str, bytes]]) -> None:

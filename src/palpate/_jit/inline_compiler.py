@@ -67,13 +67,13 @@ def _link_below(library: Any, module: Any) -> None:
         for below in one._linking_libraries:
             if below not in order:
                 order[below] = None
-                if isinstance(below, _swallowed()):
+                if isinstance(below, _linked_library_type()):
                     visit(below)
 
     visit(library)
     for below in order:
         library._reload_init.update(below._reload_init)
-        alone = below.alone if isinstance(below, _swallowed()) else below._get_module_for_linking()
+        alone = below.alone if isinstance(below, _linked_library_type()) else below._get_module_for_linking()
         module.link_in(alone, preserve=True)
 
 
@@ -96,7 +96,7 @@ def _entry_compiler(superword: bool) -> type:
             manager.run(self._final_module, builder)
             return None
 
-    class Entry(Compiler):
+    class SameFlagsCompiler(Compiler):
         """Numba's compiler, but that what is called sees the flags of everything inside."""
 
         def __init__(
@@ -106,7 +106,7 @@ def _entry_compiler(superword: bool) -> type:
             library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
-    return Entry
+    return SameFlagsCompiler
 
 
 class _Unloaded:
@@ -123,7 +123,7 @@ class _Unloaded:
 
 
 @functools.cache
-def _swallowed() -> type:
+def _linked_library_type() -> type:
     """Code that is linked into other code, and never loaded itself."""
     from numba.core.codegen import JITCodeLibrary
 
@@ -167,7 +167,7 @@ def _swallowed() -> type:
 def _inside_compiler() -> type:
     from numba.core.compiler import Compiler
 
-    swallowed = _swallowed()
+    swallowed = _linked_library_type()
 
     class Inside(Compiler):
         """Numba's compiler, its result such code."""

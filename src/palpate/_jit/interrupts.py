@@ -12,7 +12,7 @@ _Call = tuple[int, FrameType | None]
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
+def interrupts_later() -> Iterator[None]:
     """Keep a Ctrl-C back until the block is done, then hand it to who would have had it.
 
     Numba makes a kernel's result by calling the classes of its NamedTuples, where Python would raise KeyboardInterrupt;

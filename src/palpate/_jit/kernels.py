@@ -11,7 +11,7 @@ from typing import Any
 from palpate._jit.cache_files import hashed_files
 from palpate._jit.compile_lock import CompileLock
 from palpate._jit.inline_compiler import entry, inside
-from palpate._jit.interrupts import uninterrupted
+from palpate._jit.interrupts import interrupts_later
 from palpate._jit.overloads import operators_and_members
 from palpate._jit.registry import laws
 from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
@@ -43,7 +43,7 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         collects = gc.isenabled()
-        with uninterrupted():
+        with interrupts_later():
             try:
                 return self.compiled(*args)
             except Exception as error:

@@ -147,7 +147,7 @@ def _members() -> None:
         def generic_resolve(self, value: Any, attr: str) -> Any:
             member = _method(value, attr)
             if inspect.isfunction(member):
-                return types.BoundFunction(_bound(member), value)
+                return types.BoundFunction(_bound_method(member), value)
             if isinstance(member, property):
                 _lower_property(attr)
                 return _compiled_member(member.fget).get_call_type(self.context, (value,), {}).return_type
@@ -169,7 +169,7 @@ def _member_dispatcher(function: Callable[..., Any]) -> Any:
 
 
 @functools.cache
-def _bound(method: Callable[..., Any]) -> Any:
+def _bound_method(method: Callable[..., Any]) -> Any:
     """How Numba types and lowers a call of the method on an object."""
     from numba.core import types
     from numba.core.typing.templates import AbstractTemplate

@@ -36,7 +36,7 @@ def _sources(files: Iterable[Path]) -> dict[Path, bytes]:
         if file not in reached and file.exists():
             reached[file] = file.read_bytes()
             text = reached[file].decode("utf-8", "replace")
-            waiting.extend(p for root in {PACKAGE.parent, _root_of(file)} for p in _imported(text, root))
+            waiting.extend(p for root in {PACKAGE.parent, _root_of(file)} for p in _imports(text, root))
     return reached
 
 
@@ -46,7 +46,7 @@ def _root_of(file: Path) -> Path:
 
 
 @functools.cache
-def _imported(text: str, root: Path) -> list[Path]:
+def _imports(text: str, root: Path) -> list[Path]:
     """Files under the root that a source imports names from, or as modules."""
     found = []
     for module, names in _IMPORT.findall(text):

@@ -34,7 +34,7 @@ def reader(part: type) -> Callable[[Any], Any]:
     """A law that makes a part, of numbers and parts of them, of an array that begins with its numbers."""
 
     def read(a: Any) -> Any:
-        return _made(part, iter(a))
+        return _make_part(part, iter(a))
 
     stored[read] = part, True
     return read
@@ -51,16 +51,16 @@ def writer(part: type) -> Callable[[Any, Any], None]:
     return write
 
 
-def _made(part: type, numbers: Iterator[Any]) -> Any:
+def _make_part(part: type, numbers: Iterator[Any]) -> Any:
     kinds = get_type_hints(part).values()
-    return part(*(float(next(numbers)) if kind is float else _made(kind, numbers) for kind in kinds))
+    return part(*(float(next(numbers)) if kind is float else _make_part(kind, numbers) for kind in kinds))
 
 
 def kind_of(part: type) -> Any:
     """Numba's type of a part of numbers and parts of them."""
     import numba
 
-    return numba.typeof(_made(part, repeat(0.0)))
+    return numba.typeof(_make_part(part, repeat(0.0)))
 
 
 def hand_over() -> None:

@@ -10,9 +10,9 @@ def test_my_controller(check):
 A check that fails raises an AssertionError that names the violated law. ``palpate checks module:Class`` runs them all.
 """
 
-from palpate.checks.check import Check, Outcome, outcomes
+from palpate.checks.check import Check, CheckOutcome, outcomes
 from palpate.checks.controllers import controller_checks
 from palpate.checks.identifiers import identifier_checks
 from palpate.checks.surfaces import surface_checks
 
-__all__ = ["Check", "Outcome", "controller_checks", "identifier_checks", "outcomes", "surface_checks"]
+__all__ = ["Check", "CheckOutcome", "controller_checks", "identifier_checks", "outcomes", "surface_checks"]

@@ -34,7 +34,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CheckOutcome:
     """Outcome of a check.
 
     Args:
@@ -46,17 +46,17 @@ class Outcome:
     failed: str
 
 
-def outcomes(checks: Iterable[Check]) -> Iterator[Outcome]:
+def outcomes(checks: Iterable[Check]) -> Iterator[CheckOutcome]:
     """Runs all checks; an exception of one does not stop the others."""
     for one in checks:
         try:
             one()
         except AssertionError as error:
-            yield Outcome(one.sentence, " ".join(str(error).split()) or "it fails")
+            yield CheckOutcome(one.sentence, " ".join(str(error).split()) or "it fails")
         except Exception as error:  # noqa: BLE001 - whatever the user's own code raises
-            yield Outcome(one.sentence, reason(error))
+            yield CheckOutcome(one.sentence, reason(error))
         else:
-            yield Outcome(one.sentence, "")
+            yield CheckOutcome(one.sentence, "")
 
 
 def require(ok: object, why: str) -> None:

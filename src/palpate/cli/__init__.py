@@ -28,9 +28,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     from palpate.cli._help import short_help
     from palpate.cli._program import COMMANDS, COMPANIONS, EXPANDED, TYPED, program
-    from palpate.cli._streams import guarded
+    from palpate.cli._streams import run_guarded
     from palpate.cli._terminal import print_lines
-    from palpate.cli.options.kept import expanded
+    from palpate.cli.options.kept import expand
     from palpate.files.limits import check_address_space
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
@@ -40,11 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         app = program(*words[:1])
         check_address_space()
         if any(word.startswith(("--options", "--preset")) for word in words):
-            words = expanded(words, app)
+            words = expand(words, app)
         if words[1:] == ["-h"] and words[0] in {*COMMANDS, *COMPANIONS}:
             print_lines(*short_help(app, words[0]))
             return 0
         EXPANDED.set(tuple(words))
         return app(words)
 
-    return guarded(run)
+    return run_guarded(run)

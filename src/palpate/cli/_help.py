@@ -25,7 +25,7 @@ _BROKEN = 0.3
 """Share of the width that is rather left empty than a phrase broken."""
 
 
-def wrapped(text: str, width: int) -> list[str]:
+def wrap(text: str, width: int) -> list[str]:
     """Lines of at most `width` letters (a word alone may be longer), most of which end with a phrase.
 
     Of all ways to break the text, the one of least cost: the square of what each line but the last leaves empty, as a
@@ -75,7 +75,7 @@ def page(text: str, width: int) -> str:
     """A command's description: paragraphs and examples."""
     parts = [part for part in re.split(r"\n\s*\n", text) if part.strip()]
     return "\n\n".join(
-        "\n".join(example(part, width) if part.lstrip().startswith(EXAMPLE) else wrapped(part, width))
+        "\n".join(example(part, width) if part.lstrip().startswith(EXAMPLE) else wrap(part, width))
         for part in parts
     )
 
@@ -89,7 +89,7 @@ class Phrases:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from rich.text import Text
 
-        yield Text("\n".join(wrapped(self.text, options.max_width)))
+        yield Text("\n".join(wrap(self.text, options.max_width)))
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Any:
         from rich.measure import Measurement
@@ -154,11 +154,11 @@ def short_help(app: App, command: str) -> list[str]:
     wanted = [name for name in _SHOWN.get(command, ()) if name in named] or [*required, *options]
     width = 2 + max((len(name) for name in wanted), default=0)
     lines = [
-        f"Usage: palpate {' '.join([command, *places])} [OPTIONS]", "", *wrapped(description, _WIDTH), "",
+        f"Usage: palpate {' '.join([command, *places])} [OPTIONS]", "", *wrap(description, _WIDTH), "",
         *(line for text in examples for line in (*example(text, _WIDTH), "")),
     ]  # fmt: skip
     for name in [*dict.fromkeys(wanted)][:_MOST]:
         first = re.split(r"[.;](?: |$)", str(named[name].parameter.help or ""), maxsplit=1)[0]
-        begin, *more = wrapped(first, _WIDTH - width - 4) or [""]
+        begin, *more = wrap(first, _WIDTH - width - 4) or [""]
         lines += [f"  --{name:<{width}}{begin}", *(" " * (width + 4) + line for line in more)]
     return [*lines, "", f"all options: palpate {command} --help"]

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
-from palpate.cli._streams import noticed
+from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.map import MapOptions
 from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions
-from palpate.files import check_place, fresh_folder, signed, write_json, write_text
+from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
 
 if TYPE_CHECKING:
     from palpate.maps.result import MapResult
@@ -38,7 +38,7 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     request = MapOptions(stiffer_than=phantom.stiffer_than).request()
     question = simulated.question(asked, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
     folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"
-    with noticed() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
+    with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
         with bar(console(stderr=True)) as progress:
             task = progress.add_task("pressing", total=phantom.presses)
 
@@ -53,7 +53,7 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
             result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
         result.write_presses(fresh / "places.csv")
         result.write_csv(fresh / "map.csv")
-        write_json(fresh / "summary.json", signed({"command": command(), **result.to_json()}))
+        write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
         for path in filter(None, (fresh / "report.html", phantom.page)):
             write_text(path, page.page(result, title, command()))
     if json:

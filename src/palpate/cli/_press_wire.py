@@ -78,7 +78,7 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
 
 def _press(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
     """Press, keep the record and print the outcome, whatever signal comes; returns the exit code."""
-    with _streams.noticed() as came:
+    with _streams.notice_signals() as came:
         outcome, words, where = _write_record(arm, order, options, about, came)
         try:
             code = _print(outcome, words, where, json)
@@ -94,11 +94,11 @@ def _write_record(
 ) -> tuple[Outcome, str, Path | None]:
     """The outcome, the priority that was given, and where the record is; its rows are kept whatever happens."""
     from palpate.wires import Rows, press
-    from palpate.wires.realtime import hurried
+    from palpate.wires.realtime import realtime_priority
 
     rows = Rows(options.record, order.most, about)
     try:
-        with hurried(not options.ordinary_priority) as words:
+        with realtime_priority(not options.ordinary_priority) as words:
             outcome = press(arm, order, rows, lambda: came.reason, _live().put)
     except BaseException as error:
         if rows.count or rows.folder is not None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from cyclopts import App, Group, Parameter
 
 from palpate.cli._help import PhraseFormatter
-from palpate.cli.options.flags import checked
+from palpate.cli.options.flags import value_of
 from palpate.errors import InputError
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
@@ -131,7 +131,7 @@ def program(asked: str = "") -> App:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
         # A name that begins with a bracket is a name, not a list in JSON.
-        default_parameter=Parameter(converter=checked, json_list=False, json_dict=False),
+        default_parameter=Parameter(converter=value_of, json_list=False, json_dict=False),
     )
     own = {name: f"palpate.cli.{name.replace('-', '_')}:{name.replace('-', '_')}" for name in COMMANDS}
     added = {} if asked in COMMANDS else added_commands()

@@ -170,7 +170,7 @@ class Noticed:
 
 
 @contextmanager
-def noticed() -> Iterator[Noticed]:
+def notice_signals() -> Iterator[Noticed]:
     """Within the block no signal ends or halts this process; the yielded value returns whether one came, and which.
 
     For work whose results must not be lost, and which checks it regularly. Those of `_CAUGHT` are always noticed, but
@@ -246,7 +246,7 @@ _REMEDIES = {
 }
 
 
-def guarded(command: Callable[[], Any]) -> int:
+def run_guarded(command: Callable[[], Any]) -> int:
     """Run a command and return its exit code; exceptions are reported on standard error.
 
     An error that the user can correct is one line: the fault, the place, and the remedy.

@@ -148,7 +148,7 @@ def bar(screen: Console, *columns: Any, **options: Any) -> Progress:
 
 
 @contextmanager
-def simulated(
+def simulation_progress(
     screen: Console, interrupted: Callable[[], bool], start: str = "starting"
 ) -> Iterator[Callable[[float, str], None]]:
     """Shows the progress of a simulation: its time [s] and phase.
@@ -170,7 +170,7 @@ def simulated(
 
 
 @contextmanager
-def counted(screen: Console) -> Iterator[Counted]:
+def progress_of_pieces(screen: Console) -> Iterator[Counted]:
     """Shows pieces of work, part after part, with the time left in each."""
     from rich.progress import MofNCompleteColumn, TimeRemainingColumn
 

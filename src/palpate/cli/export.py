@@ -61,7 +61,7 @@ class GivenOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(FileOptions):
+class ExportOutput(FileOptions):
     """Files to write.
 
     Parameters
@@ -88,7 +88,7 @@ def export(
     scene: SceneOptions,
     given: GivenOptions | None = None,
     law: LawOptions | None = None,
-    output: OutputOptions | None = None,
+    output: ExportOutput | None = None,
 ) -> int:
     """Write an identified surface as the contact of a simulator's scene, and press it there; or a law as C.
 
@@ -105,13 +105,13 @@ def export(
     found
         The output of palpate identify --json; for a force loop in C the gains file of palpate tune.
     """
-    given, output = given or GivenOptions(), output or OutputOptions()
+    given, output = given or GivenOptions(), output or ExportOutput()
     if scene.to == "c":
         return export_law(found, law or LawOptions(), output)
     return _scene_writer()(found, scene, given, output)
 
 
-def _scene_writer() -> Callable[[Path | None, SceneOptions, GivenOptions, OutputOptions], int]:
+def _scene_writer() -> Callable[[Path | None, SceneOptions, GivenOptions, ExportOutput], int]:
     """The command of the distribution that writes scenes."""
     for entry in entry_points(group="palpate.exports", name="scene"):
         return entry.load()

@@ -13,7 +13,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
-from palpate.cli._streams import noticed
+from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
@@ -231,7 +231,7 @@ def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: Outp
     known: Known = {}
     result: MapResult | None = None
     last: object = None
-    with noticed() as interrupted:
+    with notice_signals() as interrupted:
         while not interrupted():
             try:
                 presses = growth(known)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(ReportOption, FileOptions):
+class PayloadOutput(ReportOption, FileOptions):
     """Files to write.
 
     Parameters
@@ -43,7 +43,7 @@ def payload(
     frame: FrameOptions | None = None,
     cell: CellOptions | None = None,
     tolerance: float = 0.25,
-    output: OutputOptions | None = None,
+    output: PayloadOutput | None = None,
 ) -> int:
     """Weigh a tool by a log of free motion: mass, centre, the sensor's bias and drift.
 
@@ -64,7 +64,7 @@ def payload(
     tolerance
         Largest half-width of the mass' 95 % interval, as a share of its value.
     """
-    cell, output = cell or CellOptions(), output or OutputOptions()
+    cell, output = cell or CellOptions(), output or PayloadOutput()
     cell.check()
     output.check_new(output.out, ending=".toml")
     report = output.page()

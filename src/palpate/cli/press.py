@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.cli import _terminal
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
-from palpate.cli._streams import noticed
+from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console, place, print_lines, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
@@ -20,7 +20,7 @@ from palpate.cli.options.press import (
     WireOptions,
     only,
 )
-from palpate.files import RECORD, fresh_folder, signed, write_json
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -98,10 +98,10 @@ def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int
     from palpate.press.prepare import prepared
 
     question, folder = simulated.question(asked), simulated.folder
-    with noticed() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
+    with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
         pressing = prepared(question)
         start = "starting (the first run compiles, which takes some seconds)"
-        with _terminal.simulated(console(stderr=json), interrupted, start) as show:
+        with _terminal.simulation_progress(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _write(record, pressing, fresh)
     _show(pressing, summary, folder, json)
@@ -118,7 +118,7 @@ def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     from palpate.report.press import write_report
 
     record = changed(record, meta={**record.meta, "command": printable(command())})
-    summary = signed({"command": printable(command()), **summarise(record, pressing.asked)})
+    summary = with_author({"command": printable(command()), **summarise(record, pressing.asked)})
     write_record(record, folder / RECORD)
     write_json(folder / "summary.json", summary)
     if len(record):

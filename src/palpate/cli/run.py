@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from palpate.cli._answer import print_answer
-from palpate.cli._streams import noticed
-from palpate.cli._terminal import COMPILING, console, place, show_answer, simulated
+from palpate.cli._streams import notice_signals
+from palpate.cli._terminal import COMPILING, console, place, show_answer, simulation_progress
 from palpate.cli.options.figures import DRAWN, FigureOptions
 from palpate.cli.options.flags import FLAG, WHOLE
 from palpate.cli.options.names import QUIET, Experiment
 from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
+from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
 from palpate.errors import InputError
-from palpate.files import RECORD, fresh_folder, signed, write_json, write_text
+from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def run(
     from palpate.bench.build import FILES, load_any, parse_any
 
     if known.list_:
-        listed(FILES, lambda one: load_any(one).title)
+        print_names(FILES, lambda one: load_any(one).title)
         return 0
     source = source_of(FILES, name, "run", known.print_)
     if name is None or source is None:
@@ -82,8 +82,8 @@ def run(
     drawn.check()
     with (own or PluginOptions()).consent():
         experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
-        with noticed() as interrupted:
-            ran = _run(_Asked(name, source, experiment, seed), folder, output, drawn, interrupted)
+        with notice_signals() as interrupted:
+            ran = _run(_RunRequest(name, source, experiment, seed), folder, output, drawn, interrupted)
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
     if ran.undrawn:
@@ -105,7 +105,7 @@ class _Ran:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _RunRequest:
     """The experiment to run: its name or file, the text of that, and its numbers; and the seed of the noise."""
 
     name: str
@@ -115,7 +115,11 @@ class _Asked:
 
 
 def _run(
-    asked: _Asked, folder: Path, output: FolderOptions, drawn: DrawnOptions, interrupted: Callable[[], bool]
+    asked: _RunRequest,
+    folder: Path,
+    output: FolderOptions,
+    drawn: DrawnOptions,
+    interrupted: Callable[[], bool],
 ) -> _Ran:
     """Runs and writes the folder of results."""
     from palpate.bench import summarise
@@ -131,7 +135,7 @@ def _run(
         found, why = (None, "") if alone else _identify(fresh / RECORD)
         said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
         about = {"experiment": printable(Path(asked.name).stem), "command": command}
-        summary = signed({**about, **summarise(record), **said})
+        summary = with_author({**about, **summarise(record), **said})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
         try:
@@ -183,7 +187,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
         return None, printable(str(error).replace(str(record), record.name))
 
 
-def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> Record:
+def _record(screen: Console, asked: _RunRequest, interrupted: Callable[[], bool]) -> Record:
     from palpate.bench.build import build_any, check_parts
 
     experiment = asked.experiment
@@ -193,7 +197,7 @@ def _record(screen: Console, asked: _Asked, interrupted: Callable[[], bool]) -> 
     except InputError as error:
         raise InputError(f"{asked.name}: {error}") from error
     waiting = partial(screen.print, COMPILING)
-    with simulated(screen, interrupted) as show:
+    with simulation_progress(screen, interrupted) as show:
         return bench.run(
             experiment.run.duration, asked.seed, press=experiment.run.press, progress=show, waiting=waiting
         )

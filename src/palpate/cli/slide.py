@@ -17,7 +17,7 @@ from palpate.cli.options.force import with_slide
 from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.values import vector
 from palpate.errors import InputError, unknown
-from palpate.files import RECORD, fresh_folder, signed, write_json
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def slide(
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
         head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
-        summary: dict[str, Any] = signed(
+        summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
         write_report(rows, gains, summary, fresh, RECORD)

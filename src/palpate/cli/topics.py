@@ -14,7 +14,7 @@ from palpate.cli.options.written import WRITTEN
 from palpate.logs.signals import GB, Signals
 
 if TYPE_CHECKING:
-    from palpate.logs.listing import Entry, Listing
+    from palpate.logs.listing import Listing, SignalEntry
 
 
 _HOW = Group("Reading", sort_key=1)
@@ -101,7 +101,7 @@ _UNIX = 1e8
 """Seconds since 1970 from which on a clock counts from there: March 1973."""
 
 
-def _begin(entries: list[Entry]) -> float:
+def _begin(entries: list[SignalEntry]) -> float:
     """Origin of the times: the first one if they are dates [s since 1970], else 0."""
     first = min((entry.first for entry in entries if entry.first is not None), default=0.0)
     return first if first > _UNIX else 0.0
@@ -116,7 +116,7 @@ def _date(seconds: float) -> str:
         return f"{seconds:g} s"
 
 
-def _kind(entries: list[Entry]) -> str:
+def _kind(entries: list[SignalEntry]) -> str:
     word = "topic" if all(entry.name.startswith("/") for entry in entries) else "column"
     return word if len(entries) == 1 else f"{word}s"
 

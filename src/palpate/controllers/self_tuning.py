@@ -27,7 +27,7 @@ class SelfTuningState(NamedTuple):
 
 
 @law
-def owed(x, integral, kf, ki):
+def gradient(x, integral, kf, ki):
     """df/d(gain) of the gain that multiplies x, the loop closed and the surface giving way at once.
 
     There f = f_d + u_f, so that what a gain adds to u_f, kf and ki take back: x s/((1 + kf) s + ki).
@@ -86,7 +86,7 @@ class SelfTuning(NamedTuple):
         kf = self.middle[0] + net.output(memory, 0)
         ki = self.middle[1] + net.output(memory, 1)
         kd = self.middle[2] + net.output(memory, 2)
-        by_kf, by_kd = owed(error, state.by_ki, kf, ki), owed(slowing, state.by_kd, kf, ki)
+        by_kf, by_kd = gradient(error, state.by_ki, kf, ki), gradient(slowing, state.by_kd, kf, ki)
         by_ki = state.by_ki + self.tick * by_kf
         lacking = error - clip(error, self.dead_zone)
         net.want(memory, 0, lacking @ by_kf)

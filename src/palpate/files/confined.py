@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.files.limits import COPIES, OWN, Budget
+from palpate.files.limits import COPIES, OWN, ReadingBudget
 
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
 """Threads that libraries would start, one for each core, take address space of their own."""
@@ -30,7 +30,7 @@ _TOO_LARGE = 3
 
 
 def read_confined(
-    reader: str, path: Path, what: str, budget: Budget, question: Any = None
+    reader: str, path: Path, what: str, budget: ReadingBudget, question: Any = None
 ) -> tuple[dict[str, NDArray[Any]], Any]:
     """Read a file in a process of its own.
 

@@ -67,7 +67,7 @@ class LimitError(InputError):
 
 
 @dataclass
-class Budget:
+class ReadingBudget:
     """Remaining limits while one file is read.
 
     Args:

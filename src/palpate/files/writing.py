@@ -74,7 +74,7 @@ def _encodable(value: Any) -> Any:
     return [_encodable(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
-def signed(value: Mapping[str, Any]) -> dict[str, Any]:
+def with_author(value: Mapping[str, Any]) -> dict[str, Any]:
     """An object that is to be written as JSON, saying first who wrote it."""
     from palpate import __version__
 

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files import read_bytes, signed, write_json
+from palpate.files import read_bytes, with_author, write_json
 from palpate.force.arm import PositionLoop, Table
 from palpate.force.cells import Prover
 from palpate.force.claims import Claim
@@ -79,7 +79,9 @@ class Certificate(Table):
 
     def save(self, path: Path) -> None:
         """Writes the file, whole or not at all."""
-        write_json(path, signed({k: v for k, v in msgspec.to_builtins(self).items() if v not in ("", None)}))
+        write_json(
+            path, with_author({k: v for k, v in msgspec.to_builtins(self).items() if v not in ("", None)})
+        )
 
     def check_of(self, gains: Gains) -> None:
         """Refuses to speak of other gains.

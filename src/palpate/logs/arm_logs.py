@@ -26,7 +26,7 @@ _OFF = 0.1
 
 
 @dataclass(frozen=True)
-class Written:
+class PoseFormat:
     """One way to write a pose.
 
     Args:
@@ -38,21 +38,23 @@ class Written:
     roles: tuple[str | None, ...]
 
 
-def _matrix(order: str, across: bool, whole: bool) -> Written:
+def _matrix(order: str, across: bool, whole: bool) -> PoseFormat:
     """A rotation matrix by rows or by columns, behind the place or in a matrix of four by four."""
     turn = [[f"matrix_{i}{j}" for j in range(3)] for i in range(3)]
     cells = [[*row, place] for row, place in zip(turn, PLACE, strict=True)] + [[None] * 4]
     if not whole:
         flat = [turn[i][j] if across else turn[j][i] for i in range(3) for j in range(3)]
-        return Written(order, (*PLACE, *flat))
-    return Written(order, tuple(cells[i][j] if across else cells[j][i] for i in range(4) for j in range(4)))
+        return PoseFormat(order, (*PLACE, *flat))
+    return PoseFormat(
+        order, tuple(cells[i][j] if across else cells[j][i] for i in range(4) for j in range(4))
+    )
 
 
-_WAYS: dict[str, tuple[Written, ...]] = {
-    "quaternion": (Written("x,y,z,qx,qy,qz,qw", (*PLACE, *QUATERNION)),),
-    "quaternion-wxyz": (Written("x,y,z,qw,qx,qy,qz", (*PLACE, QUATERNION[3], *QUATERNION[:3])),),
-    "rotation-vector": (Written("x,y,z,rx,ry,rz", (*PLACE, "rotvec_x", "rotvec_y", "rotvec_z")),),
-    "rpy": (Written("x,y,z,roll,pitch,yaw", (*PLACE, "rpy_x", "rpy_y", "rpy_z")),),
+_WAYS: dict[str, tuple[PoseFormat, ...]] = {
+    "quaternion": (PoseFormat("x,y,z,qx,qy,qz,qw", (*PLACE, *QUATERNION)),),
+    "quaternion-wxyz": (PoseFormat("x,y,z,qw,qx,qy,qz", (*PLACE, QUATERNION[3], *QUATERNION[:3])),),
+    "rotation-vector": (PoseFormat("x,y,z,rx,ry,rz", (*PLACE, "rotvec_x", "rotvec_y", "rotvec_z")),),
+    "rpy": (PoseFormat("x,y,z,roll,pitch,yaw", (*PLACE, "rpy_x", "rpy_y", "rpy_z")),),
     "matrix": (
         _matrix("x,y,z,r11,r12,r13,r21,...", across=True, whole=False),
         _matrix("the 16 of a 4 x 4 matrix by rows", across=True, whole=True),

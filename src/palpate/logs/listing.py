@@ -24,7 +24,7 @@ from palpate.units import unit, unit_in_name
 
 
 @dataclass(frozen=True)
-class Entry:
+class SignalEntry:
     """One topic, variable or column.
 
     Args:
@@ -62,7 +62,7 @@ class Listing:
         facts: its statements about itself.
     """
 
-    entries: list[Entry]
+    entries: list[SignalEntry]
     troubles: list[str]
     proposal: Proposal
     facts: list[str] = field(default_factory=list)
@@ -90,7 +90,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     columns, unread = _read_columns(table)
     clock = clock_of(table, columns)
     entries = [_of_column(column, clock) for column in columns]
-    entries += [Entry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
+    entries += [SignalEntry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
     proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
     repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
@@ -114,12 +114,12 @@ def _fields(bag: Bag, name: str) -> tuple[str, ...]:
     return tuple(path for path, _ in leaves(bag.first(name)))
 
 
-def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> Entry:
+def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:
     topic = bag.topics[name]
     first, last = topic.times or (None, None)
     long = first is not None and last is not None and last > first
     rate = (topic.count - 1) / (last - first) if long and first is not None and last is not None else None
-    return Entry(name, topic.kind, topic.count, rate, first, last, _use(bag, name, fields), fields)
+    return SignalEntry(name, topic.kind, topic.count, rate, first, last, _use(bag, name, fields), fields)
 
 
 def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
@@ -153,20 +153,20 @@ def _read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:
     return statistics, unread
 
 
-def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> Entry:
+def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> SignalEntry:
     there = np.isfinite(column.values)
     count = int(there.sum())
     if not count:
-        return Entry(column.name, "text", 0, None, None, None, "not numbers")
+        return SignalEntry(column.name, "text", 0, None, None, None, "not numbers")
     kind = "date" if column.clock else "number"
     about = f"{column.values[there].min():.6g} to {column.values[there].max():.6g}"
     about += f" {column.unit}" if column.unit not in {None, "1"} else ""
     if clock is None or count < 2 or len(clock.values) != len(column.values):
-        return Entry(column.name, kind, count, None, None, None, about)
+        return SignalEntry(column.name, kind, count, None, None, None, about)
     time = clock.values[there] * _factor(clock)
     rate = (count - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else None
     about += " (time?)" if column is clock else ""
-    return Entry(column.name, kind, count, rate, float(time[0]), float(time[-1]), about)
+    return SignalEntry(column.name, kind, count, rate, float(time[0]), float(time[-1]), about)
 
 
 def _factor(clock: ColumnStatistics) -> float:

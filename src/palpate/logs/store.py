@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
-from palpate.files.limits import Budget, Limits
+from palpate.files.limits import Limits, ReadingBudget
 from palpate.logs.tables.parquet import read_columns, stored_about
 from palpate.records import Record
 
@@ -63,4 +63,4 @@ def read_record(path: str | Path, limits: Limits | None = None) -> Record:
     about = stored_about(path, limits)
     if about is None:
         raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")
-    return Record(read_columns(path, Budget(path, limits)), about.units, about.meta)
+    return Record(read_columns(path, ReadingBudget(path, limits)), about.units, about.meta)

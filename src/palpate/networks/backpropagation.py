@@ -26,7 +26,7 @@ def slope(s):
 
 
 @law
-def weighed(threshold, weights, signals):
+def weighted_sum(threshold, weights, signals):
     """A neuron's sum. The weights come as a slice: the compiler then knows that no index is below zero."""
     u = threshold
     for i in range(len(weights)):
@@ -50,7 +50,7 @@ def forward(sizes, weights, signals):  # (4.23), (4.24)
         here = before + n
         into = signals[before:here]
         for j in range(here, here + sizes[layer]):
-            signals[j] = sigmoid(weighed(weights[w], weights[w + 1 : w + 1 + n], into))
+            signals[j] = sigmoid(weighted_sum(weights[w], weights[w + 1 : w + 1 + n], into))
             w += n + 1
         before = here
 

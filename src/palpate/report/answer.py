@@ -56,7 +56,7 @@ class Extent:
 
 
 @dataclass(frozen=True)
-class Answer:
+class PageAnswer:
     """Content of a page.
 
     Args:
@@ -87,7 +87,13 @@ class Answer:
 
 
 def answer_page(
-    answer: Answer, *, room: str, command: str, package: str = "", codes: Sequence[str] = (), **values: Any
+    answer: PageAnswer,
+    *,
+    room: str,
+    command: str,
+    package: str = "",
+    codes: Sequence[str] = (),
+    **values: Any,
 ) -> str:
     """The page as HTML.
 

@@ -11,11 +11,11 @@ from palpate.maps.lumps import Lump
 from palpate.maps.presses import AXES
 from palpate.maps.result import MapResult
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import Table, embedded
+from palpate.report.page import Table, data_address
 from palpate.report.svg import svg
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
 def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
     """The page as HTML; a live one loads itself again."""
     field, interval = draw_map(result), draw_interval(result)
-    answer = Answer(
+    answer = PageAnswer(
         title=title,
         sentence=sentence(result),
         about=f"{len(result.map)} presses. Interpolated by a Gaussian process on the logarithm of the stiffness; "
@@ -135,15 +135,15 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         ],
         cards={"": _cards(result)},
         pairs=[
-            {"source": embedded(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
+            {"source": data_address(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
             {
-                "source": embedded(svg(interval), "image/svg+xml"),
+                "source": data_address(svg(interval), "image/svg+xml"),
                 "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
                 f"{_GOALS[result.request.goal]}.",
             },
             *(
                 {
-                    "source": embedded(svg(draw_field(result, name)), "image/svg+xml"),
+                    "source": data_address(svg(draw_field(result, name)), "image/svg+xml"),
                     "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
                     f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
                     f"{_display_unit(result, name)[1]}.",
@@ -236,7 +236,7 @@ def draw_map(result: MapResult) -> Figure:
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
     seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
-    with style.inked(9.0):
+    with style.ink(9.0):
         figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
         low, high = bar.ax.get_xlim()
         steps = MaxNLocator(5, steps=(1, 2, 5, 10)) if high < 8.0 * low else LogLocator(subs=(1.0, 2.0, 5.0))
@@ -256,7 +256,7 @@ def draw_map(result: MapResult) -> Figure:
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
     half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
-    with style.inked(9.0):
+    with style.ink(9.0):
         figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
         for k, (x, y) in enumerate(coordinates):
@@ -268,7 +268,7 @@ def draw_interval(result: MapResult) -> Figure:
 def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
     (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
-    with style.inked(9.0):
+    with style.ink(9.0):
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
         at = 1e3 * result.map.surface.coordinates(result.map.places[known])
@@ -321,7 +321,7 @@ def draw_cut(result: MapResult) -> Figure:
     offsets = surface.coordinates(result.map.places) - begin
     along, beside = offsets @ way, np.abs(offsets @ np.array([-way[1], way[0]]))
     near = (beside < 0.05 * length) & (along >= 0.0) & (along <= length)
-    with style.inked():
+    with style.ink():
         figure, (axis,) = style.figure(height=2.6)
         x = 1e3 * length * steps
         axis.plot(x, seen.stiffness, color=style.K, linewidth=1.6, label="stiffness")

@@ -105,7 +105,7 @@ _WIDTH = 100
 """Letters of a line in a notebook."""
 
 
-def printed(show: Callable[[Console], None]) -> str:
+def console_text(show: Callable[[Console], None]) -> str:
     """Console output of a function, as plain text."""
     from io import StringIO
 

@@ -50,13 +50,13 @@ def page(
         about=about,
         notes=notes,
         tables=tables,
-        figures=captioned(figures),
+        figures=with_captions(figures),
         source=source,
         command=command,
     )
 
 
-def captioned(figures: Mapping[Path, str]) -> list[dict[str, str]]:
+def with_captions(figures: Mapping[Path, str]) -> list[dict[str, str]]:
     """PNG files with a caption each, as a page holds them."""
     return [{"source": png(path), "caption": caption} for path, caption in figures.items()]
 
@@ -98,9 +98,9 @@ def advice(text: str) -> Markup:
 
 def png(path: Path) -> str:
     """A PNG file as the source of an image that lies in the page itself."""
-    return embedded(path.read_bytes(), "image/png")
+    return data_address(path.read_bytes(), "image/png")
 
 
-def embedded(data: bytes, kind: str) -> str:
+def data_address(data: bytes, kind: str) -> str:
     """Anything as the source of an image that lies in the page itself; `kind` is its media type."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"

@@ -10,7 +10,7 @@ from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Table, embedded, render
+from palpate.report.page import Table, data_address, render
 from palpate.report.svg import svg
 from palpate.text import printable
 
@@ -72,7 +72,7 @@ def page(found: Weighed, title: str = "a record") -> str:
         tables=[table(found)],
         figures=[
             {
-                "source": embedded(svg(draw(found)), "image/svg+xml"),
+                "source": data_address(svg(draw(found)), "image/svg+xml"),
                 "caption": "The force in each orientation: measured (dots) and predicted from tool and bias (rings)",
             }
         ],
@@ -93,7 +93,7 @@ def _half(half: float) -> str:
 
 def draw(found: Weighed) -> Figure:
     """The force in each orientation, measured (dots) and of tool and bias (rings)."""
-    with style.inked():
+    with style.ink():
         figure, (axis,) = style.figure(height=2.8)
         places = np.arange(1, len(found.shown) + 1)
         for i, (name, colour) in enumerate(zip("xyz", style.SERIES[:3], strict=True)):

@@ -18,13 +18,13 @@ from palpate.press.setting import Place
 from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import DATA, PAIRS
 from palpate.report.numbers import NONE, plain, quantity
-from palpate.report.page import Table, embedded
+from palpate.report.page import Table, data_address
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
@@ -217,7 +217,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     """Writes figures, film.svg and report.html into a folder."""
     figures = []
     for name, draw in (("touch", _touch), ("force", _force), ("torque", _torque)):
-        with style.inked():
+        with style.ink():
             drawing, caption = draw(record, asked)
             style.save(drawing, folder / f"{name}.png")
             figures.append({"panels": panels_of(drawing), "caption": caption})
@@ -228,7 +228,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     }
     halves = [
         {
-            "source": embedded(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
+            "source": data_address(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
             "caption": told,
         }
         for half, told in captions.items()
@@ -236,7 +236,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     loop, parameters = summary["loop"], (summary["identified"] or {}).get("parameters", {})
     contact = summary["force"] is not None
     wanted = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
-    answer = Answer(
+    answer = PageAnswer(
         title=f"A press of {asked.arm.title}{wanted}",
         sentence=sentence(summary, parameters),
         about=f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "

@@ -12,7 +12,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.look.assets import with_peaks
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Table, embedded, render
+from palpate.report.page import Table, data_address, render
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def draw(record: Record) -> Figure:
     if not names:
         raise InputError("this record has no numeric column besides its time; there is nothing to draw")
     time = record[clock] if clock else np.arange(len(record), dtype=float)
-    with style.inked():
+    with style.ink():
         figure, axes = style.figure(rows=len(names), height=1.6)
         for axis, name in zip(axes, names, strict=True):
             axis.plot(*with_peaks(time, record[name], _POINTS), color=style.SERIES[0], linewidth=0.9)
@@ -98,7 +98,7 @@ def page(record: Record) -> str:
             if len(record.columns) > _DRAWN
             else "Its columns over time"
         )
-        figures = [{"source": embedded(svg(draw(record)), "image/svg+xml"), "caption": caption}]
+        figures = [{"source": data_address(svg(draw(record)), "image/svg+xml"), "caption": caption}]
     return render(
         "page.html",
         title="A record",

@@ -17,7 +17,7 @@ from palpate.force.sliding.slide_world import COLUMNS, SETTLED, figures_of
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Answer, Card, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
 
@@ -86,7 +86,7 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     units = {name: _UNITS.get(name, "1") for name in columns}
     write_record(Record(columns, units, {"command": summary["command"]}), folder / record)
-    with style.inked():
+    with style.ink():
         drawing = _drawn(rows, gains, summary)
         style.save(drawing, folder / "slide.png")
         panels = panels_of(drawing)
@@ -100,7 +100,7 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
         {"panels": panels[:-1], "caption": caption},
         {"panels": panels[-1:], "caption": "Speed along the path."},
     ]
-    answer = Answer(
+    answer = PageAnswer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",

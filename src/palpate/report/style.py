@@ -36,7 +36,7 @@ _LONG = 15
 
 
 @contextmanager
-def inked(size: float | None = None) -> Iterator[None]:
+def ink(size: float | None = None) -> Iterator[None]:
     """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them.
 
     What is given no colour takes those of `SERIES` in turn.

@@ -135,7 +135,7 @@ def prepare() -> None:
         os.dup2(2, 1)
 
 
-def opened(kind: str, where: str) -> Hosted:
+def open_hosted(kind: str, where: str) -> Hosted:
     """The wire of an address, in this process."""
     if kind == "rtde":
         from palpate.wires.ur import RtdeWire
@@ -153,7 +153,7 @@ def main() -> None:
     theirs = socket.socket(fileno=int(number))
     theirs.send(realtime.text(realtime.STARTED))
     try:
-        wire = opened(kind, where)
+        wire = open_hosted(kind, where)
         theirs.send(realtime.text(realtime.READY, f"{wire.title}\n{wire.watchdog}\n{wire.source}"))
         Host(wire, theirs).run()
         wire.close()

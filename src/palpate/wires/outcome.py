@@ -17,7 +17,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files import RECORD, check_place, fresh_folder, signed, write_json
+from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.wires.at_rest import AtRest
@@ -139,7 +139,7 @@ class Rows:
             raise InputError(f"{folder} exists; choose another place for --record")
         check_place(folder, "--record")
         with fresh_folder(folder, replace=False) as draft:
-            write_json(draft / _HEAD, signed({"unfinished": True, **about}))
+            write_json(draft / _HEAD, with_author({"unfinished": True, **about}))
             _reserve(draft / _ROWS, 8 * most * len(UNITS))
         self._rows = np.memmap(folder / _ROWS, dtype=np.float64, mode="r+", shape=shape)
 
@@ -207,7 +207,7 @@ def _finish(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
     if len(record):
         write_record(record, folder / RECORD)
     outcome = {name: value for name, value in outcome.items() if name != "written_by"}
-    write_json(folder / _HEAD, signed(outcome))
+    write_json(folder / _HEAD, with_author(outcome))
     (folder / _ROWS).unlink()
     return folder / RECORD
 

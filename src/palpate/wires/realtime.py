@@ -20,7 +20,7 @@ _BOTH = 3  # MCL_CURRENT | MCL_FUTURE
 
 
 @contextmanager
-def hurried(wanted: bool) -> Iterator[str]:
+def realtime_priority(wanted: bool) -> Iterator[str]:
     """Within the block this process goes before others, stays in memory and collects no garbage; yields what was given.
 
     Args:

@@ -29,12 +29,12 @@ class State(NamedTuple):
     values: tuple[float, ...]
 
 
-def packed(kind: int, session: int, body: bytes = b"") -> bytes:
+def pack(kind: int, session: int, body: bytes = b"") -> bytes:
     """Bytes of a datagram."""
     return _HEAD.pack(MAGIC, kind, session) + body
 
 
-def unpacked(data: bytes) -> tuple[int, int, bytes] | None:
+def unpack(data: bytes) -> tuple[int, int, bytes] | None:
     """Kind, session and body of a datagram; None of one that is none."""
     if len(data) < _HEAD.size:
         return None
@@ -126,13 +126,13 @@ class SimWire:
     def _greet(self) -> float:
         end = time.monotonic() + _ANSWER
         while (left := end - time.monotonic()) > 0:
-            self._socket.send(packed(HELLO, self._session))
+            self._socket.send(pack(HELLO, self._session))
             self._socket.settimeout(min(left, 0.2))
             try:
                 data = self._socket.recv(512)
             except TimeoutError:
                 continue
-            found = unpacked(data)
+            found = unpack(data)
             if found is None:
                 raise InputError(f"{self._where} speaks another protocol; is it the port of a simulated arm?")
             kind, session, body = found
@@ -172,7 +172,7 @@ class SimWire:
 
     def _sense(self, data: bytes) -> Sense | None:
         received = time.monotonic()
-        found = unpacked(data)
+        found = unpack(data)
         if found is None or found[0] != STATE or found[1] != self._session:
             return None
         state = read_state(found[2])
@@ -192,7 +192,7 @@ class SimWire:
         """Send the desired speed."""
         self._sent += 1
         try:
-            self._socket.send(packed(MOVE, self._session, move(self._sent, command.velocity)))
+            self._socket.send(pack(MOVE, self._session, move(self._sent, command.velocity)))
         except OSError as error:
             raise LostError(f"a command could not be sent: {error.strerror or error}") from None
 
@@ -200,7 +200,7 @@ class SimWire:
         """Rest; said three times, as a datagram may be lost."""
         for _ in range(3):
             try:
-                self._socket.send(packed(STOP, self._session))
+                self._socket.send(pack(STOP, self._session))
             except OSError:
                 return
 

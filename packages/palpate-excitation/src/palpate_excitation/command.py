@@ -26,7 +26,7 @@ _FASTEST = 200_000
 
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
-class SurfaceOptions:
+class SurfaceRangeOptions:
     """Range of the surfaces.
 
     Parameters
@@ -227,7 +227,7 @@ class LoopOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(PictureOptions, FileOptions):
+class ExcitationOutput(PictureOptions, FileOptions):
     """Files to write.
 
     Parameters
@@ -260,12 +260,12 @@ class OutputOptions(PictureOptions, FileOptions):
 
 def excite(
     *,
-    surface: SurfaceOptions,
+    surface: SurfaceRangeOptions,
     limits: BudgetOptions,
     goal: GoalOptions | None = None,
     sensor: SensorOptions | None = None,
     robot: LoopOptions | None = None,
-    output: OutputOptions | None = None,
+    output: ExcitationOutput | None = None,
 ) -> int:
     """Design a force that identifies a surface, and predict the uncertainty.
 
@@ -279,7 +279,7 @@ def excite(
     from palpate_excitation import Problem
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
-    robot, output = robot or LoopOptions(), output or OutputOptions()
+    robot, output = robot or LoopOptions(), output or ExcitationOutput()
     picture = output.picture("excite.png")
     output.check_all()
     surfaces = surface.range()
@@ -298,7 +298,7 @@ def excite(
     return _answer(problem, sensor.rate, output, picture)
 
 
-def _answer(problem: Problem, rate: int, output: OutputOptions, picture: Path | None) -> int:
+def _answer(problem: Problem, rate: int, output: ExcitationOutput, picture: Path | None) -> int:
     from palpate_excitation import design, remedies
 
     found = design(problem)

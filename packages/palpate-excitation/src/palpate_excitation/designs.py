@@ -15,7 +15,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.references import Chirp, Multisine
 from palpate_excitation import multisine
-from palpate_excitation.force_loops import Made, Prediction, Wave
+from palpate_excitation.force_loops import Made, SurfaceResponse, Wave
 from palpate_excitation.multisine import error_of_sweep
 from palpate_excitation.problem import LONGEST, Problem, used_up
 
@@ -70,7 +70,9 @@ def _predict_chirp(problem: Problem, sweep: Chirp) -> Made:
         travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
         between = (problem.budget.mean - felt, problem.budget.mean + felt)
         predictions.append(
-            Prediction(surface, problem.surfaces.names, known[0], problem.prior, *known[1:], between, travel)
+            SurfaceResponse(
+                surface, problem.surfaces.names, known[0], problem.prior, *known[1:], between, travel
+            )
         )
     return Made(sweep, tuple(predictions), gap=0.0)
 
@@ -106,7 +108,7 @@ class Design:
         return self.made.wave
 
     @property
-    def predictions(self) -> tuple[Prediction, ...]:
+    def predictions(self) -> tuple[SurfaceResponse, ...]:
         """One a surface, the middle first."""
         return self.made.predictions
 

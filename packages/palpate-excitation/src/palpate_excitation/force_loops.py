@@ -236,7 +236,7 @@ POWER_KNOWN = 0.3
 
 
 @dataclass(frozen=True)
-class Prediction:
+class SurfaceResponse:
     """Of one surface.
 
     Args:
@@ -281,7 +281,7 @@ class Made:
     """
 
     wave: Wave
-    predictions: tuple[Prediction, ...]
+    predictions: tuple[SurfaceResponse, ...]
     gap: float
 
     def worst(self, seconds: float) -> dict[str, float]:

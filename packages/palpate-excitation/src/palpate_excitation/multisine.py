@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError
 from palpate.references import Multisine
-from palpate_excitation.force_loops import Made, Prediction
+from palpate_excitation.force_loops import Made, SurfaceResponse
 from palpate_excitation.problem import Problem, used_up
 from palpate_excitation.spectra import optimal
 
@@ -219,7 +219,9 @@ def _within_budget(
         known = problem.predicted(surface, omega, force * start, error[:, harmonics], seconds, together=True)
         names, prior = problem.surfaces.names, problem.prior
         predictions.append(
-            Prediction(surface, names, known[0], prior, known[1], known[2], between, float(np.ptp(moved)))
+            SurfaceResponse(
+                surface, names, known[0], prior, known[1], known[2], between, float(np.ptp(moved))
+            )
         )
     frequencies = omega / (2 * np.pi)
     wave = Multisine(tuple(frequencies.tolist()), tuple(amplitudes.tolist()), tuple(phases.tolist()))

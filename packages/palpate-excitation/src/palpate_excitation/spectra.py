@@ -195,7 +195,7 @@ _CLOSE = 0.01
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class PowerSpectrum:
     """Powers, and how good they are.
 
     Args:
@@ -214,7 +214,7 @@ def optimal(
     criterion: str = "worst",
     costs: Array | None = None,
     start: Array | None = None,
-) -> Spectrum:
+) -> PowerSpectrum:
     """The optimal powers.
 
     Args:
@@ -246,7 +246,7 @@ def optimal(
             break
         powers = powers * (sensitivity / mean) ** _ROOTS[criterion]
         powers /= powers @ price
-    return Spectrum(powers, gap)
+    return PowerSpectrum(powers, gap)
 
 
 def covariance(information: Array, prior: Array) -> Array:

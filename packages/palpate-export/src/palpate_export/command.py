@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 from palpate.cli.one_log import read_found
 from palpate.cli.toolkit import STYLE, command, console, head, place, print_answer, show_table
 from palpate.errors import InputError
-from palpate.files import MADE, signed, whole, write_json
+from palpate.files import MADE, whole, with_author, write_json
 from palpate_export.contact import contact_from
 from palpate_export.exporting import Request, check, prepare
 
 if TYPE_CHECKING:
-    from palpate.cli.export import GivenOptions, OutputOptions, SceneOptions
+    from palpate.cli.export import ExportOutput, GivenOptions, SceneOptions
     from palpate_export.exporting import Checked, Exported
 
 
-def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, output: OutputOptions) -> int:
+def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, output: ExportOutput) -> int:
     """Write the contact of an identified surface, and press it if that is wanted.
 
     Returns:
@@ -42,13 +42,13 @@ def export_scene(found: Path | None, scene: SceneOptions, given: GivenOptions, o
     exported = prepare(contact, request, out)
     checked = _write(exported, out, output.check)
     told = _as_json(exported, out, checked)
-    write_json(beside, signed(told))
+    write_json(beside, with_author(told))
     _print(exported, told, checked, (out, beside), json=output.json)
     verdicts = [one.within_tolerance for one in checked if one.within_tolerance is not None]
     return 1 if output.check and not (verdicts and all(verdicts)) else 0
 
 
-def _check_places(places: tuple[Path, ...], output: OutputOptions, model: Path | None) -> None:
+def _check_places(places: tuple[Path, ...], output: ExportOutput, model: Path | None) -> None:
     for path in places:
         if model is not None and path.absolute() == model.absolute():
             raise InputError(f"--out {path} is the scene itself; name another file")

@@ -141,11 +141,11 @@ def live(
 
 def _simulation(name: str, seed: int, whole: bool) -> RowSource:
     from palpate.bench.tables import load
-    from palpate_live.simulation import Simulation
+    from palpate_live.simulation import WatchedSimulation
 
     experiment = load(name)
     try:
-        return Simulation(experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
+        return WatchedSimulation(experiment, seed, whole=whole, waiting=lambda: say(COMPILING))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 

@@ -119,7 +119,7 @@ class Pause(msgspec.Struct, tag="pause", tag_field="do", forbid_unknown_fields=T
     on: bool
 
 
-class Step(msgspec.Struct, tag="step", tag_field="do", forbid_unknown_fields=True):
+class NextMoment(msgspec.Struct, tag="step", tag_field="do", forbid_unknown_fields=True):
     """Stand still a moment later."""
 
 
@@ -148,7 +148,7 @@ class Pace(msgspec.Struct, tag="pace", tag_field="do", forbid_unknown_fields=Tru
     value: float
 
 
-Request = Pause | Step | Reset | Set | Seek | Pace
+Request = Pause | NextMoment | Reset | Set | Seek | Pace
 
 
 def made_ready() -> None:
@@ -298,7 +298,7 @@ class Player:
                 self._playing = not on
                 if not on and self.source.state.ended:
                     self._begin(None)
-            case Step():
+            case NextMoment():
                 self._playing = False
                 self._advance(STEP)
             case Reset(seed):

@@ -32,7 +32,7 @@ from palpate_live.view import (
     STRIDE,
     Happened,
     Slider,
-    State,
+    SourceState,
     View,
     ViewScene,
     check_ahead,
@@ -72,7 +72,7 @@ class PressingArm:
         self._series = series_of(asked.gains.arm)
         self._stride = max(1, round(STRIDE * asked.gains.arm.rate))
         sliders = _sliders(asked.gains)
-        self.state = State(values={slider.key: slider.value for slider in sliders}, seed=seed)
+        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
         self.view = View(
             title=printable(asked.arm.title),
             about=printable(f"{asked.gains.arm.title}; the cautious law of palpate tune, own physics"),

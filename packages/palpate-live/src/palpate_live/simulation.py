@@ -26,7 +26,7 @@ from palpate_live.view import (
     STRIDE,
     Happened,
     Slider,
-    State,
+    SourceState,
     View,
     check_ahead,
     planar_bones,
@@ -51,7 +51,7 @@ _INTO = [AT[name] for name in _TAKEN]
 _OUT = [_FROM[name] for name in _TAKEN.values()]
 
 
-class Simulation:
+class WatchedSimulation:
     """An experiment that is run as long as somebody watches.
 
     Args:
@@ -73,7 +73,7 @@ class Simulation:
         waiting: Callable[[], None] | None = None,
     ):
         self._experiment, self._whole, self._waiting = experiment, whole, waiting
-        self.state = State(seed=seed)
+        self.state = SourceState(seed=seed)
         bench = build(experiment)
         check_parts(bench, waiting)
         self._rate = experiment.run.rate

@@ -168,7 +168,7 @@ class Happened:
 
 
 @dataclass
-class State:
+class SourceState:
     """How a source stands, beside its rows.
 
     Args:
@@ -229,7 +229,7 @@ class RowSource(Protocol):
     """The source of rows: a simulation, or a replayed log."""
 
     view: View
-    state: State
+    state: SourceState
 
     @property
     def loop_asked(self) -> Any:
@@ -320,7 +320,7 @@ class Replay:
         self._all = signals.happened
         there = tuple(name for name in COLUMNS if np.isfinite(self._rows[:, AT[name]]).any())
         self.view = View(**{**vars(view), "shown": there, "span": (float(t[0]), float(t[-1]))})
-        self.state = State()
+        self.state = SourceState()
         self._first = float(t[0]) if first is None else first
         self._now, self._at = self._first, 0
 

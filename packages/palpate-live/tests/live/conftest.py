@@ -11,7 +11,7 @@ import pytest
 from palpate.bench.tables import changed, load
 from palpate_live.player import Feed, Player
 from palpate_live.server import serve
-from palpate_live.simulation import Simulation
+from palpate_live.simulation import WatchedSimulation
 from palpate_live.view import AT, COLUMNS
 
 PATIENCE = headless.PATIENCE
@@ -73,7 +73,7 @@ def near(name="foam-hybrid", **more):
 
 @pytest.fixture
 def simulation():
-    return Simulation(near(), seed=1)
+    return WatchedSimulation(near(), seed=1)
 
 
 @contextmanager

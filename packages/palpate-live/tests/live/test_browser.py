@@ -12,7 +12,7 @@ from live.conftest import PATIENCE, near, playing
 from live.test_server import Clock
 from palpate_live.pressing import PressingArm
 from palpate_live.recorded_run import clear_at_restarts
-from palpate_live.simulation import Simulation
+from palpate_live.simulation import WatchedSimulation
 from palpate_live.view import Replay, ReplayedSignals, View
 
 MS = 1000 * PATIENCE
@@ -50,7 +50,7 @@ def opened(browser, address, **context):
 
 @pytest.fixture(scope="module")
 def served_simulation():
-    with playing(Simulation(near(), seed=1)) as (player, address, _):
+    with playing(WatchedSimulation(near(), seed=1)) as (player, address, _):
         yield player, address
 
 
@@ -111,7 +111,7 @@ def test_two_pages_at_once_see_the_same(browser, served_simulation):
 
 
 def test_gone_and_back(browser):
-    source = Simulation(near(), seed=1)
+    source = WatchedSimulation(near(), seed=1)
     with playing(source) as (_, address, _client):
         with opened(browser, address) as page:
             until(page, "palpate.live.rows > 10")

@@ -88,10 +88,10 @@ def test_an_arm_is_a_scene_of_lines():
     """As Foxglove's own library encodes it: an arm and a surface, in SI."""
     from palpate.bench.tables import load
     from palpate_live.foxglove import viewers
-    from palpate_live.simulation import Simulation
+    from palpate_live.simulation import WatchedSimulation
 
     with (
-        Player(Simulation(load("foam-hybrid")), Feed()) as player,
+        Player(WatchedSimulation(load("foam-hybrid")), Feed()) as player,
         viewers(player, 0) as (line,),
         connected(line.removeprefix("viewers: ")) as client,
     ):

@@ -13,7 +13,7 @@ from live.conftest import PATIENCE, Stream, playing
 from palpate.errors import InputError
 from palpate_live.player import Feed, Player
 from palpate_live.server import READERS, serve
-from palpate_live.view import AT, COLUMNS, State, View
+from palpate_live.view import AT, COLUMNS, SourceState, View
 
 
 class Clock:
@@ -23,7 +23,7 @@ class Clock:
         self.view = View(
             title="<b>clock</b>", about="</script><script>alert(1)</script>", kind="simulation", rate=200.0
         )
-        self.state = State(values={"speed": 1.0}, seed=0)
+        self.state = SourceState(values={"speed": 1.0}, seed=0)
         self.count, self.most = 0, most
 
     def advance(self, seconds):

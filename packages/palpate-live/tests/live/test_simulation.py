@@ -10,7 +10,7 @@ import pytest
 from live.conftest import near
 from palpate.bench import build
 from palpate.errors import InputError
-from palpate_live.simulation import Simulation
+from palpate_live.simulation import WatchedSimulation
 from palpate_live.view import AT, STRIDE
 
 
@@ -52,13 +52,13 @@ def test_it_begins_shortly_before_the_touch_and_the_same_again(simulation):
 
 
 def test_the_whole_approach_is_there_if_asked_for():
-    whole = Simulation(near(), seed=1, whole=True)
+    whole = WatchedSimulation(near(), seed=1, whole=True)
     assert pressed(whole, 0.1)[0, 0] == pytest.approx(0.004)
 
 
 @pytest.mark.parametrize("surface", ["foam-hybrid", "foam-viscoelastic"])
 def test_a_surface_that_changes_bears_the_force_of_that_moment(surface):
-    simulation = Simulation(near(surface), seed=1)
+    simulation = WatchedSimulation(near(surface), seed=1)
     before = pressed(simulation, 4.0)
     simulation.set("surface.stiffness", 4.0 * simulation.state.values["surface.stiffness"])
     after = pressed(simulation, 0.05)
@@ -113,7 +113,7 @@ def test_sliders_take_nothing_else(simulation, key, value):
 
 
 def test_controllers_without_a_force_gain_say_so():
-    simulation = Simulation(near("foam-impedance"), seed=0)
+    simulation = WatchedSimulation(near("foam-impedance"), seed=0)
     assert "controller.kf" not in simulation.state.values
     assert any("no force gain" in note for note in simulation.view.notes)
 

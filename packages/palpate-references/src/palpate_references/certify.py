@@ -17,7 +17,7 @@ import numpy as np
 from mpmath import mp  # type: ignore[import-untyped]
 
 from palpate_references.models import FLOATS, MODELS, Functions, SineMotion
-from palpate_references.problem import Certified, Problem, motion_and_force
+from palpate_references.problem import Certified, CertifiedProblem, motion_and_force
 
 mp.dps = 60
 HERE = Path(__file__).parent
@@ -180,7 +180,7 @@ def profile_newton(law: Any, path: SineMotion, force: Any, start: dict[str, Any]
     return dict(zip(law.linear, linear(values)[0], strict=True)) | values
 
 
-def certify(problem: Problem) -> Problem:
+def certify(problem: CertifiedProblem) -> CertifiedProblem:
     """The problem with its certified parameters.
 
     Raises:
@@ -217,7 +217,7 @@ def main() -> None:
             name = f"{model}-{number + 1}"
             log(name, model, **numbers)
             amplitude, frequency, phase = zip(*numbers["sines"], strict=True)
-            problem = Problem(
+            problem = CertifiedProblem(
                 name=name, level=level, about=about, model=model, mean="0.003", amplitude=amplitude,
                 frequency=frequency, phase=phase, starts={k: _FAR[k] for k in MODELS[model].nonlinear}, certified={},
                 residual_std="0", rows=150,

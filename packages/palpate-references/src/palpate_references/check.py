@@ -14,7 +14,7 @@ from palpate.identification.estimators.descent import Descent
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, NonlinearParameter
 from palpate_references.models import FLOATS, SineMotion
-from palpate_references.problem import Problem, motion_and_force
+from palpate_references.problem import CertifiedProblem, motion_and_force
 
 MOST = 11.0
 """Certified digits."""
@@ -44,7 +44,7 @@ class Score:
         digits_std: that of the worst standard deviation; None of a solver that gives none.
     """
 
-    problem: Problem
+    problem: CertifiedProblem
     solver: str
     start: int
     digits: float
@@ -59,7 +59,7 @@ def digits_of(value: float, certified: float) -> float:
     return min(max(-log10(error) if error > 0.0 else inf, 0.0), MOST)
 
 
-def palpate_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
+def palpate_solver(problem: CertifiedProblem, start: dict[str, float]) -> SolverResult:
     """The search of `palpate identify`, without its filters and its priors, until the sum of squares stands."""
     path, force = motion_and_force(problem)
     law = problem.law
@@ -83,7 +83,7 @@ def palpate_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
     return SolverResult(values, _deviations(problem, path, force, values))
 
 
-def scipy_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
+def scipy_solver(problem: CertifiedProblem, start: dict[str, float]) -> SolverResult:
     """`scipy.optimize.least_squares`, method "lm", tolerances of 1e-15, all parameters at once."""
     from scipy.optimize import least_squares
 
@@ -103,7 +103,7 @@ def scipy_solver(problem: Problem, start: dict[str, float]) -> SolverResult:
         return SolverResult(values, _deviations(problem, path, force, values))
 
 
-def lstsq_solver(problem: Problem, _start: dict[str, float]) -> SolverResult:
+def lstsq_solver(problem: CertifiedProblem, _start: dict[str, float]) -> SolverResult:
     """`numpy.linalg.lstsq`, of a linear model."""
     path, force = motion_and_force(problem)
     theta = np.linalg.lstsq(_regressors(problem, path), force, rcond=None)[0]
@@ -111,7 +111,7 @@ def lstsq_solver(problem: Problem, _start: dict[str, float]) -> SolverResult:
     return SolverResult(values, _deviations(problem, path, force, values))
 
 
-def recursive_solver(problem: Problem, _start: dict[str, float]) -> SolverResult:
+def recursive_solver(problem: CertifiedProblem, _start: dict[str, float]) -> SolverResult:
     """`palpate.identifiers.RecursiveLeastSquares` of a linear model, a row at a time, from zero."""
     from palpate.identifiers import RecursiveLeastSquares
 
@@ -126,7 +126,7 @@ def recursive_solver(problem: Problem, _start: dict[str, float]) -> SolverResult
     return SolverResult(values, {})
 
 
-Solver = Callable[[Problem, dict[str, float]], SolverResult]
+Solver = Callable[[CertifiedProblem, dict[str, float]], SolverResult]
 SOLVERS: dict[str, Solver] = {
     "palpate": palpate_solver,
     "scipy least_squares": scipy_solver,
@@ -137,7 +137,7 @@ LINEAR = {"numpy lstsq", "palpate recursive"}
 """Solvers of linear models alone."""
 
 
-def scores(problem: Problem, solver: str) -> Iterator[Score]:
+def scores(problem: CertifiedProblem, solver: str) -> Iterator[Score]:
     """Digits of a solver from each start; none where it does not take the model."""
     if problem.starts and solver in LINEAR:
         return
@@ -150,24 +150,24 @@ def scores(problem: Problem, solver: str) -> Iterator[Score]:
         yield Score(problem, solver, number, worst, min(std) if std else None)
 
 
-def _size(problem: Problem, name: str) -> float:
+def _size(problem: CertifiedProblem, name: str) -> float:
     """Order of a nonlinear parameter: the larger of its starts."""
     return max(abs(float(text)) for text in problem.starts[name])
 
 
-def _range(problem: Problem, name: str) -> tuple[float, float]:
+def _range(problem: CertifiedProblem, name: str) -> tuple[float, float]:
     """Where a nonlinear parameter is looked for: between its starts, and as far beyond either."""
     low, high = (float(text) for text in problem.starts[name])
     return 2.0 * low - high, 2.0 * high - low
 
 
-def _regressors(problem: Problem, path: SineMotion) -> Array:
+def _regressors(problem: CertifiedProblem, path: SineMotion) -> Array:
     """Columns of a linear model, shape (n, p)."""
     return np.column_stack(problem.law.columns(path, {}, FLOATS))
 
 
 def _deviations(
-    problem: Problem, path: SineMotion, force: Array, values: dict[str, float]
+    problem: CertifiedProblem, path: SineMotion, force: Array, values: dict[str, float]
 ) -> dict[str, float]:
     """Standard deviations by the Jacobian, of central differences in the nonlinear parameters."""
     law = problem.law

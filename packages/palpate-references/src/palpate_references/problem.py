@@ -18,7 +18,7 @@ class Certified(msgspec.Struct, frozen=True):
     std: str
 
 
-class Problem(msgspec.Struct, frozen=True, kw_only=True):
+class CertifiedProblem(msgspec.Struct, frozen=True, kw_only=True):
     """One certified log.
 
     Args:
@@ -52,9 +52,11 @@ class Problem(msgspec.Struct, frozen=True, kw_only=True):
         return MODELS[self.model]
 
 
-def problems() -> list[Problem]:
+def problems() -> list[CertifiedProblem]:
     """Every certified log, in the order of the table."""
-    return msgspec.json.decode(files(__package__).joinpath("certified.json").read_bytes(), type=list[Problem])
+    return msgspec.json.decode(
+        files(__package__).joinpath("certified.json").read_bytes(), type=list[CertifiedProblem]
+    )
 
 
 def log_text(name: str) -> str:
@@ -62,7 +64,7 @@ def log_text(name: str) -> str:
     return files(__package__).joinpath("logs", f"{name}.csv").read_text(encoding="utf-8")
 
 
-def motion_and_force(problem: Problem, number: Any = float) -> tuple[SineMotion, Any]:
+def motion_and_force(problem: CertifiedProblem, number: Any = float) -> tuple[SineMotion, Any]:
     """SineMotion and forces of a log as numbers of a type, from the exact decimals.
 
     Args:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from palpate.cli.options.flags import FLAG
-from palpate.cli.toolkit import console, counted, place, print_answer, print_lines, show_table
+from palpate.cli.toolkit import console, place, print_answer, print_lines, progress_of_pieces, show_table
 
 if TYPE_CHECKING:
     from palpate_references.check import Score
-    from palpate_references.problem import Problem
+    from palpate_references.problem import CertifiedProblem
 
 
 def references(
@@ -59,12 +59,12 @@ def references(
     return _check(known, json=json)
 
 
-def _check(known: list[Problem], *, json: bool) -> int:
+def _check(known: list[CertifiedProblem], *, json: bool) -> int:
     from palpate.report.page import Table
     from palpate_references.check import ENOUGH, SOLVERS, scores
 
     summary: dict[str, dict[str, Any]] = {}
-    with counted(console(stderr=True)) as show:
+    with progress_of_pieces(console(stderr=True)) as show:
         for solver in SOLVERS:
             rows: list[Score] = []
             for number, problem in enumerate(known):

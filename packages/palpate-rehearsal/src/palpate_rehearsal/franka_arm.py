@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.errors import InputError
-from palpate_rehearsal.rehearsal import OneDirection, arm_of, loopback, paced, ready, words_of
+from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, loopback, ready, ticks, words_of
 
 _Q = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
 _RATE = 1000.0
@@ -19,7 +19,7 @@ _MOST = 20
 """Commands missing in a row at which the motion ends (Franka Control Interface)."""
 
 
-def robot_of(arm: OneDirection) -> Any:
+def robot_of(arm: ToolAxisArm) -> Any:
     """Robot for franky-sim's server, with the arm of one direction behind it."""
     try:
         from franky_sim import BaseRobot
@@ -28,7 +28,7 @@ def robot_of(arm: OneDirection) -> Any:
     except ImportError:
         raise InputError("this arm needs franky-sim: pip install franky-sim") from None
 
-    class Robot(BaseRobot):  # type: ignore[misc, unused-ignore]
+    class FrankaRobot(BaseRobot):  # type: ignore[misc, unused-ignore]
         """The arm; its tool points down."""
 
         def __init__(self) -> None:
@@ -62,14 +62,14 @@ def robot_of(arm: OneDirection) -> Any:
                 control_command_success_rate=1.0,
             )  # fmt: skip
 
-    return Robot()
+    return FrankaRobot()
 
 
 def server_of(robot: Any, address: str) -> Any:
     """Server of franky-sim's protocol that refuses each motion but that by Cartesian velocities."""
     from franky_sim import FrankaRobotServer
 
-    class Server(FrankaRobotServer):  # type: ignore[misc, unused-ignore]
+    class FrankaServer(FrankaRobotServer):  # type: ignore[misc, unused-ignore]
         """Server that refuses all but Cartesian velocities."""
 
         def start_motion(self, controller_mode: Any, motion_generator_mode: Any, motion_id: int) -> None:
@@ -79,10 +79,10 @@ def server_of(robot: Any, address: str) -> Any:
                 raise ValueError(f"a motion by {asked} is not simulated: Cartesian velocities alone")
             super().start_motion(controller_mode, motion_generator_mode, motion_id)
 
-    return Server(robot, [address])
+    return FrankaServer(robot, [address])
 
 
-def serve(arm: OneDirection, address: str, seconds: float) -> None:
+def serve(arm: ToolAxisArm, address: str, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over.
 
     Args:
@@ -94,7 +94,7 @@ def serve(arm: OneDirection, address: str, seconds: float) -> None:
     server = server_of(robot, address)
     server.init()
     ready(f"franka:{address}")
-    for _ in paced(arm, seconds):
+    for _ in ticks(arm, seconds):
         server.process_commands()
         if robot.silent > _MOST:
             server.stop_motion()

@@ -14,7 +14,7 @@ from palpate._vector import ZERO3
 from palpate.force.arm import Arm, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
-from palpate.wires.realtime import hurried
+from palpate.wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""
@@ -22,7 +22,7 @@ _BEHIND = 1.0
 """Behind real time by which this process must have been stopped [s]: so much is not made up for in a hurry."""
 
 
-class OneDirection:
+class ToolAxisArm:
     """An arm that moves along its tool's axis, -z of the base, towards a surface.
 
     Args:
@@ -82,9 +82,9 @@ def loopback(words: argparse.ArgumentParser, address: str) -> str:
     return address
 
 
-def arm_of(told: argparse.Namespace, bias: tuple[float, float, float], seed: int = 0) -> OneDirection:
+def arm_of(told: argparse.Namespace, bias: tuple[float, float, float], seed: int = 0) -> ToolAxisArm:
     """The arm that was asked for; the bias is of its sensor [N]."""
-    return OneDirection(load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, bias, seed)
+    return ToolAxisArm(load_arm(told.arm), surface(told.stiffness, told.damping), told.gap, bias, seed)
 
 
 def ready(line: str) -> None:
@@ -93,7 +93,7 @@ def ready(line: str) -> None:
     sys.stdout.flush()
 
 
-def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
+def ticks(arm: ToolAxisArm, seconds: float, wait: Callable[[float], None] = time.sleep) -> Iterator[None]:
     """Each tick when it is due, at real time, until the seconds of the arm are over.
 
     With real-time priority, where the system gives it: a controller is not late because the loop's computer is busy.
@@ -103,7 +103,7 @@ def paced(arm: OneDirection, seconds: float, wait: Callable[[float], None] = tim
         seconds: of the arm's time.
         wait: called before each tick with the seconds that are left until it is due.
     """
-    with hurried(True):
+    with realtime_priority(True):
         begun = time.monotonic()
         while arm.time < seconds:
             left = begun + arm.time - time.monotonic()

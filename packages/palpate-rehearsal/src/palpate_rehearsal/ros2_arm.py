@@ -15,7 +15,7 @@ import numpy as np
 from palpate.press.setting import place_of
 from palpate.robots import SerialArm
 from palpate.wires.ros2 import SENT
-from palpate_rehearsal.rehearsal import START, OneDirection, arm_of, paced, ready, words_of
+from palpate_rehearsal.rehearsal import START, ToolAxisArm, arm_of, ready, ticks, words_of
 
 _REST = 10
 _DOWN = (1.0, 0.0, 0.0, 0.0)
@@ -80,7 +80,7 @@ class Node:
         self._taken = ros2_messages.message(SENT[kind])
         self._commands = DataReader(participant, topic("/command", SENT[kind]), qos=qos)
 
-    def heard(self, arm: OneDirection) -> float | None:
+    def heard(self, arm: ToolAxisArm) -> float | None:
         """The speed downwards that was commanded since [m/s]; None if nothing came."""
         speed = None
         for sample in self._commands.take(10):
@@ -88,7 +88,7 @@ class Node:
                 speed = self._speed(sample, arm)
         return speed
 
-    def _speed(self, sample: Any, arm: OneDirection) -> float:
+    def _speed(self, sample: Any, arm: ToolAxisArm) -> float:
         if self._kind == "twist":
             return -float(sample.twist.linear.z)
         if self._kind == "pose":
@@ -98,7 +98,7 @@ class Node:
             return self._joints.speed(sample.data)
         return -float(sample.data[2])
 
-    def publish(self, arm: OneDirection) -> None:
+    def publish(self, arm: ToolAxisArm) -> None:
         """All that there is."""
         # Stamped by the arm's own clock, as a controller's cycle is.
         head = self._m.header(self._begun + round(1e9 * arm.time), "base")
@@ -112,10 +112,10 @@ class Node:
         self._wrench.write(self._m.wrench(head, (0.0, 0.0, fz), (0.0, 0.0, 0.0)))
 
 
-def serve(arm: OneDirection, node: Node, seconds: float) -> None:
+def serve(arm: ToolAxisArm, node: Node, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over."""
     speed, silent = 0.0, 0
-    for _ in paced(arm, seconds):
+    for _ in ticks(arm, seconds):
         heard = node.heard(arm)
         silent = 0 if heard is not None else silent + 1
         speed = heard if heard is not None else (speed if silent < _REST else 0.0)

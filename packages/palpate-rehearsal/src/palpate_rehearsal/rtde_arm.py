@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate_rehearsal.rehearsal import START, OneDirection, arm_of, loopback, paced, ready, words_of
+from palpate_rehearsal.rehearsal import START, ToolAxisArm, arm_of, loopback, ready, ticks, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
@@ -106,7 +106,7 @@ class Controller:
         arm: the simulated arm.
     """
 
-    def __init__(self, arm: OneDirection):
+    def __init__(self, arm: ToolAxisArm):
         self.arm = arm
         self.running, self.state = False, READY
         self.speed, self.zero = 0.0, 0.0
@@ -204,7 +204,7 @@ class Server:
 
     def serve(self, seconds: float) -> None:
         """Run at real time until the seconds of the arm are over."""
-        for _ in paced(self.controller.arm, seconds, self._listen):
+        for _ in ticks(self.controller.arm, seconds, self._listen):
             self.controller.tick()
             for client in list(self.clients.values()):
                 if client.started:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from palpate.wires import sim as protocol
-from palpate_rehearsal.rehearsal import OneDirection, arm_of, paced, ready, words_of
+from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, ready, ticks, words_of
 
 _REST = 10
 """Ticks without a command after which it rests."""
@@ -35,7 +35,7 @@ class Master:
     sent: int = 0
 
 
-def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
+def serve(arm: ToolAxisArm, listening: socket.socket, seconds: float) -> None:
     """Run at real time until the seconds are over.
 
     Args:
@@ -45,8 +45,8 @@ def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
     """
     listening.setblocking(False)
     master, speed = None, 0.0
-    for _ in paced(arm, seconds):
-        master = _heard(listening, master, arm.arm.rate)
+    for _ in ticks(arm, seconds):
+        master = _receive(listening, master, arm.arm.rate)
         wanted = 0.0
         if master is not None:
             master.ticks += 1
@@ -57,10 +57,10 @@ def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
         if master is not None:
             body = protocol.state(master.sent, arm.time, arm.reading())
             master.sent += 1
-            _send(listening, protocol.packed(protocol.STATE, master.session, body), master.address)
+            _send(listening, protocol.pack(protocol.STATE, master.session, body), master.address)
 
 
-def _heard(listening: socket.socket, master: Master | None, rate: float) -> Master | None:
+def _receive(listening: socket.socket, master: Master | None, rate: float) -> Master | None:
     """Take all that came; a second master is told that the arm is busy."""
     now = time.monotonic()
     while True:
@@ -70,17 +70,17 @@ def _heard(listening: socket.socket, master: Master | None, rate: float) -> Mast
             return master
         except OSError:  # a master that has gone
             continue
-        found = protocol.unpacked(data)
+        found = protocol.unpack(data)
         if found is None:
             continue
         kind, session, body = found
         if kind == protocol.HELLO:
             if master is not None and master.session != session and now - master.heard < _LEFT:
-                _send(listening, protocol.packed(protocol.BUSY, session), address)
+                _send(listening, protocol.pack(protocol.BUSY, session), address)
                 continue
             if master is None or master.session != session:
                 master = Master(address, session, now)
-            _send(listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(rate)), address)
+            _send(listening, protocol.pack(protocol.WELCOME, session, protocol.welcome(rate)), address)
         elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
             _obey(master, kind, body)

@@ -153,7 +153,7 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, no worker is left, or the workers cannot run palpate.
         """
-        hand = Hand(self._client, self.address, self._patience)
+        hand = Dispatcher(self._client, self.address, self._patience)
         try:
             yield from hand.all(Batches(jobs))
         finally:
@@ -252,7 +252,7 @@ def _guess(job: RunJob) -> float:
 
 
 @dataclass
-class Hand:
+class Dispatcher:
     """The batches that are with the cluster."""
 
     client: Any

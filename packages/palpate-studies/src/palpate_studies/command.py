@@ -17,8 +17,17 @@ from palpate.cli.options.figures import FigureOptions
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.names import QUIET, shipped_names
 from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, listed, source_of
-from palpate.cli.toolkit import COMPILING, confirmed, console, counted, place, print_answer, say, show_answer
+from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
+from palpate.cli.toolkit import (
+    COMPILING,
+    confirmed,
+    console,
+    place,
+    print_answer,
+    progress_of_pieces,
+    say,
+    show_answer,
+)
 from palpate.errors import InputError
 from palpate.text import printable
 
@@ -26,7 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from palpate_studies.cluster import Cluster
-    from palpate_studies.plan import Plan
+    from palpate_studies.plan import RunPlan
     from palpate_studies.run_study import StudyRunner
     from palpate_studies.summary import Findings
 
@@ -106,7 +115,7 @@ def study(
     from palpate_studies import study as studies
 
     if known.list_:
-        listed(studies.FILES, lambda one: studies.load(one).title)
+        print_names(studies.FILES, lambda one: studies.load(one).title)
         return 0
     source = source_of(studies.FILES, name, "study", known.print_)
     if name is None or source is None:
@@ -115,7 +124,7 @@ def study(
     try:
         with (own or PluginOptions()).consent():
             found = _print_end(
-                _Asked(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
+                _StudyRequest(name, source, folder, yes, output.replace), where or ClusterOptions(), drawn
             )
     except KeyboardInterrupt:
         kept = f"the finished runs are saved in {folder}; the same command resumes"
@@ -126,7 +135,7 @@ def study(
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _StudyRequest:
     """A study's name, its text and its folder; whether to ask before a long one, and to replace what is there."""
 
     name: str
@@ -136,7 +145,7 @@ class _Asked:
     replace: bool
 
 
-def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Findings:
+def _print_end(asked: _StudyRequest, where: ClusterOptions, drawn: FigureOptions) -> Findings:
     """Do the missing runs, and write table, page and summary."""
     from palpate_studies.plan import plan
     from palpate_studies.preview import check_cases, check_parts_of
@@ -157,14 +166,14 @@ def _print_end(asked: _Asked, where: ClusterOptions, drawn: FigureOptions) -> Fi
         raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
     if new and not asked.yes:
         _ask(planned, screen, here=where.scheduler is None)
-    with _runner(where, screen) as runner, counted(screen) as show:
+    with _runner(where, screen) as runner, progress_of_pieces(screen) as show:
         work = Work(planned, asked.source, folder, runner, lambda done: show("runs", done, len(planned)))
         frame = work.run(replace=asked.replace)
     told = printable(f"palpate study {shlex.quote(name)}")
     return present(frame, planned, folder, asked.source, told, drawn.endings, drawn.dpi)
 
 
-def _ask(plan: Plan, screen: Console, *, here: bool) -> None:
+def _ask(plan: RunPlan, screen: Console, *, here: bool) -> None:
     """Ask for confirmation of a very long study; for a cluster only the number of runs is known."""
     from palpate_studies.preview import MANY, seconds_a_run, too_much
 

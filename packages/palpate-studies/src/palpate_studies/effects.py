@@ -25,7 +25,7 @@ from palpate_studies.pairing import (
     short,
     with_unit,
 )
-from palpate_studies.plan import MAIN, Plan
+from palpate_studies.plan import MAIN, RunPlan
 from palpate_studies.report.plain import MOST, numbers, plain_panels
 
 if TYPE_CHECKING:
@@ -35,7 +35,9 @@ ENTRANTS = 12
 """Settings that are drawn against each other at most, the best ones."""
 
 
-def charts(plan: Plan, comparisons: Sequence[PairedComparison], figures: Sequence[Drawn]) -> dict[str, Any]:
+def charts(
+    plan: RunPlan, comparisons: Sequence[PairedComparison], figures: Sequence[Drawn]
+) -> dict[str, Any]:
     """Comparisons and figures, by metric."""
     shown = [
         {
@@ -209,7 +211,7 @@ EFFECTS_SHOWN = 3
 """Factors in the headline, those that change most first."""
 
 
-def effects(frame: DataFrame, plan: Plan) -> list[PairedComparison]:
+def effects(frame: DataFrame, plan: RunPlan) -> list[PairedComparison]:
     """Of each factor its values compared by the study's metric, on the same surfaces, seeds and other factors.
 
     The factor that changes the metric most comes first. Parameters drawn at random are surfaces, not factors.
@@ -241,7 +243,7 @@ def effects(frame: DataFrame, plan: Plan) -> list[PairedComparison]:
     return sorted(found, key=lambda one: -_change(one))
 
 
-def _metric(plan: Plan) -> tuple[str, bool] | None:
+def _metric(plan: RunPlan) -> tuple[str, bool] | None:
     """The metric by which factors are judged, and whether more of it is better; None where none has a better side."""
     best = plan.study.best
     if best is not None:

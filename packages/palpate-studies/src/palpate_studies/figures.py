@@ -26,18 +26,18 @@ from palpate.errors import InputError
 from palpate.report import style
 from palpate_studies.pairing import FEW, Drawn, StudyRows, logarithmic, restricted_to, sentence, short
 from palpate_studies.parameters import Axis
-from palpate_studies.plan import Part, Plan
+from palpate_studies.plan import RunPlan, StudyPart
 from palpate_studies.report.lines import (
     Cloud,
-    Curve,
-    Line,
+    LinePanel,
+    MetricLine,
     Points,
     Scale,
     clouds_figure,
     curves_figure,
     decades,
 )
-from palpate_studies.report.maps import Bound, Heat, heat_figure
+from palpate_studies.report.maps import BoundaryLine, Heat, heat_figure
 from palpate_studies.study import Curves, Map, flat
 
 if TYPE_CHECKING:
@@ -51,11 +51,11 @@ def curves_of(table: StudyRows, asked: Curves, number: int) -> Drawn:
     """Curves that a study asks for."""
     metric, x = metric_of(asked.metric), table.scale(asked.x)
 
-    def made() -> list[Curve]:
+    def made() -> list[LinePanel]:
         panels = []
         for title, value, rows in table.panels(asked):
             drawn = [*lines(table, rows, asked, x), *references(table, asked, x, value)]
-            panels.append(Curve(title, x, drawn, decades(np.concatenate([one.middle for one in drawn]))))
+            panels.append(LinePanel(title, x, drawn, decades(np.concatenate([one.middle for one in drawn]))))
         return panels
 
     against = " Dashed: the reference runs." if table.plan.study.against else ""
@@ -66,7 +66,7 @@ def curves_of(table: StudyRows, asked: Curves, number: int) -> Drawn:
     return Drawn(f"curves{number}", caption, metric, made, curves_figure)
 
 
-def lines(table: StudyRows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[Line]:
+def lines(table: StudyRows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[MetricLine]:
     """The study's own lines in a panel."""
     import polars
 
@@ -81,7 +81,7 @@ def lines(table: StudyRows, rows: DataFrame, asked: Curves, x: Scale) -> Iterato
         yield _line(rows.filter(polars.col(asked.lines) == value), asked, x, label, False)
 
 
-def references(table: StudyRows, asked: Curves, x: Scale, panel: Any) -> Iterator[Line]:
+def references(table: StudyRows, asked: Curves, x: Scale, panel: Any) -> Iterator[MetricLine]:
     """The reference runs: a curve if they have the same parameter, else a level."""
     import polars
 
@@ -96,15 +96,15 @@ def references(table: StudyRows, asked: Curves, x: Scale, panel: Any) -> Iterato
             numbers = _good(rows, asked.metric)
             ends = x.places[[0, -1]]
             middle, low, high = (np.full(2, v) for v in _spread(numbers))
-            yield Line(part.name, ends, middle, low, high, reference=True)
+            yield MetricLine(part.name, ends, middle, low, high, reference=True)
 
 
-def _line(rows: DataFrame, asked: Curves, x: Scale, label: str, reference: bool) -> Line:
+def _line(rows: DataFrame, asked: Curves, x: Scale, label: str, reference: bool) -> MetricLine:
     import polars
 
     found = [_spread(_good(rows.filter(polars.col(asked.x) == value), asked.metric)) for value in x.values]
     middle, low, high = np.array(found).T
-    return Line(label, x.places, middle, low, high, reference)
+    return MetricLine(label, x.places, middle, low, high, reference)
 
 
 def _good(rows: DataFrame, metric: str) -> list[float]:
@@ -223,14 +223,14 @@ def draw(
     """
     made = {}
     for one in drawn:
-        with style.inked():
+        with style.ink():
             figure = one.draw()
             for ending in dict.fromkeys((*endings, ".png")):
                 made[style.save(figure, folder / f"{one.name}{ending}", dpi)] = one.caption
     return {path: caption for path, caption in made.items() if path.suffix == ".png"}
 
 
-def figures(frame: DataFrame, plan: Plan) -> Iterator[Drawn]:
+def figures(frame: DataFrame, plan: RunPlan) -> Iterator[Drawn]:
     """The figures that a study asks for; of each metric that it asks none of, those that its parameters suit."""
     own = StudyRows(frame, plan)
     maps, curves = list(plan.study.maps), list(plan.study.curves)
@@ -245,7 +245,7 @@ def figures(frame: DataFrame, plan: Plan) -> Iterator[Drawn]:
     yield from (curves_of(own, asked, number) for number, asked in enumerate(curves, 1))
 
 
-def _suggest(plan: Plan, metrics: Sequence[str], *, maps: bool) -> tuple[list[Map], list[Curves]]:
+def _suggest(plan: RunPlan, metrics: Sequence[str], *, maps: bool) -> tuple[list[Map], list[Curves]]:
     """A map of each metric over the two longest parameters, or curves over the longest."""
     free = [a for a in plan.parts[0].grid if "seed" not in a.targets]
     by_size = sorted(free, key=lambda a: -len(a.settings) if Scale("", a.labels()).numeric else 0)
@@ -266,7 +266,7 @@ LABEL = "linear model: stability lost"
 Growing = Callable[[float], float | None]
 
 
-def bounds(part: Part, asked: Map, panel: Any, x: Scale, y: Scale) -> list[Bound]:
+def bounds(part: StudyPart, asked: Map, panel: Any, x: Scale, y: Scale) -> list[BoundaryLine]:
     """Where stability is lost, along each row of a map; along each column where only the rows are numbers.
 
     Args:
@@ -288,7 +288,7 @@ def bounds(part: Part, asked: Map, panel: Any, x: Scale, y: Scale) -> list[Bound
         ):
             found.setdefault(i, []).extend([(lost, place)] if across.numeric else _over_cell(lost, place))
     lines = [list(zip(*points, strict=True)) for points in found.values()]
-    return [Bound(LABEL, *((a, b) if x.numeric else (b, a))) for a, b in lines]
+    return [BoundaryLine(LABEL, *((a, b) if x.numeric else (b, a))) for a, b in lines]
 
 
 def equivalent(experiment: Experiment) -> Experiment:
@@ -305,7 +305,7 @@ def equivalent(experiment: Experiment) -> Experiment:
     return changed(experiment, {"controller": table})
 
 
-def _growing(part: Part, name: str, fixed: Mapping[str, Any]) -> Growing:
+def _growing(part: StudyPart, name: str, fixed: Mapping[str, Any]) -> Growing:
     """How fast the linear model grows at a value of a parameter, below 0 where it is stable; None without a model."""
     middle = {a.name: a.settings[len(a.settings) // 2] if a.settings else a.between(0.5) for a in part.axes}
     middle |= {a.name: _set(a.settings, a.labels(), fixed[a.name]) for a in part.axes if a.name in fixed}

@@ -21,7 +21,7 @@ from palpate.bench.force_input import DONE
 from palpate.bench.metrics import Metric, metric_of
 from palpate.errors import unknown
 from palpate_studies.parameters import Axis, Label, label
-from palpate_studies.plan import MAIN, Part, Plan
+from palpate_studies.plan import MAIN, RunPlan, StudyPart
 from palpate_studies.report.lines import Scale
 from palpate_studies.study import Curves, Map, flat
 
@@ -104,7 +104,7 @@ class PairedComparison:
         return compare(self.entrants[one], self.entrants[other], self.most)
 
 
-def conditions_of(plan: Plan) -> list[str]:
+def conditions_of(plan: RunPlan) -> list[str]:
     """The parameters that are not chosen but met, as a surface is: those drawn at random, and [best] over."""
     over = plan.study.best.over if plan.study.best else []
     if plan.study.search is not None:
@@ -112,7 +112,7 @@ def conditions_of(plan: Plan) -> list[str]:
     return [a.name for a in plan.parts[0].axes if a.drawn or a.name in over]
 
 
-def comparisons(frame: DataFrame, plan: Plan) -> list[PairedComparison]:
+def comparisons(frame: DataFrame, plan: RunPlan) -> list[PairedComparison]:
     """For each metric that has a better side, the one of [best] first, and each value of what is given."""
     conditions, best = conditions_of(plan), plan.study.best
     if not conditions or best is None:
@@ -133,7 +133,7 @@ GroupedRows = dict[str, tuple[dict[str, Label], "DataFrame"]]
 
 
 def _groups(
-    frame: DataFrame, plan: Plan, conditions: Sequence[str]
+    frame: DataFrame, plan: RunPlan, conditions: Sequence[str]
 ) -> list[tuple[dict[str, Label], GroupedRows]]:
     """The rows of each setting, by the given values."""
     import polars
@@ -153,7 +153,7 @@ def _groups(
     return [(dict(given), rows) for given, rows in found.items()]
 
 
-def _name(plan: Plan, part: Part, at: Mapping[str, Any]) -> str:
+def _name(plan: RunPlan, part: StudyPart, at: Mapping[str, Any]) -> str:
     """A setting's values in words; a parameter's name only where its value alone would not say it."""
     several = len(at) > 1
     words = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in at.values()]
@@ -296,7 +296,7 @@ class Drawn:
 class StudyRows:
     """A study's rows, as figures ask for them."""
 
-    def __init__(self, frame: DataFrame, plan: Plan):
+    def __init__(self, frame: DataFrame, plan: RunPlan):
         self.frame, self.plan = frame, plan
 
     def part(self, name: str = MAIN) -> DataFrame:

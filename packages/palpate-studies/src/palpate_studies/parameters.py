@@ -14,7 +14,7 @@ import numpy as np
 from palpate.bench import changed
 from palpate.bench.build import AnyExperiment
 from palpate.errors import InputError
-from palpate_studies.study import Parameter, flat
+from palpate_studies.study import StudyParameter, flat
 
 Tables = dict[str, Any]
 
@@ -175,7 +175,7 @@ class Axis:
     """
 
     name: str
-    parameter: Parameter
+    parameter: StudyParameter
     whole: bool
     settings: tuple[Any, ...]
 
@@ -231,7 +231,7 @@ class Axis:
         return None if cases is None else cases[value].get("experiment")
 
 
-def axis(name: str, parameter: Parameter, some: Sequence[Tables]) -> Axis:
+def axis(name: str, parameter: StudyParameter, some: Sequence[Tables]) -> Axis:
     """The axis of a parameter.
 
     Args:
@@ -278,7 +278,7 @@ def _settings(axis: Axis) -> Sequence[Any]:
     return list(dict.fromkeys(map(axis.between, shares)))
 
 
-def _check_used(name: str, p: Parameter) -> None:
+def _check_used(name: str, p: StudyParameter) -> None:
     used = p.times or p.plus or p.factor != 1.0
     odd = [v for v in p.values or () if used and (isinstance(v, bool) or not isinstance(v, int | float))]
     if odd:

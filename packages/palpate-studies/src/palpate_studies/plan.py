@@ -20,7 +20,7 @@ from palpate.bench.toml_parts import ROLES
 from palpate.errors import InputError, PluginError, unknown
 from palpate.plugins import Plugin, is_plugin, plugin
 from palpate_studies.parameters import Axis, Label, Tables, axis, experiment_of, label, put, tables_of
-from palpate_studies.study import Against, Parameter, Study, flat
+from palpate_studies.study import Against, Study, StudyParameter, flat
 
 
 class Sobol:
@@ -55,7 +55,7 @@ MAIN = "study"
 
 
 @dataclass(frozen=True)
-class Setting:
+class RunSetting:
     """One run before it is run.
 
     Args:
@@ -74,7 +74,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Part:
+class StudyPart:
     """A study's own runs, or those of one that it is compared with: a base experiment and the axes over it.
 
     Args:
@@ -144,7 +144,7 @@ class Part:
             base = experiment_of(base, tables)
         return base
 
-    def setting(self, number: int, values: Mapping[str, Any], seed: int, compared: bool) -> Setting:
+    def setting(self, number: int, values: Mapping[str, Any], seed: int, compared: bool) -> RunSetting:
         """A run with these values and this seed."""
         own = next((a for a in self.axes if "seed" in a.targets), None)
         seed = seed if own is None else values[own.name]
@@ -152,13 +152,13 @@ class Part:
         at |= {name: label(value) for name, value in values.items()}
         at["seed"] = seed
         try:
-            return Setting(number, at, self.experiment(values), seed)
+            return RunSetting(number, at, self.experiment(values), seed)
         except InputError as error:
-            return Setting(number, at, None, seed, str(error))
+            return RunSetting(number, at, None, seed, str(error))
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """All runs of a study.
 
     Args:
@@ -167,14 +167,14 @@ class Plan:
     """
 
     study: Study
-    parts: tuple[Part, ...]
+    parts: tuple[StudyPart, ...]
 
     def __len__(self) -> int:
         if self.study.search is not None:
             return self.study.search.trials * len(self.parts[0].seeds)
         return sum(map(len, self.parts))
 
-    def setting(self, run: int) -> Setting:
+    def setting(self, run: int) -> RunSetting:
         """A run by its number."""
         left = run
         for part in self.parts:
@@ -184,7 +184,7 @@ class Plan:
             left -= len(part)
         raise IndexError(run)
 
-    def trial(self, number: int, values: Mapping[str, Any]) -> list[Setting]:
+    def trial(self, number: int, values: Mapping[str, Any]) -> list[RunSetting]:
         """The runs of one trial of a search, one for each seed."""
         part = self.parts[0]
         first = number * len(part.seeds)
@@ -227,7 +227,7 @@ def _common(kinds: set[type]) -> type:
     return float if kinds == {int, float} else str
 
 
-def plan(study: Study, where: str = "") -> Plan:
+def plan(study: Study, where: str = "") -> RunPlan:
     """The runs of a study.
 
     Args:
@@ -246,7 +246,7 @@ def plan(study: Study, where: str = "") -> Plan:
     ]
     if study.search is None and not all(map(len, parts)):
         raise InputError("the grid is empty: a parameter has no values")
-    return Plan(study, tuple(parts))
+    return RunPlan(study, tuple(parts))
 
 
 def _whole(study: Study, other: Against) -> Against:
@@ -260,7 +260,7 @@ def _whole(study: Study, other: Against) -> Against:
     return Against(experiment=experiment, fixed=fixed, parameters=shared | other.parameters)
 
 
-def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: Path) -> Part:
+def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: Path) -> StudyPart:
     cases = [p for p in of.parameters.values() if p.cases is not None]
     others = {c["experiment"] for p in cases for c in (p.cases or {}).values() if "experiment" in c}
     named = {one: _load(one, folder) for one in others} | {"": _load(of.experiment, folder)}
@@ -271,7 +271,7 @@ def _part(study: Study, name: str, of: Against, seeds: tuple[int, ...], folder: 
     drawn = any(a.drawn for a in axes)
     if any("seed" in a.targets for a in axes):
         seeds = seeds[:1]
-    found = Part(name, bases, axes, seeds, study.samples or 1 if drawn else 1, study.samples_seed)
+    found = StudyPart(name, bases, axes, seeds, study.samples or 1 if drawn else 1, study.samples_seed)
     _check_values(found, study.search is None)
     return found
 
@@ -291,7 +291,7 @@ def _fix(base: AnyExperiment, fixed: Mapping[str, Any], name: str) -> AnyExperim
         raise type(error)(f"[fixed] does not fit the experiment {name}: {error}") from error
 
 
-def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[Parameter]) -> list[Tables]:
+def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[StudyParameter]) -> list[Tables]:
     """The tables of every experiment that a parameter may have to change: each base, and each case."""
     found = [tables_of(base) for base in bases.values()]
     for one in cases:
@@ -306,7 +306,7 @@ def _some(bases: Mapping[str, AnyExperiment], cases: Sequence[Parameter]) -> lis
     return found
 
 
-def _check_values(part: Part, planned: bool) -> None:
+def _check_values(part: StudyPart, planned: bool) -> None:
     """Refuses parameters of which no values make an experiment: a mistake, not a result."""
     if not planned:
         return
@@ -324,7 +324,7 @@ def _check_values(part: Part, planned: bool) -> None:
         raise InputError(f"none of the parameters' values make an experiment: {trouble}")
 
 
-def samples(part: Part) -> Iterator[dict[str, Any]]:
+def samples(part: StudyPart) -> Iterator[dict[str, Any]]:
     """All first values, all last ones, and each value of each parameter with all others at their first or last."""
     every = {a.name: a.settings or (a.between(0.0), a.between(1.0)) for a in part.axes}
     ends = [{name: values[i] for name, values in every.items()} for i in (0, -1)]
@@ -333,7 +333,7 @@ def samples(part: Part) -> Iterator[dict[str, Any]]:
         yield from ({**end, name: value} for value in values for end in ends)
 
 
-def resolve(plan: Plan) -> bytes:
+def resolve(plan: RunPlan) -> bytes:
     """Everything that decides the rows of a study, as bytes: what is only shown is left out."""
     study = plan.study
     shown = (

@@ -14,14 +14,14 @@ import numpy as np
 from palpate.bench import Experiment, build
 from palpate.bench.build import AnyExperiment, build_any, check_parts
 from palpate.bench.force_input import DONE, NO_CONTACT
-from palpate.bench.metrics import Look, metric_of
+from palpate.bench.metrics import Window, metric_of
 from palpate.bench.metrics.verdicts import try_metric
 from palpate.bench.speed import cores
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.text import duration
 from palpate_studies.parameters import Label
-from palpate_studies.plan import MAIN, TRIED, Plan, Setting, samples
+from palpate_studies.plan import MAIN, TRIED, RunPlan, RunSetting, samples
 from palpate_studies.run_one import FAILED, REFUSED, RunJob, Stopped, run_one
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ PRESS = 0.1
 """Contact after which a run is long enough to ask a metric of it [s]."""
 
 
-def check_parts_of(plan: Plan, waiting: Callable[[], None] | None = None) -> None:
+def check_parts_of(plan: RunPlan, waiting: Callable[[], None] | None = None) -> None:
     """Tries every combination of the user's parts once, and every metric of theirs on a short press.
 
     Args:
@@ -52,11 +52,11 @@ def check_parts_of(plan: Plan, waiting: Callable[[], None] | None = None) -> Non
             run = experiment.run
             record = bench.run(run.duration, press=min(PRESS, run.press), waiting=waiting)
             for metric in metrics:
-                try_metric(metric, Look(record))
+                try_metric(metric, Window(record))
         first = False
 
 
-def _combinations(plan: Plan) -> Iterator[Experiment]:
+def _combinations(plan: RunPlan) -> Iterator[Experiment]:
     """An experiment for each combination of parts that the study's values come to."""
     seen = set()
     for part in plan.parts:
@@ -84,7 +84,7 @@ SAMPLES = 20
 """How many settings are tried for one that runs."""
 
 
-def seconds_a_run(plan: Plan, waiting: Callable[[], None] | None = None) -> float:
+def seconds_a_run(plan: RunPlan, waiting: Callable[[], None] | None = None) -> float:
     """Time of a run on one core [s], from the first setting that runs; 0 if none of the first does.
 
     Args:
@@ -127,7 +127,7 @@ def _time_run(experiment: AnyExperiment, seed: int) -> float:
     return time.perf_counter() - begun
 
 
-def too_much(plan: Plan, seconds: float) -> str:
+def too_much(plan: RunPlan, seconds: float) -> str:
     """A sentence that says how many runs there are and how long they take, where that is more than one would expect."""
     total = seconds * len(plan) / cores()
     if len(plan) < MANY and total < LONG:
@@ -141,7 +141,7 @@ USELESS = {NO_CONTACT, REFUSED, FAILED}
 """Results that say nothing of what is studied."""
 
 
-def check_cases(plan: Plan, waiting: Callable[[], None] | None = None) -> None:
+def check_cases(plan: RunPlan, waiting: Callable[[], None] | None = None) -> None:
     """Runs each case of a long study once.
 
     Args:
@@ -164,7 +164,7 @@ def check_cases(plan: Plan, waiting: Callable[[], None] | None = None) -> None:
             )
 
 
-def _cases(plan: Plan) -> Iterator[tuple[str, Setting]]:
+def _cases(plan: RunPlan) -> Iterator[tuple[str, RunSetting]]:
     """The middle setting of each part for each of its cases."""
     for part in plan.parts:
         middle = {a.name: a.between(0.5) if a.drawn else a.settings[len(a.settings) // 2] for a in part.axes}
@@ -238,7 +238,7 @@ class Ranking:
         return {name: sorted({s.at[name] for s in self.alike}, key=_order) for name in names}
 
 
-def rankings(frame: DataFrame, plan: Plan, part: str = MAIN) -> list[Ranking]:
+def rankings(frame: DataFrame, plan: RunPlan, part: str = MAIN) -> list[Ranking]:
     """The settings of a part by the study's [best]: a ranking for each combination of what is given."""
     best = plan.study.best
     if best is None:
@@ -261,7 +261,7 @@ def _ranking(
 
 
 def _settings(
-    frame: DataFrame, plan: Plan, part: str, metric: str
+    frame: DataFrame, plan: RunPlan, part: str, metric: str
 ) -> list[tuple[dict[str, Label], dict[int, float] | None]]:
     """Each setting and its metric by seed; None where a run failed."""
     import polars

@@ -22,14 +22,14 @@ import msgspec
 
 import palpate
 from palpate.bench.build import AnyExperiment, build_any
-from palpate.bench.metrics import Look, metric_of
+from palpate.bench.metrics import Window, metric_of
 from palpate.bench.speed import cores
 from palpate.errors import InputError
 from palpate.logs.store import write_parquet
 from palpate.plugins import Plugin
 from palpate.records import Record
 from palpate_studies.parameters import Label
-from palpate_studies.plan import Plan, Setting
+from palpate_studies.plan import RunPlan, RunSetting
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -73,7 +73,7 @@ class RunJob:
         keep: whether the record is wanted too.
     """
 
-    setting: Setting
+    setting: RunSetting
     metrics: tuple[str, ...]
     window: tuple[float, float] | None
     keep: bool
@@ -107,8 +107,8 @@ def run_one(
         return row(REFUSED, setting.refused, none), None
     try:
         record = _record(setting.experiment, setting.seed, stopped, waiting)
-        look = Look(record, job.window)
-        metrics = tuple(metric_of(name).value_in(look) for name in job.metrics)
+        window = Window(record, job.window)
+        metrics = tuple(metric_of(name).value_in(window) for name in job.metrics)
     except Stopped:
         raise
     except InputError as error:
@@ -181,7 +181,7 @@ CHUNK = 20_000
 """Rows that are taken at a time from text to columns."""
 
 
-def table(plan: Plan, rows: Iterable[Row]) -> DataFrame:
+def table(plan: RunPlan, rows: Iterable[Row]) -> DataFrame:
     """The rows as columns: run, parameters, seed, result, why, metrics; each run once, sorted by its number."""
     import polars
 
@@ -191,7 +191,7 @@ def table(plan: Plan, rows: Iterable[Row]) -> DataFrame:
     return joined.unique("run", keep="first", maintain_order=True).sort("run").rechunk()
 
 
-def write(frame: DataFrame, plan: Plan, path: Path) -> None:
+def write(frame: DataFrame, plan: RunPlan, path: Path) -> None:
     """Writes the table as Parquet, atomically; units and texts of the metrics in the file's own metadata.
 
     Raises:
@@ -209,7 +209,7 @@ def write(frame: DataFrame, plan: Plan, path: Path) -> None:
         ) from error
 
 
-def _columns(plan: Plan, rows: Iterable[Row]) -> Iterator[dict[str, list[Any]]]:
+def _columns(plan: RunPlan, rows: Iterable[Row]) -> Iterator[dict[str, list[Any]]]:
     left, texts = iter(rows), [name for name, kind in plan.columns.items() if kind is str]
     while chunk := list(islice(left, CHUNK)):
         columns: dict[str, list[Any]] = {"run": [r.run for r in chunk]}
@@ -221,7 +221,7 @@ def _columns(plan: Plan, rows: Iterable[Row]) -> Iterator[dict[str, list[Any]]]:
         yield columns
 
 
-def _schema(plan: Plan) -> dict[str, Any]:
+def _schema(plan: RunPlan) -> dict[str, Any]:
     import polars
 
     kinds = {int: polars.Int64, float: polars.Float64, bool: polars.Boolean, str: polars.String}

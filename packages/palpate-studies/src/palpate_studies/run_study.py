@@ -19,7 +19,7 @@ from palpate.errors import InputError
 from palpate.files import MADE, check_kept_folder, check_place, kept_folder, write_text
 from palpate.logs import write_record
 from palpate_studies import journal, run_one, search
-from palpate_studies.plan import Plan, Setting, plan, resolve
+from palpate_studies.plan import RunPlan, RunSetting, plan, resolve
 from palpate_studies.preview import check_parts_of
 from palpate_studies.run_one import Done, Local, Row, RunJob, sources
 from palpate_studies.study import parse
@@ -167,7 +167,7 @@ class Work:
         progress: receives the number of finished runs.
     """
 
-    plan: Plan
+    plan: RunPlan
     source: str
     folder: Path
     runner: StudyRunner
@@ -195,7 +195,7 @@ class Work:
             run_one.write(frame, self.plan, self.folder / run_one.NAME)
         return frame
 
-    def _run(self, book: RunJournal, settings: Iterable[Setting]) -> None:
+    def _run(self, book: RunJournal, settings: Iterable[RunSetting]) -> None:
         """Runs these; each row is in the journal as soon as it is done, its record before it."""
         study = self.plan.study
         metrics = tuple(study.metrics)
@@ -251,7 +251,7 @@ def begun(folder: Path) -> bool:
     return (folder / NAME).exists()
 
 
-def check_folder(folder: Path, plan: Plan, *, replace: bool) -> None:
+def check_folder(folder: Path, plan: RunPlan, *, replace: bool) -> None:
     """Refuse a folder before anything is compiled: it holds other files, or another study.
 
     Raises:
@@ -263,7 +263,7 @@ def check_folder(folder: Path, plan: Plan, *, replace: bool) -> None:
             pass
 
 
-def head(plan: Plan) -> JournalHead:
+def head(plan: RunPlan) -> JournalHead:
     """Identity of a study's journal."""
     from palpate import __version__
 

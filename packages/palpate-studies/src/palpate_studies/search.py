@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, check_place
 from palpate_studies.parameters import Axis
-from palpate_studies.plan import Plan
+from palpate_studies.plan import RunPlan
 
 if TYPE_CHECKING:
     from optuna import Study as OptunaStudy
@@ -40,7 +40,7 @@ class Searching:
         InputError: the extra is not installed.
     """
 
-    def __init__(self, plan: Plan, path: Path, name: str):
+    def __init__(self, plan: RunPlan, path: Path, name: str):
         self._optuna = _optuna()
         study = plan.study
         assert study.search is not None

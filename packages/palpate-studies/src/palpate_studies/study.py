@@ -21,7 +21,7 @@ Seed = Annotated[int, Meta(ge=0)]
 DottedPath = str
 
 
-class Parameter(Table, frozen=True):
+class StudyParameter(Table, frozen=True):
     """One parameter: the values that it takes, and what of the experiment they are.
 
     The values are one of `values`, `range` or `log` (with `points`, or drawn at `random`), or `cases`.
@@ -68,7 +68,7 @@ class Best(Table, frozen=True):
         return self.least or self.most
 
 
-class Search(Table, frozen=True):
+class OptunaSearch(Table, frozen=True):
     """A search by Optuna in place of a grid."""
 
     trials: Annotated[int, Meta(ge=1)]
@@ -113,7 +113,7 @@ class Against(Table, frozen=True):
     shares: list[str] = msgspec.field(default_factory=list)
     """Parameters of the study that it has, too."""
     fixed: dict[str, Any] = msgspec.field(default_factory=dict)
-    parameters: dict[str, Parameter] = msgspec.field(default_factory=dict)
+    parameters: dict[str, StudyParameter] = msgspec.field(default_factory=dict)
 
 
 class Study(Table, frozen=True, kw_only=True):
@@ -125,7 +125,7 @@ class Study(Table, frozen=True, kw_only=True):
     """A name, or a TOML file beside the study's."""
     fixed: dict[str, Any] = msgspec.field(default_factory=dict)
     """Changes of the experiment in every run."""
-    parameters: dict[str, Parameter]
+    parameters: dict[str, StudyParameter]
     seeds: Annotated[int, Meta(ge=1, le=1_000_000)] | list[Seed] = 1
     """How many, from 0 on, or which."""
     samples: Annotated[int, Meta(ge=1, le=2**30)] | None = None
@@ -136,7 +136,7 @@ class Study(Table, frozen=True, kw_only=True):
     """From when to when after the first contact the force is measured [s]; to the end when left out."""
     best: Best | None = None
     against: dict[str, Against] = msgspec.field(default_factory=dict)
-    search: Search | None = None
+    search: OptunaSearch | None = None
     maps: list[Map] = msgspec.field(default_factory=list)
     curves: list[Curves] = msgspec.field(default_factory=list)
     keep_records: bool = False
@@ -144,7 +144,7 @@ class Study(Table, frozen=True, kw_only=True):
 
 
 T = TypeVar("T")
-VALUES = frozenset(Parameter.__struct_fields__)
+VALUES = frozenset(StudyParameter.__struct_fields__)
 
 
 FILES = TomlFiles("study", "a", "palpate_studies", ("shipped",))
@@ -201,7 +201,9 @@ def _convert(tables: dict[str, Any]) -> Study:
 def _convert_parameters(tables: dict[str, Any]) -> None:
     if isinstance(tables.get("parameters"), dict):
         flattened = _parameters(tables["parameters"], "")
-        tables["parameters"] = {n: _as(Parameter, p, f"the parameter {n!r}") for n, p in flattened.items()}
+        tables["parameters"] = {
+            n: _as(StudyParameter, p, f"the parameter {n!r}") for n, p in flattened.items()
+        }
 
 
 def _as(kind: type[T], tables: Any, where: str = "") -> T:
@@ -279,7 +281,7 @@ def _check_metrics(study: Study) -> None:
             raise InputError(f"{name!r} is drawn or ranked by, and is not among the metrics; add it there")
 
 
-def _check_parameter(name: str, p: Parameter, searched: bool) -> None:
+def _check_parameter(name: str, p: StudyParameter, searched: bool) -> None:
     given = [key for key in ("values", "range", "log", "cases") if getattr(p, key) is not None]
     if len(given) != 1:
         raise InputError(

@@ -12,13 +12,13 @@ import numpy as np
 
 from palpate.bench.force_input import DONE
 from palpate.bench.metrics import metric_of
-from palpate.files import signed, write_json, write_text
+from palpate.files import with_author, write_json, write_text
 from palpate.report.page import Table
 from palpate_studies import effects
 from palpate_studies.effects import charts
 from palpate_studies.figures import draw, figures
 from palpate_studies.pairing import PairedComparison, comparisons, short, with_unit
-from palpate_studies.plan import MAIN, Plan
+from palpate_studies.plan import MAIN, RunPlan
 from palpate_studies.preview import MetricMean, Ranked, Ranking, rankings
 from palpate_studies.report.plain import StudyPage, study_page
 
@@ -52,7 +52,7 @@ class Findings:
 
 def present(
     frame: DataFrame,
-    plan: Plan,
+    plan: RunPlan,
     folder: Path,
     source: str,
     command: str,
@@ -64,7 +64,7 @@ def present(
     ranked = [] if compared else rankings(frame, plan)
     apart = effects.effects(frame, plan)
     answer = headline(frame, plan, ranked, compared, apart)
-    told = signed(
+    told = with_author(
         {
             "command": command,
             "answer": answer,
@@ -104,7 +104,7 @@ def present(
 
 def headline(
     frame: DataFrame,
-    plan: Plan,
+    plan: RunPlan,
     ranked: Sequence[Ranking],
     compared: Sequence[PairedComparison],
     apart: Sequence[PairedComparison] = (),
@@ -140,7 +140,7 @@ def _failures(frame: DataFrame) -> str:
     return f"{len(results)} of {len(frame)} runs failed{most}: {why}."
 
 
-def _seeds(plan: Plan) -> str:
+def _seeds(plan: RunPlan) -> str:
     seeds = plan.parts[0].seeds
     return (
         ", ".join(map(str, seeds)) if len(seeds) <= 8 else f"{seeds[0]} to {seeds[-1]}, {len(seeds)} of them"
@@ -148,7 +148,7 @@ def _seeds(plan: Plan) -> str:
 
 
 def summary(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
+    frame: DataFrame, plan: RunPlan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> dict[str, Any]:
     """JSON summary: runs, results, and the best settings of each ranking, or those on the same surfaces."""
     best = plan.study.best
@@ -176,7 +176,7 @@ def _span(values: Sequence[Any]) -> list[Any]:
 
 
 def tables(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
+    frame: DataFrame, plan: RunPlan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> list[Table]:
     """The best settings, the best of what the study is compared with, and results."""
     best = plan.study.best
@@ -199,7 +199,7 @@ def tables(
     return [*found, _results(frame)]
 
 
-def best_table(plan: Plan, part: str, ranking: Ranking) -> Table:
+def best_table(plan: RunPlan, part: str, ranking: Ranking) -> Table:
     """The best settings: the metric with its 95 % interval, and how far each lies behind the best one."""
     heads = _heads(plan, part, ranking.settings[0].at)
     rows = [
@@ -210,7 +210,7 @@ def best_table(plan: Plan, part: str, ranking: Ranking) -> Table:
     return Table(title, ("", *heads, _ranked_by(plan), "behind the best, seed by seed"), rows)
 
 
-def each_table(plan: Plan, part: str, ranked: Sequence[Ranking]) -> Table:
+def each_table(plan: RunPlan, part: str, ranked: Sequence[Ranking]) -> Table:
     """The best setting for each combination of what is given, and what cannot be told from it."""
     good = [one for one in ranked if one.settings]
     if not good:
@@ -235,7 +235,7 @@ def each_table(plan: Plan, part: str, ranked: Sequence[Ranking]) -> Table:
     return Table(title, (*heads, "as good with these seeds", "settings not ranked"), rows)
 
 
-def overall_table(frame: DataFrame, plan: Plan) -> Table:
+def overall_table(frame: DataFrame, plan: RunPlan) -> Table:
     """Each metric over all runs, and over those of each case: of yes or no the share, of quantities the spread."""
     cases = next((a for a in plan.parts[0].axes if a.parameter.cases is not None), None)
     kinds = list(cases.labels()) if cases else []
@@ -261,7 +261,7 @@ def _overall(values: Sequence[float], name: str) -> str:
 
 
 def notes(
-    frame: DataFrame, plan: Plan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
+    frame: DataFrame, plan: RunPlan, ranked: Sequence[Ranking], compared: Sequence[PairedComparison] = ()
 ) -> list[str]:
     """Warnings of the summary."""
     found = []
@@ -287,7 +287,7 @@ def notes(
     return found
 
 
-def _of_pairs(one: PairedComparison, plan: Plan) -> list[str]:
+def _of_pairs(one: PairedComparison, plan: RunPlan) -> list[str]:
     """Notes on the counts of a comparison."""
     failed = {e.name: int(e.failed.sum()) for e in one.entrants if e.failed.any()}
     found = []
@@ -316,12 +316,12 @@ def _of(part: str) -> str:
     return "" if part == MAIN else f" of {part}"
 
 
-def _heads(plan: Plan, part: str, at: Mapping[str, Any]) -> list[str]:
+def _heads(plan: RunPlan, part: str, at: Mapping[str, Any]) -> list[str]:
     axes = {a.name: a.title for p in plan.parts if p.name == part for a in p.axes}
     return [axes[name] for name in at]
 
 
-def _ranked_by(plan: Plan) -> str:
+def _ranked_by(plan: RunPlan) -> str:
     best = plan.study.best
     return with_unit(metric_of(best.metric)) if best else ""
 

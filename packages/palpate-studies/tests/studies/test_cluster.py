@@ -194,7 +194,7 @@ class Deadly:
 
 
 def test_of_runs_that_kill_workers_each_is_tried_alone_and_becomes_a_row():
-    hand = clusters.Hand(None, "tcp://somewhere", 1.0)
+    hand = clusters.Dispatcher(None, "tcp://somewhere", 1.0)
     assert hand.take(Deadly(), jobs(2)) is None
     ((row, record),) = hand.take(Deadly(), jobs(1))
     assert (row.run, row.result, row.metrics, record) == (0, "failed", (None, None, None), None)

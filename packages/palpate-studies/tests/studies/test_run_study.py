@@ -136,7 +136,7 @@ def test_an_error_within_a_run_is_its_result(tmp_path, monkeypatch):
     def broken(record, window):
         raise ZeroDivisionError("a metric that\nfails")
 
-    monkeypatch.setattr(one_run, "Look", broken)
+    monkeypatch.setattr(one_run, "Window", broken)
     frame = work(SMALL, tmp_path / "out", Local(2)).run()
     assert set(frame["result"]) == {"failed"}
     assert set(frame["why"]) == {"ZeroDivisionError: a metric that fails"}

@@ -18,7 +18,7 @@ ENOUGH = 0.9
 
 
 @dataclass(frozen=True)
-class Claim:
+class ThesisClaim:
     """One row of claims.json.
 
     Args:
@@ -51,7 +51,7 @@ class Done:
     number: str
     title: str
     caption: str
-    claims: list[Claim]
+    claims: list[ThesisClaim]
     seconds: float
 
 
@@ -119,7 +119,7 @@ class Numbered:
         return texts(self.NUMBER)[1]
 
 
-def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> Claim:
+def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     """A row of claims.json.
 
     Args:
@@ -132,21 +132,21 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> Claim:
         row = {**tables()["claims"][row.pop("like")], **row}
     places = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
     filled: dict[str, Any] = {name: text.format(**places) for name, text in row.items()}
-    return Claim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(holds), **filled)
+    return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(holds), **filled)
 
 
-def rows_of(studies: Sequence[Done]) -> list[Claim]:
+def rows_of(studies: Sequence[Done]) -> list[ThesisClaim]:
     """The claims of these studies, one count for the page, claims.json and the terminal: see `with_wholes`."""
     return with_wholes([claim for done in studies for claim in done.claims])
 
 
-def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
+def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
     """The claims, and before the first part of each that was only measured in parts ("a.K", "a.B") the whole, "a".
 
     A whole is reproduced if all its parts are; "not checkable" if all are that.
     """
     ids = {claim.id for claim in claims}
-    rows: list[Claim] = []
+    rows: list[ThesisClaim] = []
     for claim in claims:
         name = _name(claim)
         if name not in ids:
@@ -156,12 +156,12 @@ def with_wholes(claims: Sequence[Claim]) -> list[Claim]:
     return rows
 
 
-def count_verdicts(claims: Sequence[Claim]) -> Counter[str]:
+def count_verdicts(claims: Sequence[ThesisClaim]) -> Counter[str]:
     """How many claims came to each verdict; rows that only sum up others are none."""
     return Counter(claim.verdict for claim in claims if not claim.group)
 
 
-def count_in_words(claims: Sequence[Claim]) -> str:
+def count_in_words(claims: Sequence[ThesisClaim]) -> str:
     """The count, the same everywhere: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
     found = count_verdicts(claims)
     parts = [("reproduced", "reproduced"), ("differs", "differ"), ("not checkable", "not checkable")]
@@ -169,16 +169,16 @@ def count_in_words(claims: Sequence[Claim]) -> str:
     return f"{found.total()} claim{'s' * (found.total() != 1)} measured: {told}"
 
 
-def _name(claim: Claim) -> str:
+def _name(claim: ThesisClaim) -> str:
     """The claim that this one is, or is a part of: "a" of "a.K"."""
     return claim.id.partition(".")[0]
 
 
-def _whole(name: str, parts: Sequence[Claim]) -> Claim:
+def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
     verdicts = {part.verdict for part in parts}
     verdict: Verdict = verdicts.pop() if len(verdicts) == 1 else "differs"
     told = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
-    return Claim(
+    return ThesisClaim(
         id=name,
         source="; ".join(dict.fromkeys(part.source for part in parts)),
         claim=" ".join(dict.fromkeys(part.claim for part in parts)),

@@ -10,12 +10,12 @@ from typing import Any, Protocol, cast
 
 from palpate.errors import unknown
 from palpate_thesis import explanations, figures
-from palpate_thesis.claims import Claim
+from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 
-class Study(Protocol):
+class FigureModule(Protocol):
     """A module with one figure.
 
     ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
@@ -32,7 +32,7 @@ class Study(Protocol):
         """Measured values for `check` and `plot`, and no others."""
         ...
 
-    def check(self, data: Any) -> Sequence[Claim]:
+    def check(self, data: Any) -> Sequence[ThesisClaim]:
         """A row for each claim that this figure decides."""
         ...
 
@@ -41,16 +41,16 @@ class Study(Protocol):
         ...
 
 
-def studies() -> list[Study]:
+def studies() -> list[FigureModule]:
     """All figures in the thesis' order, then all explanations."""
     return [*sorted(_of(figures), key=_place), *_of(explanations)]
 
 
-def _place(figure: Study) -> tuple[int, ...]:
+def _place(figure: FigureModule) -> tuple[int, ...]:
     return tuple(map(int, figure.NUMBER.split(".")))
 
 
-def study(number: str) -> Study:
+def study(number: str) -> FigureModule:
     """One of them.
 
     Raises:
@@ -62,8 +62,10 @@ def study(number: str) -> Study:
     return known[number]
 
 
-def _of(package: ModuleType) -> list[Study]:
+def _of(package: ModuleType) -> list[FigureModule]:
     """Each module of a package is a study, or has several as `STUDIES`."""
     names = sorted(m.name for m in pkgutil.iter_modules(package.__path__))
     modules = [import_module(f"{package.__name__}.{name}") for name in names]
-    return [cast("Study", study) for module in modules for study in getattr(module, "STUDIES", (module,))]
+    return [
+        cast("FigureModule", study) for module in modules for study in getattr(module, "STUDIES", (module,))
+    ]

@@ -43,5 +43,5 @@ def apply_look() -> Iterator[None]:
     """The look, for figures that are drawn inside."""
     import matplotlib
 
-    with style.inked(), matplotlib.rc_context(LOOK):
+    with style.ink(), matplotlib.rc_context(LOOK):
         yield

@@ -12,12 +12,12 @@ import msgspec
 
 from palpate._jit import sources_stamp
 from palpate.errors import InputError
-from palpate.files import check_place, kept_folder, signed, write_json, write_text
+from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
 from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis import look
-from palpate_thesis.claims import Claim, Done, rows_of
-from palpate_thesis.figure import Study
+from palpate_thesis.claims import Done, ThesisClaim, rows_of
+from palpate_thesis.figure import FigureModule
 from palpate_thesis.laboratory.laboratory import values
 from palpate_thesis.page import index_page
 from palpate_thesis.runs import Runs
@@ -27,7 +27,7 @@ PANELS = ".panels.json"
 
 
 @dataclass(frozen=True)
-class Written:
+class MeasurementFormat:
     """How a measurement is written.
 
     Args:
@@ -42,7 +42,7 @@ class Written:
 
 
 @dataclass
-class State:
+class FolderState:
     """Content of the folder, with its sources and seeds."""
 
     stamp: str
@@ -52,13 +52,13 @@ class State:
 
 
 def measure(
-    studies: Sequence[Study],
+    studies: Sequence[FigureModule],
     runs: Runs,
     folder: Path,
     *,
-    written: Written,
+    written: MeasurementFormat,
     replace: bool = False,
-    started: Callable[[Study], None] = lambda _: None,
+    started: Callable[[FigureModule], None] = lambda _: None,
     resumed: Callable[[int], None] = lambda _: None,
 ) -> list[Done]:
     """Runs the studies and writes claims.json, index.html and each figure into the folder, after each study.
@@ -84,7 +84,7 @@ def measure(
     return [state.done[number] for number in state.wanted]
 
 
-def _measure_study(study: Study, runs: Runs, folder: Path, written: Written) -> Done:
+def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: MeasurementFormat) -> Done:
     begun = time.perf_counter()
     data = study.run(runs)
     claims = [_with_note(claim, runs) for claim in study.check(data)]
@@ -92,11 +92,11 @@ def _measure_study(study: Study, runs: Runs, folder: Path, written: Written) -> 
         drawing = study.plot(data)
         for ending in dict.fromkeys((".png", *written.endings)):
             style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
-        write_json(folder / f"{study.NUMBER}{PANELS}", signed({"panels": panels_of(drawing)}))
+        write_json(folder / f"{study.NUMBER}{PANELS}", with_author({"panels": panels_of(drawing)}))
     return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
 
 
-def _with_note(claim: Claim, runs: Runs) -> Claim:
+def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
     """A claim with a note that is true of the laboratory: those of the figures speak of the hand-chosen bench."""
     if runs.laboratory.chosen:
         return claim
@@ -105,14 +105,14 @@ def _with_note(claim: Claim, runs: Runs) -> Claim:
     return replace(claim, note=note)
 
 
-def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> State:
+def _state(studies: Sequence[FigureModule], runs: Runs, folder: Path, command: str) -> FolderState:
     wanted = [s.NUMBER for s in studies]
     sources = sources_stamp(*sorted(Path(__file__).parent.rglob("*.py")))
     stamp = f"{sources} seeds {list(runs.seeds)}"
     if not runs.laboratory.chosen:
         stamp += f" laboratory {values(runs.laboratory)}"
     if not (folder / STATE).exists():
-        return State(stamp, wanted, command)
+        return FolderState(stamp, wanted, command)
     old = _read_state(folder)
     if old is None:
         raise InputError(f"{folder / STATE} is no measurement of the thesis; choose another --out")
@@ -123,15 +123,15 @@ def _state(studies: Sequence[Study], runs: Runs, folder: Path, command: str) -> 
     return old
 
 
-def _read_state(folder: Path) -> State | None:
+def _read_state(folder: Path) -> FolderState | None:
     check_place(folder / STATE)
     try:
-        return msgspec.json.decode((folder / STATE).read_bytes(), type=State)
+        return msgspec.json.decode((folder / STATE).read_bytes(), type=FolderState)
     except (OSError, msgspec.DecodeError):
         return None
 
 
-def _write(state: State, folder: Path) -> None:
+def _write(state: FolderState, folder: Path) -> None:
     """Everything that the folder says, each file whole or as it was."""
     finished = [state.done[n] for n in state.wanted if n in state.done]
     write_json(folder / "claims.json", [asdict(row) for row in rows_of(finished)])
@@ -149,5 +149,5 @@ def _panels(path: Path) -> list[dict[str, Any]]:
         return []
 
 
-def _write_state(state: State, folder: Path) -> None:
-    write_json(folder / STATE, signed(asdict(state)))
+def _write_state(state: FolderState, folder: Path) -> None:
+    write_json(folder / STATE, with_author(asdict(state)))

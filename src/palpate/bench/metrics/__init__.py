@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from palpate.bench.metrics.following import CONTACT_METRICS, FOLLOWING, SURFACE
 from palpate.bench.metrics.verdicts import CLAIMS, own_metric
-from palpate.bench.metrics.window import Look, Metric, Value
+from palpate.bench.metrics.window import Metric, Value, Window
 from palpate.errors import unknown
 from palpate.plugins import is_plugin
 
@@ -25,4 +25,4 @@ def metric_of(name: str) -> Metric:
     return METRICS[name]
 
 
-__all__ = ["METRICS", "Look", "Metric", "Value", "metric_of"]
+__all__ = ["METRICS", "Metric", "Value", "Window", "metric_of"]

@@ -14,9 +14,9 @@ from palpate.bench.metrics.window import (
     IDENTIFIER,
     PARAMETERS,
     SETTLE,
-    Look,
     Metric,
     Value,
+    Window,
     losses,
     rms,
 )
@@ -24,49 +24,49 @@ from palpate.bench.metrics.window import (
 JOINTS = (1, 2, 3)
 
 
-def time_to_loss(look: Look) -> Value:
+def time_to_loss(window: Window) -> Value:
     """From the first contact to its first loss, or to where numbers are none [s]; None if it is kept."""
-    if not look.touched:
+    if not window.touched:
         return None
-    lost = np.flatnonzero((look.record["phase"] == LOST) & (look.since > 0.0))
+    lost = np.flatnonzero((window.record["phase"] == LOST) & (window.since > 0.0))
     if len(lost):
-        return float(look.since[lost[0]])
-    return float(look.since[-1]) if look.ended else None
+        return float(window.since[lost[0]])
+    return float(window.since[-1]) if window.ended else None
 
 
-def _time_in_contact(look: Look) -> Value:
+def _time_in_contact(window: Window) -> Value:
     """As `time_to_loss`, or to the end of the run."""
-    if not look.touched:
+    if not window.touched:
         return 0.0
-    lost = time_to_loss(look)
-    return float(look.since[-1]) if lost is None else lost
+    lost = time_to_loss(window)
+    return float(window.since[-1]) if lost is None else lost
 
 
-def _saturation(*joints: int) -> Callable[[Look], Value]:
-    def of(look: Look) -> Value:
-        if not len(look.error):
+def _saturation(*joints: int) -> Callable[[Window], Value]:
+    def of(window: Window) -> Value:
+        if not len(window.error):
             return None
-        return max(float(np.mean(look[f"saturated{joint}"])) for joint in joints)
+        return max(float(np.mean(window[f"saturated{joint}"])) for joint in joints)
 
     return of
 
 
-def _off(column: str, scale: float) -> Callable[[Look], Value]:
-    def of(look: Look) -> Value:
-        if not len(look.error):
+def _off(column: str, scale: float) -> Callable[[Window], Value]:
+    def of(window: Window) -> Value:
+        if not len(window.error):
             return None
-        return scale * float(np.mean(look[column] - look[f"{column}_desired"]))
+        return scale * float(np.mean(window[column] - window[f"{column}_desired"]))
 
     return of
 
 
 CONTACT_METRICS = (
-    Metric("contact_at", "s", "time of the first contact", lambda look: look.summary["contact_at_s"]),
+    Metric("contact_at", "s", "time of the first contact", lambda window: window.summary["contact_at_s"]),
     Metric(
         "contacts_lost",
         "1",
         "number of losses of contact",
-        lambda look: float(losses(look.record)),
+        lambda window: float(losses(window.record)),
         better="least",
     ),
     Metric("time_to_loss", "s", "from the first contact to its first loss; none if it is kept", time_to_loss),
@@ -94,7 +94,7 @@ CONTACT_METRICS = (
         "hidden_weights",
         "1",
         "norm of a neural controller's weights into the first hidden layer, at the end",
-        lambda look: float(look.record["adapted1"][-1]) if look.touched else None,
+        lambda window: float(window.record["adapted1"][-1]) if window.touched else None,
     ),
 )
 """Metrics of contact, motors and pose."""
@@ -107,23 +107,25 @@ SHARE = 0.10
 """Largest mean error in the last second of an interval, as a share of the desired force there."""
 
 
-def _mean_error(look: Look) -> Value:
-    return float(np.mean(look.error)) if len(look.error) else None
+def _mean_error(window: Window) -> Value:
+    return float(np.mean(window.error)) if len(window.error) else None
 
 
-def _std(look: Look) -> Value:
-    return float(np.std(look.error)) if len(look.error) else None
+def _std(window: Window) -> Value:
+    return float(np.std(window.error)) if len(window.error) else None
 
 
-def interval_error(look: Look) -> Value:
+def interval_error(window: Window) -> Value:
     """The largest mean error in the last second of an interval, as a share of the desired force there."""
-    shares = [abs(float(np.mean(error))) / abs(float(np.mean(desired))) for error, desired in look.intervals]
+    shares = [
+        abs(float(np.mean(error))) / abs(float(np.mean(desired))) for error, desired in window.intervals
+    ]
     return max(shares, default=None)
 
 
-def settled_rms(look: Look) -> Value:
+def settled_rms(window: Window) -> Value:
     """RMS error outside the first half second after each step [N]."""
-    return rms(look.after_steps) if len(look.after_steps) else None
+    return rms(window.after_steps) if len(window.after_steps) else None
 
 
 def _of_force(key: str) -> Metric:
@@ -136,52 +138,52 @@ def _of_force(key: str) -> Metric:
     }[key]
     name = key.rpartition("_")[0]
 
-    def of(look: Look) -> Value:
-        force = look.summary["force"]
+    def of(window: Window) -> Value:
+        force = window.summary["force"]
         return None if force is None else force[key]
 
     return Metric(name, unit, text, of, better=LEAST)
 
 
-def _settles(look: Look) -> Value:
-    force = look.summary["force"]
+def _settles(window: Window) -> Value:
+    force = window.summary["force"]
     return None if force is None else float(force["settling_s"] is not None)
 
 
-def _overshoot_share(look: Look) -> Value:
-    force = look.summary["force"]
+def _overshoot_share(window: Window) -> Value:
+    force = window.summary["force"]
     if force is None or force["overshoot_N"] is None:
         return None
-    return float(force["overshoot_N"]) / float(look.record["force_desired"][look.pressing][0])
+    return float(force["overshoot_N"]) / float(window.record["force_desired"][window.pressing][0])
 
 
-def _ringing(key: str) -> Callable[[Look], Value]:
-    def of(look: Look) -> Value:
-        force = look.summary["force"]
+def _ringing(key: str) -> Callable[[Window], Value]:
+    def of(window: Window) -> Value:
+        force = window.summary["force"]
         return None if force is None else (force["ringing"] or {}).get(key, 0.0 if "_N" in key else None)
 
     return of
 
 
-def rings(look: Look) -> bool:
+def rings(window: Window) -> bool:
     """Whether the force oscillates at the end by more than the band within which it counts as settled."""
-    force = look.summary["force"]
+    force = window.summary["force"]
     found = force and force["ringing"]
     return bool(found and found["amplitude_N"] > BAND * abs(force["desired_N"]))
 
 
-def _peak(look: Look) -> Value:
-    return float(np.max(look["force"])) if len(look.error) else None
+def _peak(window: Window) -> Value:
+    return float(np.max(window["force"])) if len(window.error) else None
 
 
-def _bandwidth(look: Look) -> Value:
+def _bandwidth(window: Window) -> Value:
     """Slope of the controller's memory over the integral of the measured force error."""
-    t = look.record["t"][look.inside]
+    t = window.record["t"][window.inside]
     if len(t) < 3:
         return None
-    error = look["force_desired"] - look["force_measured"]
+    error = window["force_desired"] - window["force_measured"]
     integral = np.cumsum(error)[:-1] * (t[1] - t[0])
-    return float(np.polyfit(integral, look["memory_fx"][1:], 1)[0])
+    return float(np.polyfit(integral, window["memory_fx"][1:], 1)[0])
 
 
 FOLLOWING = (
@@ -189,7 +191,7 @@ FOLLOWING = (
         "force_rms",
         "N",
         "RMS of the true force's error, steps included",
-        lambda look: rms(look.error),
+        lambda window: rms(window.error),
         better=LEAST,
     ),
     Metric(
@@ -247,22 +249,22 @@ TOLD = {
 }
 
 
-def estimate(front: str, parameter: str) -> Callable[[Look], Value]:
+def estimate(front: str, parameter: str) -> Callable[[Window], Value]:
     """An estimate at the end of a run, in SI units; None without contact."""
 
-    def of(look: Look) -> Value:
-        found = look.summary["identified"]
+    def of(window: Window) -> Value:
+        found = window.summary["identified"]
         return None if found is None else found.get(front, {}).get(parameter)
 
     return of
 
 
-def error(front: str, parameter: str) -> Callable[[Look], Value]:
+def error(front: str, parameter: str) -> Callable[[Window], Value]:
     """The estimate over the truth, less one; None where the surface has no such parameter."""
     estimated = estimate(front, parameter)
 
-    def of(look: Look) -> Value:
-        truth, found = look.summary["truth"].get(parameter), estimated(look)
+    def of(window: Window) -> Value:
+        truth, found = window.summary["truth"].get(parameter), estimated(window)
         return None if truth is None or found is None or not truth["value"] else found / truth["value"] - 1.0
 
     return of

@@ -18,7 +18,7 @@ from palpate.bench.metrics.following import (
     rings,
     settled_rms,
 )
-from palpate.bench.metrics.window import STEADY, Look, Metric, Value, losses
+from palpate.bench.metrics.window import STEADY, Metric, Value, Window, losses
 from palpate.errors import InputError
 from palpate.plugins import plugin, reason
 
@@ -28,65 +28,65 @@ YES_OR_NO = ("no", "yes")
 OUTCOMES = ("follows", "slow", "rings")
 
 
-def outcome(look: Look) -> Value:
+def outcome(window: Window) -> Value:
     """0 if the force follows; 1 if it is still on its way at the ends of intervals; 2 if it shakes or rings."""
-    off, shaking = interval_error(look), settled_rms(look)
+    off, shaking = interval_error(window), settled_rms(window)
     if off is None or shaking is None:
         return None
     if off > SHARE:
         return 1.0
-    return 0.0 if shaking <= LIMIT and not rings(look) else 2.0
+    return 0.0 if shaking <= LIMIT and not rings(window) else 2.0
 
 
-def _follows(look: Look) -> Value:
-    if not look.touched:
+def _follows(window: Window) -> Value:
+    if not window.touched:
         return None
-    if look.ended or losses(look.record):
+    if window.ended or losses(window.record):
         return 0.0
-    off, shaking = interval_error(look), settled_rms(look)
+    off, shaking = interval_error(window), settled_rms(window)
     return None if off is None or shaking is None else float(off <= SHARE and shaking <= LIMIT)
 
 
-def _steady(look: Look) -> Value:
-    if not look.touched:
+def _steady(window: Window) -> Value:
+    if not window.touched:
         return None
-    error = look.error
-    if not len(error) or losses(look.record):
+    error = window.error
+    if not len(error) or losses(window.record):
         return 0.0
-    return float(np.std(error) <= STEADY * abs(np.mean(look["force_desired"])))
+    return float(np.std(error) <= STEADY * abs(np.mean(window["force_desired"])))
 
 
-def adaptation_time(look: Look) -> Value:
+def adaptation_time(window: Window) -> Value:
     """From the first contact to the beginning of the first interval from which on none ends far off [s].
 
     Far off is a mean error in the last second of more than 10 % of the desired force. None if one of the last two is:
     steps go between two forces, and the lower one is held where the higher never is. None, too, if contact was lost.
     The study's window does not count.
     """
-    if not look.touched or losses(look.record) or look.ended:
+    if not window.touched or losses(window.record) or window.ended:
         return None
-    period = float(look.record.meta["experiment"]["force"]["period"])
+    period = float(window.record.meta["experiment"]["force"]["period"])
     far = [
         abs(float(np.mean(error))) > SHARE * abs(float(np.mean(desired)))
-        for error, desired in Look(look.record).intervals
+        for error, desired in Window(window.record).intervals
     ]
     if not far or any(far[-2:]):
         return None
     return period * (max((i for i, off in enumerate(far) if off), default=-1) + 1)
 
 
-def _negative(front: str, parameter: str) -> Callable[[Look], Value]:
+def _negative(front: str, parameter: str) -> Callable[[Window], Value]:
     value = estimate(front, parameter)
 
-    def of(look: Look) -> Value:
-        found = value(look)
+    def of(window: Window) -> Value:
+        found = value(window)
         return None if found is None else float(found < 0.0)
 
     return of
 
 
-def _agrees(look: Look) -> Value:
-    K, quotient = estimate("thesis", "K")(look), estimate(QUOTIENT, "K")(look)
+def _agrees(window: Window) -> Value:
+    K, quotient = estimate("thesis", "K")(window), estimate(QUOTIENT, "K")(window)
     return None if K is None or not quotient else float(abs(K / quotient - 1.0) <= APART)
 
 
@@ -164,20 +164,20 @@ def own_metric(name: str) -> Metric:
         inspect.signature(found).bind(None)
     except (TypeError, ValueError):
         raise InputError(
-            f"{name} takes {inspect.signature(found)}; a metric takes one argument, a Look: look['force'] is a column"
+            f"{name} takes {inspect.signature(found)}; a metric takes one argument, a Look: window['force'] is a column"
         ) from None
     text = (inspect.getdoc(found) or name).splitlines()[0].rstrip(".")
     return Metric(name, "1", text, _where_there_is_something(found))
 
 
-def try_metric(metric: Metric, look: Look) -> None:
+def try_metric(metric: Metric, window: Window) -> None:
     """Asks a metric once.
 
     Raises:
         InputError: it raises, or does not return a number.
     """
     try:
-        metric.value_in(look)
+        metric.value_in(window)
     except Exception as error:
         raise InputError(
             f"the metric {metric.name} fails: {reason(error)}; it returns a number, or None"
@@ -185,7 +185,7 @@ def try_metric(metric: Metric, look: Look) -> None:
 
 
 def _where_there_is_something(of: Any) -> Any:
-    def value(look: Look) -> Value:
-        return of(look) if look.inside.any() else None
+    def value(window: Window) -> Value:
+        return of(window) if window.inside.any() else None
 
     return value

@@ -197,7 +197,7 @@ class Metric:
         name: as studies have it.
         unit: SI; "1" for a plain number.
         text: its description, in a line.
-        of: from a look at a record; None where the run does not have it.
+        of: from a window at a record; None where the run does not have it.
         words: meanings of its whole numbers, from 0 on; empty for a quantity.
         better: whether the least or the most of it is better; "" where neither is.
     """
@@ -205,7 +205,7 @@ class Metric:
     name: str
     unit: str
     text: str
-    of: Callable[[Look], Value]
+    of: Callable[[Window], Value]
     words: tuple[str, ...] = ()
     better: Literal["", "least", "most"] = ""
     signed: bool = False
@@ -221,15 +221,15 @@ class Metric:
         """Its name in a sentence."""
         return f"{self.name} by magnitude" if self.signed else self.name
 
-    def value_in(self, look: Look) -> Value:
+    def value_in(self, window: Window) -> Value:
         """The number, or None where there is none or it is not finite."""
         with np.errstate(all="ignore"):
-            value = self.of(look)
+            value = self.of(window)
         return float(value) if value is not None and math.isfinite(value) else None
 
 
 @dataclass(frozen=True)
-class Look:
+class Window:
     """A record, and from when to when after the first contact it is judged [s].
 
     What several metrics need is computed once.

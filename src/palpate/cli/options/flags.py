@@ -16,7 +16,7 @@ SIGNED = Parameter(allow_leading_hyphen=True)
 """A value that may begin with a minus: it is a number below zero, not another option."""
 
 
-def checked(kind: Any, tokens: Sequence[Token]) -> Any:
+def value_of(kind: Any, tokens: Sequence[Token]) -> Any:
     """The value of any option or argument: a number must be one, and not beyond what the machine counts."""
     from cyclopts import convert
 

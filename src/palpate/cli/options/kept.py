@@ -88,7 +88,7 @@ def _name(part: Any, field: str) -> str:
     return said[0].removeprefix("--") if said else field.replace("_", "-")
 
 
-def expanded(argv: Sequence[str], app: App) -> list[str]:
+def expand(argv: Sequence[str], app: App) -> list[str]:
     """The words of a command, followed by those of its options file and preset.
 
     Raises:

@@ -142,7 +142,7 @@ class FolderOptions:
     json: Annotated[bool, FLAG] = False
 
 
-def listed(files: TomlFiles, title: Callable[[str], str]) -> None:
+def print_names(files: TomlFiles, title: Callable[[str], str]) -> None:
     """Print the names that come with palpate, each with its title."""
     width = 2 + max(map(len, files.names()))
     for name in files.names():

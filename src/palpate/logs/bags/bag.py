@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.files.limits import Budget, Limits
+from palpate.files.limits import Limits, ReadingBudget
 from palpate.logs.bags.reading import Stream, finder, first_line, leaves, no_field, open_files
-from palpate.logs.bags.scanning import Channel
+from palpate.logs.bags.scanning import TopicInFile
 from palpate.logs.kinds import Kind
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Bag:
         self._unpacked = TemporaryDirectory()
         try:
             self._files, self.troubles = open_files(
-                path, kind, Budget(path, limits or Limits()), self._unpacked
+                path, kind, ReadingBudget(path, limits or Limits()), self._unpacked
             )
             self._types = _types([channel for file in self._files for channel in file.channels.values()])
             self.topics = {topic.name: topic for topic in self._list_topics()}
@@ -167,8 +167,8 @@ class Bag:
                     raise _no_reading(name, path, self.first(name))
         return streams, origin / 1e9
 
-    def _rows(self, wanted: Mapping[str, Sequence[str]]) -> dict[str, _Rows]:
-        rows = {name: _Rows() for name in wanted}
+    def _rows(self, wanted: Mapping[str, Sequence[str]]) -> dict[str, _TopicRows]:
+        rows = {name: _TopicRows() for name in wanted}
         finders: dict[str, Callable[[Any], Sequence[float]]] = {}
         for name, received, message in self._messages(list(wanted)):
             if name not in finders:
@@ -206,7 +206,7 @@ class Bag:
 
 
 @dataclass
-class _Rows:
+class _TopicRows:
     """The messages of a topic: times of recording and of their headers [ns], numbers row by row, the first frame.
 
     A stamp of 0 means no stamp.
@@ -233,7 +233,7 @@ class _Rows:
         return Stream(topic, (received - origin) / 1e9, stamps, values, self.frame or "")
 
 
-def _types(channels: Sequence[Channel]) -> Typestore:
+def _types(channels: Sequence[TopicInFile]) -> Typestore:
     """The types that the bag defines; those of ROS 2 itself where it defines none, as bags before 2023 did."""
     from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 

@@ -16,12 +16,12 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.files.limits import Budget
+from palpate.files.limits import ReadingBudget
 from palpate.logs.bags.scanning import (
     ZSTD,
-    Channel,
     End,
-    Raw,
+    RawMessage,
+    TopicInFile,
     scan_bag1,
     scan_mcap,
     scan_sqlite,
@@ -50,11 +50,11 @@ class Storage:
         ImportError: the library that reads bags is not installed.
     """
 
-    def __init__(self, path: Path, kind: Kind, budget: Budget, *, packed: bool = False) -> None:
+    def __init__(self, path: Path, kind: Kind, budget: ReadingBudget, *, packed: bool = False) -> None:
         self.path, self._budget, self._packed = path, budget, packed
         self._scan = _SCANS[kind]
         self.end = End(finished=False)
-        self.channels: dict[int, Channel] = {}
+        self.channels: dict[int, TopicInFile] = {}
         self.counts: Counter[int] = Counter()
         self.spans: dict[int, tuple[int, int]] = {}
         trouble = self._look()
@@ -66,7 +66,7 @@ class Storage:
         """Find channels, counts and times; what ended it early."""
         try:
             for item in self._items():
-                if isinstance(item, Raw):
+                if isinstance(item, RawMessage):
                     self.counts[item.channel] += 1
                     first, last = self.spans.get(item.channel, (item.received, item.received))
                     self.spans[item.channel] = min(first, item.received), max(last, item.received)
@@ -78,16 +78,16 @@ class Storage:
             return str(error)
         return ""
 
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[Channel, int, bytes]]:
+    def messages(self, topics: Collection[str]) -> Iterator[tuple[TopicInFile, int, bytes]]:
         """Channel, time of recording [ns] and serialised message, of some topics."""
         try:
             for item in self._items():
-                if isinstance(item, Raw) and self.channels[item.channel].topic in topics:
+                if isinstance(item, RawMessage) and self.channels[item.channel].topic in topics:
                     yield self.channels[item.channel], item.received, self._unpack(item)
         except _DamageError:
             return
 
-    def _unpack(self, item: Raw) -> bytes:
+    def _unpack(self, item: RawMessage) -> bytes:
         """A message; one that its bag's metadata calls packed may be plain, as recorders pack what gains by it."""
         if not (self._packed and item.data.startswith(ZSTD)):
             return item.data
@@ -102,11 +102,11 @@ class Storage:
             )
             raise InputError(text) from None
 
-    def _items(self) -> Iterator[Channel | Raw | End]:
+    def _items(self) -> Iterator[TopicInFile | RawMessage | End]:
         """Content of the file up to its end, or to the first unreadable part."""
         try:
             for item in self._scan(self.path, self._budget):
-                if isinstance(item, Raw) and not (
+                if isinstance(item, RawMessage) and not (
                     item.channel in self.channels and 0 <= item.received < _LATEST
                 ):
                     return
@@ -138,7 +138,7 @@ class _DamageError(Exception):
 
 
 def open_files(
-    path: Path, kind: Kind, budget: Budget, unpacked: TemporaryDirectory[str]
+    path: Path, kind: Kind, budget: ReadingBudget, unpacked: TemporaryDirectory[str]
 ) -> tuple[list[Storage], list[str]]:
     """The files of a bag in the order of time, and what is wrong with them.
 
@@ -199,7 +199,7 @@ def _is_storage(path: Path) -> bool:
     return path.suffix in STORAGES or (path.suffix == PACKED and path.with_suffix("").suffix in STORAGES)
 
 
-def _unpack_whole(path: Path, budget: Budget, to: TemporaryDirectory[str]) -> Path:
+def _unpack_whole(path: Path, budget: ReadingBudget, to: TemporaryDirectory[str]) -> Path:
     """A file that was packed as a whole, unpacked."""
     kind_of(path)
     place = Path(to.name) / path.stem

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, BinaryIO, NamedTuple
 from urllib.parse import quote
 
 from palpate.errors import InputError
-from palpate.files.limits import Budget, LimitError
+from palpate.files.limits import LimitError, ReadingBudget
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import Header
@@ -24,7 +24,7 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 """First bytes of whatever zstd packed."""
 
 
-class Channel(NamedTuple):
+class TopicInFile(NamedTuple):
     """A topic as one file holds it.
 
     Args:
@@ -42,7 +42,7 @@ class Channel(NamedTuple):
     definition: str
 
 
-class Raw(NamedTuple):
+class RawMessage(NamedTuple):
     """A message as it lies in the file.
 
     Args:
@@ -68,7 +68,7 @@ class End(NamedTuple):
     share: float | None = None
 
 
-def unpack_chunk(data: bytes, packing: str, size: int, budget: Budget) -> bytes:
+def unpack_chunk(data: bytes, packing: str, size: int, budget: ReadingBudget) -> bytes:
     """Unpack a chunk.
 
     Args:
@@ -99,7 +99,7 @@ def unpack_chunk(data: bytes, packing: str, size: int, budget: Budget) -> bytes:
     return bytes(found)
 
 
-def unpack_message(data: bytes, budget: Budget) -> bytes:
+def unpack_message(data: bytes, budget: ReadingBudget) -> bytes:
     """Unpack a message that was packed by itself, by zstd."""
     most = int(min(budget.limits.size, 2**40))
     found = bytes(zstd().ZstdDecompressor().decompress(data, max_length=most))
@@ -107,7 +107,7 @@ def unpack_message(data: bytes, budget: Budget) -> bytes:
     return found
 
 
-def unpack_file(packed: IO[bytes], to: IO[bytes], budget: Budget) -> None:
+def unpack_file(packed: IO[bytes], to: IO[bytes], budget: ReadingBudget) -> None:
     """Unpack a whole file that was packed by zstd."""
     with zstd().open(packed, "rb") as source:
         while piece := source.read(1 << 20):
@@ -127,7 +127,7 @@ def zstd() -> Any:
 _BAG1_MAGIC = b"#ROSBAG V2.0"
 
 
-def scan_bag1(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+def scan_bag1(path: Path, budget: ReadingBudget) -> Iterator[TopicInFile | RawMessage | End]:
     """Connections and messages of a ROS 1 bag (format 2.0) as far as they are whole."""
     from rosbags.rosbag1.reader import Header, RecordType
     from rosbags.typesys.msg import normalize_msgtype
@@ -148,9 +148,9 @@ def scan_bag1(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
                     about = Header.read(BytesIO(len(data).to_bytes(4, "little") + data))
                     kind, definition = about.get_string("type"), about.get_string("message_definition")
                     number, topic = header.get_uint32("conn"), header.get_string("topic")
-                    yield Channel(number, topic, normalize_msgtype(kind), "ros1msg", definition)
+                    yield TopicInFile(number, topic, normalize_msgtype(kind), "ros1msg", definition)
                 case RecordType.MSGDATA:
-                    yield Raw(header.get_uint32("conn"), header.get_time("time"), data)
+                    yield RawMessage(header.get_uint32("conn"), header.get_time("time"), data)
         reached = file.tell()
     size = path.stat().st_size
     share = None if not index else max(1 - size / index, 0.0) if reached == size else None
@@ -158,7 +158,7 @@ def scan_bag1(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
 
 
 def _bag1_records(
-    file: BinaryIO, budget: Budget, *, packed: bool = False
+    file: BinaryIO, budget: ReadingBudget, *, packed: bool = False
 ) -> Iterator[tuple[Header, bytes, int]]:
     """Headers and data of all whole records, those inside of chunks included, and where each ends."""
     from rosbags.rosbag1.reader import Header, ReaderError, RecordType, read_uint32
@@ -190,7 +190,7 @@ _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
 _MAGIC = 8
 
 
-def scan_mcap(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+def scan_mcap(path: Path, budget: ReadingBudget) -> Iterator[TopicInFile | RawMessage | End]:
     """Channels and messages of an MCAP file as far as they are whole."""
     schemas: dict[int, tuple[str, str, str]] = {}
     finished = False
@@ -204,16 +204,16 @@ def scan_mcap(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
                 about = schemas.get(unpack_from("<H", data, 2)[0], ("", "", ""))
                 topic, coding = _strings(data, 4, 2)
                 kind = about[0] if coding == "cdr" else f"{about[0]} as {coding}"
-                yield Channel(_number(data), topic, kind, *about[1:])
+                yield TopicInFile(_number(data), topic, kind, *about[1:])
             elif operation == _MESSAGE:
                 channel, _, received = unpack_from("<HIQ", data)
-                yield Raw(channel, received, data[22:])
+                yield RawMessage(channel, received, data[22:])
             else:
                 finished = True
     yield End(finished)
 
 
-def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterator[tuple[int, bytes]]:
+def _records(file: BinaryIO, budget: ReadingBudget, *, packed: bool = False) -> Iterator[tuple[int, bytes]]:
     """Operations and data of all whole records that matter, those inside of chunks included.
 
     The records of a chunk that is not compressed are read where they stand, so that a cut in it costs one message.
@@ -249,7 +249,7 @@ def _records(file: BinaryIO, budget: Budget, *, packed: bool = False) -> Iterato
         yield from _records(BytesIO(inside), budget, packed=True)
 
 
-def _inside(data: bytes, packing: str, size: int, crc: int, budget: Budget) -> bytes | None:
+def _inside(data: bytes, packing: str, size: int, crc: int, budget: ReadingBudget) -> bytes | None:
     """Content of a chunk; None if it is damaged."""
     try:
         inside = unpack_chunk(data, packing, size, budget)
@@ -292,12 +292,12 @@ _STEPS = 100_000
 """Instructions of SQLite between two looks at the clock."""
 
 
-def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
+def scan_sqlite(path: Path, budget: ReadingBudget) -> Iterator[TopicInFile | RawMessage | End]:
     """Topics and messages of a ROS 2 bag in SQLite as far as its pages are there."""
     with closing(_open_database(path, budget)) as database:
         types = {kind: (encoding, text) for kind, encoding, text in _rows(database, _TYPES)}
         for number, topic, kind in _rows(database, _TOPICS):
-            yield Channel(number, topic, kind, *types.get(kind, ("", "")))
+            yield TopicInFile(number, topic, kind, *types.get(kind, ("", "")))
         hurt = False
         left = path.stat().st_size
         try:
@@ -306,7 +306,7 @@ def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
                 left -= len(row[2]) if plain else 0
                 if hurt := not plain or left < 0:  # a page that is there in part is read as if zeros followed
                     break
-                yield Raw(*row)
+                yield RawMessage(*row)
         except sqlite3.DatabaseError:
             if budget.seconds_left <= 0:
                 raise budget.too_long() from None
@@ -315,7 +315,7 @@ def scan_sqlite(path: Path, budget: Budget) -> Iterator[Channel | Raw | End]:
     yield End(finished=not (hurt or share), share=share)
 
 
-def _open_database(path: Path, budget: Budget) -> sqlite3.Connection:
+def _open_database(path: Path, budget: ReadingBudget) -> sqlite3.Connection:
     """The database, to be read only, and no longer than the log may take."""
     database = sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)
     database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size + 1_000_000, 2**31 - 1))

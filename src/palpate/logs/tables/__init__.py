@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from palpate.files.limits import Budget, Limits
+from palpate.files.limits import Limits, ReadingBudget
 from palpate.logs.kinds import Kind
 from palpate.logs.tables.matlab import read_matlab
 from palpate.logs.tables.parquet import read_parquet
@@ -21,7 +21,7 @@ def open_table(path: Path, kind: Kind, delimiter: str | None = None, limits: Lim
     Raises:
         InputError: it cannot be read, or is larger than the limits.
     """
-    budget = Budget(path, limits or Limits())
+    budget = ReadingBudget(path, limits or Limits())
     match kind:
         case Kind.MAT:
             return read_matlab(path, budget)

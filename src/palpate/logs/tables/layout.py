@@ -10,8 +10,8 @@ from itertools import groupby
 from pathlib import Path
 
 from palpate.errors import InputError
-from palpate.files.limits import Budget
-from palpate.logs.tables.lines import Line, Parting
+from palpate.files.limits import ReadingBudget
+from palpate.logs.tables.lines import Parting, TextLine
 from palpate.logs.tables.sheet import Stated
 from palpate.units import known_unit
 
@@ -59,7 +59,9 @@ class Layout:
         return _NAMES.get(self.parting.delimiter, repr(self.parting.delimiter))
 
 
-def find_layout(path: Path, lines: Sequence[Line], budget: Budget, delimiter: str | None = None) -> Layout:
+def find_layout(
+    path: Path, lines: Sequence[TextLine], budget: ReadingBudget, delimiter: str | None = None
+) -> Layout:
     """Look at the first lines of a text log.
 
     Args:
@@ -110,7 +112,7 @@ class _Block:
     quoted: bool
 
 
-def _best(lines: Sequence[Line], budget: Budget, delimiter: str | None) -> _Block | None:
+def _best(lines: Sequence[TextLine], budget: ReadingBudget, delimiter: str | None) -> _Block | None:
     tried = [p for p in _PARTINGS if delimiter in {None, p.delimiter}]
     if not tried and delimiter is not None:
         tried = [Parting(delimiter), Parting(delimiter, decimal_comma=delimiter != ",")]
@@ -118,7 +120,7 @@ def _best(lines: Sequence[Line], budget: Budget, delimiter: str | None) -> _Bloc
     return max(blocks, key=lambda block: block.score, default=None)
 
 
-def _block(lines: Sequence[Line], parting: Parting, budget: Budget) -> _Block | None:
+def _block(lines: Sequence[TextLine], parting: Parting, budget: ReadingBudget) -> _Block | None:
     """The rows of numbers under one parting: the longest run of lines of one width that hold some."""
     cells = [parting.split(line.text) for line in lines]
     budget.take(0)
@@ -171,7 +173,7 @@ def _is_row(kinds: Sequence[int], width: int, numeric: Sequence[int]) -> bool:
     return there and 2 * sum(kinds[place] == 1 for place in numeric) >= len(numeric)
 
 
-def _layout(path: Path, lines: Sequence[Line], block: _Block) -> Layout:
+def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     above = [line for line in lines if line.number < block.first]
     symbols: list[str] = []
     if len(above) > 1 and _is_units(found := block.parting.header(above[-1].text), block):
@@ -205,7 +207,7 @@ def _is_units(cells: Sequence[str], block: _Block) -> bool:
     return len(cells) >= block.filled and len(known) >= max(1, block.filled / 2) and len(others) < len(known)
 
 
-def _header(line: Line, block: _Block) -> list[str]:
+def _header(line: TextLine, block: _Block) -> list[str]:
     """The names in the line above the rows; none if it is something else.
 
     A header may be parted otherwise than its rows are; it then has a name for each column.

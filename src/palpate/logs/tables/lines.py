@@ -51,7 +51,7 @@ _SPACED = re.compile(r"\[[^\[\]]*\]|\([^()]*\)|[^\s\[(]+(?:\s*(?:\[[^\[\]]*\]|\(
 
 
 @dataclass(frozen=True)
-class Line:
+class TextLine:
     """One line that holds something.
 
     Args:
@@ -114,7 +114,7 @@ class Parting:
         return 1 if seconds_of_text(cell) is not None else -1
 
 
-def first_lines(path: Path) -> tuple[list[Line], bool]:
+def first_lines(path: Path) -> tuple[list[TextLine], bool]:
     """The lines at a file's beginning that hold something, and whether they end with CR alone.
 
     Raises:
@@ -136,13 +136,13 @@ def first_lines(path: Path) -> tuple[list[Line], bool]:
     return lines_of(path, _decode(begin)), b"\r" in begin and b"\n" not in begin
 
 
-def lines_of(path: Path, text: str) -> list[Line]:
+def lines_of(path: Path, text: str) -> list[TextLine]:
     """The first lines of a text that hold something, be it behind the mark of a comment.
 
     Raises:
         InputError: a line is so long that it is no row of a table.
     """
-    lines: list[Line] = []
+    lines: list[TextLine] = []
     seen = 0
     for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_LINES], 1):
         seen += len(raw)
@@ -156,7 +156,7 @@ def lines_of(path: Path, text: str) -> list[Line]:
         mark = next((mark for mark in COMMENTS if stripped.lstrip().startswith(mark)), None)
         body = stripped.lstrip().lstrip(mark).strip() if mark and mark != ";" else stripped
         if body.strip():
-            lines.append(Line(number, body, mark is not None and mark != ";"))
+            lines.append(TextLine(number, body, mark is not None and mark != ";"))
     return lines
 
 

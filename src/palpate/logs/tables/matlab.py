@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.files.confined import read_confined
-from palpate.files.limits import Budget
+from palpate.files.limits import ReadingBudget
 from palpate.logs.tables.sheet import Cells, Sheet, as_counts
 
 _HEADER, _COMPRESSED, _PIECE = 128, 15, 1 << 20
@@ -31,7 +31,7 @@ _EXPORTS = {
 """How MATLAB itself turns an object of a class into plain arrays."""
 
 
-def read_matlab(path: Path, budget: Budget) -> Sheet:
+def read_matlab(path: Path, budget: ReadingBudget) -> Sheet:
     """The numeric variables of a MATLAB file as columns; fields of a struct are `struct.field`.
 
     An array gives a column for each place beside its longest side: `wrench.0` to `wrench.5` for one of 5000 x 6 or

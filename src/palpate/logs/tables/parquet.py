@@ -15,7 +15,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import SIGNATURE
 from palpate.files.confined import read_confined
-from palpate.files.limits import Budget, Limits
+from palpate.files.limits import Limits, ReadingBudget
 from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 
@@ -41,7 +41,7 @@ class About(msgspec.Struct, frozen=True):
     meta: dict[str, Any]
 
 
-class Head(msgspec.Struct, frozen=True, array_like=True):
+class ParquetHead(msgspec.Struct, frozen=True, array_like=True):
     """Statements of a Parquet file about itself.
 
     Args:
@@ -57,7 +57,7 @@ class Head(msgspec.Struct, frozen=True, array_like=True):
     about: str | None
 
 
-def read_parquet(path: Path, budget: Budget) -> Sheet:
+def read_parquet(path: Path, budget: ReadingBudget) -> Sheet:
     """The columns of a Parquet file; a field of a struct is `struct.field`.
 
     Args:
@@ -77,7 +77,7 @@ def read_parquet(path: Path, budget: Budget) -> Sheet:
     )  # fmt: skip
 
 
-def _read(path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str]) -> list[Cells]:
+def _read(path: Path, budget: ReadingBudget, places: Sequence[int], missing: Sequence[str]) -> list[Cells]:
     own = _open(path, budget.limits)[1]
     if own is not None and np.isfinite(own[list(places)]).all():
         return [Cells(own[i]) for i in places]
@@ -90,12 +90,12 @@ def _read(path: Path, budget: Budget, places: Sequence[int], missing: Sequence[s
     return cells
 
 
-def _read_counts(path: Path, budget: Budget, place: int) -> NDArray[np.int64] | None:
+def _read_counts(path: Path, budget: ReadingBudget, place: int) -> NDArray[np.int64] | None:
     found = _query(path, budget, [place], exact=True)[0]
     return as_counts(found["counts"]) if found else None
 
 
-def read_columns(path: Path, budget: Budget) -> dict[str, Array]:
+def read_columns(path: Path, budget: ReadingBudget) -> dict[str, Array]:
     """All columns of a record of palpate's own, what is infinite included.
 
     Raises:
@@ -107,7 +107,12 @@ def read_columns(path: Path, budget: Budget) -> dict[str, Array]:
 
 
 def _query(
-    path: Path, budget: Budget, places: Sequence[int], missing: Sequence[str] = (), *, exact: bool = False
+    path: Path,
+    budget: ReadingBudget,
+    places: Sequence[int],
+    missing: Sequence[str] = (),
+    *,
+    exact: bool = False,
 ) -> tuple[dict[str, NDArray[Any]], Any]:
     budget.check(_BYTES * head(path, budget.limits).rows * len(places))
     question = {"places": list(places), "missing": list(missing), "exact": exact}
@@ -129,7 +134,7 @@ def stored_about(path: Path, limits: Limits | None = None) -> About | None:
         ) from None
 
 
-def head(path: Path, limits: Limits | None = None) -> Head:
+def head(path: Path, limits: Limits | None = None) -> ParquetHead:
     """Read the statements of a Parquet file about itself.
 
     Raises:
@@ -138,7 +143,7 @@ def head(path: Path, limits: Limits | None = None) -> Head:
     return _open(path, limits)[0]
 
 
-def _open(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
+def _open(path: Path, limits: Limits | None) -> tuple[ParquetHead, Array | None]:
     """The head; and all columns, shape (columns, rows), of a small record of palpate's own."""
     try:
         state = path.stat()
@@ -148,9 +153,9 @@ def _open(path: Path, limits: Limits | None) -> tuple[Head, Array | None]:
 
 
 @lru_cache(maxsize=_KEPT)
-def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[Head, Array | None]:
-    arrays, also = read_confined(__name__, path, "Parquet", Budget(path, limits))
-    return msgspec.convert(also, Head), arrays.get("numbers")
+def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[ParquetHead, Array | None]:
+    arrays, also = read_confined(__name__, path, "Parquet", ReadingBudget(path, limits))
+    return msgspec.convert(also, ParquetHead), arrays.get("numbers")
 
 
 def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, NDArray[Any]], Any]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
 from palpate.files.confined import read_confined
-from palpate.files.limits import Budget, LimitError, Limits
+from palpate.files.limits import LimitError, Limits, ReadingBudget
 from palpate.logs.tables.sheet import Cells, Sheet
 from palpate.logs.tables.text import read_text_sheet
 
@@ -23,7 +23,7 @@ _KEPT = 2
 """Books whose cells are kept: several questions are asked about one."""
 
 
-def read_book(path: Path, budget: Budget) -> Sheet:
+def read_book(path: Path, budget: ReadingBudget) -> Sheet:
     """The sheets of an .xlsx, .xlsm or .ods file; a column is `SHEET.NAME`, or `NAME` where only one sheet has it.
 
     Args:
@@ -74,7 +74,7 @@ def _join_sheets(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str])
     )  # fmt: skip
 
 
-def sheets_of(path: Path, budget: Budget) -> tuple[dict[str, Sheet], dict[str, str]]:
+def sheets_of(path: Path, budget: ReadingBudget) -> tuple[dict[str, Sheet], dict[str, str]]:
     """The sheets of a book that hold rows of numbers, by title; and the others, with the reason.
 
     Raises:
@@ -107,7 +107,7 @@ def equal_sheets(path: Path, limits: Limits, names: Sequence[str] = ()) -> list[
     Returns:
         Paths that are read as logs; none if fewer than two sheets are equal.
     """
-    sheets, _ = sheets_of(path, Budget(path, limits))
+    sheets, _ = sheets_of(path, ReadingBudget(path, limits))
     usual, count = Counter(tuple(sheet.names) for sheet in sheets.values()).most_common(1)[0]
     if count < 2 or not set(names) <= set(usual):
         return []
@@ -117,7 +117,7 @@ def equal_sheets(path: Path, limits: Limits, names: Sequence[str] = ()) -> list[
 @lru_cache(maxsize=_KEPT)
 def _contents(path: Path, state: tuple[int, ...], limits: Limits) -> dict[str, str]:
     """The sheets' text by title; `state` tells a changed file from the one that is kept."""
-    arrays, _ = read_confined(__name__, path, "a spreadsheet", Budget(path, limits))
+    arrays, _ = read_confined(__name__, path, "a spreadsheet", ReadingBudget(path, limits))
     return {title: content.tobytes().decode() for title, content in arrays.items()}
 
 

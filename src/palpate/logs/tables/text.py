@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.files.limits import Budget
+from palpate.files.limits import ReadingBudget
 from palpate.logs.tables.layout import Layout, find_layout, read_preamble
 from palpate.logs.tables.lines import (
     COMMENTS,
@@ -42,7 +42,7 @@ _LABVIEW = "***End_of_Header***"
 
 
 def read_text_sheet(
-    path: Path, budget: Budget, delimiter: str | None = None, content: str | None = None
+    path: Path, budget: ReadingBudget, delimiter: str | None = None, content: str | None = None
 ) -> Sheet:
     """A log of lines of text: CSV in any of its dialects, .lvm, .ddf, a sheet of a spreadsheet.
 
@@ -66,7 +66,7 @@ def read_text_sheet(
     units = {name: Stated(symbol, "the row of units") for name, symbol in layout.units.items()}
     if content is None and not layout.quoted and layout.parting.delimiter != " ":
         layout = replace(layout, quoted=_holds_quotes(path, layout.first_row))
-    rows = _Rows(path, layout, budget, bare_returns, content)
+    rows = _TextRows(path, layout, budget, bare_returns, content)
     return Sheet(
         path, names, rows.read, rows.counts, units | preamble.columns, preamble.rate,
         doubts=lambda name: _doubts(name, layout),
@@ -94,12 +94,12 @@ def _doubts(name: str, layout: Layout) -> str:
 
 
 @dataclass
-class _Rows:
+class _TextRows:
     """The rows of a text log."""
 
     path: Path
     layout: Layout
-    budget: Budget
+    budget: ReadingBudget
     bare_returns: bool
     content: str | None
 

@@ -22,8 +22,17 @@ from palpate.report.figure_panels.artists import (
     title,
     unit,
 )
-from palpate.report.look.assets import ABSENT, CHARTS, TABLES, data, packed, scripts, text_of, thinned
-from palpate.report.page import embedded
+from palpate.report.look.assets import (
+    ABSENT,
+    CHARTS,
+    TABLES,
+    data,
+    packed_column,
+    rows_shown,
+    scripts,
+    text_of,
+)
+from palpate.report.page import data_address
 from palpate.report.svg import svg
 
 if TYPE_CHECKING:
@@ -90,7 +99,7 @@ def _join(curves: Sequence[Curve]) -> tuple[Array, list[Array]]:
     """All places of thinned curves in order, and each curve's values there: infinite where it has no place."""
     thin = []
     for same in _alike(curves):
-        rows = np.unique(np.concatenate([thinned(one.y, MOST // len(same)) for one in same]))
+        rows = np.unique(np.concatenate([rows_shown(one.y, MOST // len(same)) for one in same]))
         thin += [(one, one.x[rows], one.y[rows]) for one in same]
     x = np.unique(np.concatenate([places for _, places, _ in thin]))
     by_curve = {}
@@ -115,7 +124,7 @@ def _alike(curves: Sequence[Curve]) -> list[list[Curve]]:
 def _column(values: Array, scale: str) -> Any:
     """Packed; on a scale of powers as they are, for there the smallest count as much as the largest."""
     if scale == "linear":
-        return packed(values)
+        return packed_column(values)
     known = [None if not v > 0.0 else float(f"{v:.5g}") for v in values.tolist()]
     return [ABSENT if np.isinf(v) else k for v, k in zip(values, known, strict=True)]
 
@@ -253,7 +262,7 @@ def _picture(drawing: Figure, one: Axes) -> dict[str, Any]:
         for other in hidden:
             other.set_visible(True)
     wide = one.get_tightbbox().width / drawing.dpi * 96  # type: ignore[union-attr]
-    return {"picture": embedded(data, "image/svg+xml"), "title": title(one), "wide": round(wide)}
+    return {"picture": data_address(data, "image/svg+xml"), "title": title(one), "wide": round(wide)}
 
 
 def _colours(bar: Axes) -> Axes | None:

@@ -33,7 +33,7 @@ from palpate.report.identification.words import (
     unit_warnings,
     units_of,
 )
-from palpate.report.numbers import NONE, as_html, plain, printed, quantity, with_half
+from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
@@ -320,7 +320,7 @@ def line(found: Identification) -> str:
 
 def text(found: Identification) -> str:
     """The output of `palpate identify`; `report` has all evidence."""
-    return printed(lambda console: show(found, NAME, console))
+    return console_text(lambda console: show(found, NAME, console))
 
 
 def html(found: Identification) -> str:

@@ -10,7 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
 from palpate.report import style
 from palpate.report.identification.spectra import band_of, leaving, resting, stretches, white
-from palpate.report.look.assets import thinned, with_peaks
+from palpate.report.look.assets import rows_shown, with_peaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -204,7 +204,7 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
 
 def _whole(axes: Axes, traces: Traces, scale: float) -> None:
     """Every loading and unloading of the log, broken where there is no contact."""
-    rows = thinned(traces.fitted_force, _POINTS)
+    rows = rows_shown(traces.fitted_force, _POINTS)
     t = traces.fitted_time[rows]
     steps = np.diff(t, prepend=t[0])
     gap = steps > _BREAK * max(float(np.median(steps)), float(np.ptp(traces.fitted_time)) / _POINTS)

@@ -49,7 +49,7 @@ def draw(found: Identification, title: str) -> Figure:
     traces = found.traces
     if traces is None:
         raise ValueError("an identification without traces has no figure")
-    with style.inked():
+    with style.ink():
         fitted = len(traces.fitted_time) > 0
         figure = _figure(_WIDE, _HIGH if fitted else _HIGH / 2)
         parts: Any = figure.subfigures(2, 1, height_ratios=(_HEAD, figure.get_figheight() - _HEAD))
@@ -97,7 +97,7 @@ def dynamic(figure: Any, found: Identification, traces: Traces, title: str = "")
 
 def one(panel: Panel, found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """A figure of one panel, so many pixels wide and high on a page."""
-    with style.inked(_LETTERS):
+    with style.ink(_LETTERS):
         figure = _figure(width * _PIXEL, height * _PIXEL)
         panel(figure.subplots(), found, traces)
     return figure
@@ -105,7 +105,7 @@ def one(panel: Panel, found: Identification, traces: Traces, width: int, height:
 
 def both_parts(found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """Storage above loss, likewise."""
-    with style.inked(_LETTERS):
+    with style.ink(_LETTERS):
         figure = _figure(width * _PIXEL, height * _PIXEL)
         dynamic(figure, found, traces)
     return figure

@@ -32,7 +32,7 @@ from palpate.report.identification.words import (
     units_of,
 )
 from palpate.report.numbers import plain, quantity, with_half
-from palpate.report.page import embedded, render
+from palpate.report.page import data_address, render
 from palpate.report.svg import svg
 from palpate.text import printable
 
@@ -345,7 +345,7 @@ def _figure(
 
 def picture(title: str, caption: str, drawn: Sequence[Figure], *, full: bool = False) -> dict[str, str]:
     """A figure on a page, drawn wide and narrow, with its caption."""
-    wide, narrow = (embedded(svg(one), "image/svg+xml") for one in drawn)
+    wide, narrow = (data_address(svg(one), "image/svg+xml") for one in drawn)
     return {
         "title": title,
         "wide": wide,

@@ -29,7 +29,7 @@ _HALF = 32500
 """Steps of a two-byte number on either side of the middle, but for what says that there is none."""
 
 
-def packed(values: Array) -> dict[str, Any]:
+def packed_column(values: Array) -> dict[str, Any]:
     """A column: `b` its values as little-endian int16 in base64, value = origin `o` + step `s` (i + 32500).
 
     Infinite stands for a place that the column does not have, NaN for a gap. The step is a 65,000th of the column's
@@ -46,11 +46,11 @@ def packed(values: Array) -> dict[str, Any]:
 
 def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
     """A line through values over x, of about so many points that keep its peaks."""
-    rows = thinned(values, most)
+    rows = rows_shown(values, most)
     return x[rows], values[rows]
 
 
-def thinned(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
+def rows_shown(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
     """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
 
     Args:
@@ -65,8 +65,8 @@ def thinned(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.i
         inside, outside = np.flatnonzero(dense), np.flatnonzero(~dense)
         share = max(most // 2, most - len(outside))
         parts = [
-            inside[thinned(values[inside], share)],
-            outside[thinned(values[outside], most - min(share, len(inside)))],
+            inside[rows_shown(values[inside], share)],
+            outside[rows_shown(values[outside], most - min(share, len(inside)))],
         ]
         return np.unique(np.concatenate(parts))
     edges = np.linspace(0, n, max(most // 2, 1) + 1).astype(int)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
 from palpate.report.identification.words import CALLED
-from palpate.report.many.table import POINT, LogRow, drawn, failures, quantities, sentence
+from palpate.report.many.table import POINT, LogRow, failures, quantities, quantities_with_number, sentence
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ def draw(rows: Sequence[LogRow], pooled: Pooled) -> Figure:
     """The sentence, and a forest plot of each quantity that is pooled, two beside each other."""
     from matplotlib.figure import Figure
 
-    names = drawn(rows, pooled) or [POINT]
+    names = quantities_with_number(rows, pooled) or [POINT]
     high = height(rows) * -(-len(names) // 2)
-    with style.inked():
+    with style.ink():
         figure = Figure(figsize=(_WIDE, high + 1.0), dpi=style.DPI, layout="constrained")
         parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, high))
         head, body = parts
@@ -58,7 +58,7 @@ def one(rows: Sequence[LogRow], pooled: Pooled, name: str, width: int) -> Figure
     """One forest plot, so many pixels wide on a page."""
     from matplotlib.figure import Figure
 
-    with style.inked(_LETTERS):
+    with style.ink(_LETTERS):
         figure = Figure(figsize=(width / 72, height(rows)), dpi=style.DPI, layout="constrained")
         forest(figure.subplots(), rows, name, quantities(pooled).get(name))
     return figure

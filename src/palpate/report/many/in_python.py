@@ -9,8 +9,8 @@ from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report.identification.words import Source, formatted, interval
 from palpate.report.many import forest
 from palpate.report.many import page as pages
-from palpate.report.many.table import LogRow, drawn, failures, quantities, sentence, show
-from palpate.report.numbers import as_html, printed
+from palpate.report.many.table import LogRow, failures, quantities, quantities_with_number, sentence, show
+from palpate.report.numbers import as_html, console_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def line(pooled: Pooled) -> str:
 
 def text(pooled: Pooled) -> str:
     """The output of `palpate identify` for many logs."""
-    return printed(lambda console: show(_rows(pooled), pooled, console))
+    return console_text(lambda console: show(_rows(pooled), pooled, console))
 
 
 def html(pooled: Pooled) -> str:
@@ -44,7 +44,7 @@ def draw(pooled: Pooled) -> Figure:
         InputError: no log gives anything a number.
     """
     rows = _rows(pooled)
-    if not drawn(rows, pooled):
+    if not quantities_with_number(rows, pooled):
         raise InputError("none of these logs gives a number; there is nothing to draw")
     return forest.draw(rows, pooled)
 

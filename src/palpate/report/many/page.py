@@ -11,7 +11,16 @@ from palpate.report.identification.page import TONES, picture, split
 from palpate.report.identification.words import CALLED, Source, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many import forest
-from palpate.report.many.table import POINT, LogRow, drawn, failures, json_of, place, quantities, sentence
+from palpate.report.many.table import (
+    POINT,
+    LogRow,
+    failures,
+    json_of,
+    place,
+    quantities,
+    quantities_with_number,
+    sentence,
+)
 from palpate.report.numbers import quantity
 from palpate.report.page import render
 from palpate.text import printable
@@ -38,7 +47,7 @@ def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
         cards=[_card(name, own, pooled) for name, own in quantities(pooled).items()],
         names=list(quantities(pooled)),
         rows=[_row(row, pooled) for row in rows],
-        figures=[_figure(rows, pooled, name) for name in drawn(rows, pooled)],
+        figures=[_figure(rows, pooled, name) for name in quantities_with_number(rows, pooled)],
         json=json.dumps(json_of(rows, pooled), indent=1),
         source=Source("", source.options, None, source.command, source.made),
         file="",

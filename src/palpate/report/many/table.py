@@ -71,7 +71,7 @@ def quantities(pooled: Pooled) -> dict[str, PooledParameter]:
     return first | pooled.parameters
 
 
-def drawn(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
+def quantities_with_number(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
     """The quantities that at least one log gives a number."""
     return [name for name in quantities(pooled) if any(has_number(row, name) for row in rows)]
 
@@ -148,7 +148,7 @@ def show(rows: Sequence[LogRow], pooled: Pooled, console: Console) -> None:
 
 def _logs(rows: Sequence[LogRow], pooled: Pooled, wide: bool) -> Table:
     """A row a log; where it belongs to only if there is room."""
-    names = drawn(rows, pooled)
+    names = quantities_with_number(rows, pooled)
     own = quantities(pooled)
     units = [f"{'stiffness' if name == POINT else name}{_unit(own[name].parameter)}" for name in names]
     table = bare_table("log", *units, *(["at"] if wide else []), "verdict", wrapped=("log", "at", "verdict"))

@@ -83,7 +83,7 @@ def draw(
     """
     captions = {}
     for one in drawings(record):
-        with style.inked():
+        with style.ink():
             figure = one.draw(record)
             for ending in endings:
                 style.save(figure, folder / f"{one.name}{ending}", dpi)
@@ -229,7 +229,7 @@ def write_one_direction(
     experiment = record.meta["experiment"]
     figures = {}
     for name, draw, caption in DRAWN if summary["force"] is not None else ():
-        with style.inked():
+        with style.ink():
             drawing = draw(record)
             for ending in dict.fromkeys((*endings, ".png")):
                 style.save(drawing, folder / f"{name}{ending}", dpi)
@@ -294,7 +294,7 @@ def _force_panel(record: Record) -> Figure:
     return figure
 
 
-def _bound(record: Record) -> Figure:
+def _stiffness_bound(record: Record) -> Figure:
     figure, (axis,) = style.figure(1, height=2.4)
     since, shown = around_contact(record, BEFORE_CONTACT)
     style.panel(axis, "stiffness [N/m]", "time since the touch [s]")
@@ -327,7 +327,7 @@ DRAWN = (
     ),
     (
         "bound",
-        _bound,
+        _stiffness_bound,
         "The law's upper bound of the stiffness (not its estimate). It falls as the readings give more information.",
     ),
 )

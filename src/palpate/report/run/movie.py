@@ -42,7 +42,7 @@ def write_movie(record: Record, path: Path) -> Path:
     check_movie(path)
     if len(record) < 2:
         raise InputError("there is no film: the run ended at its start")
-    rows, pace = chosen(record)
+    rows, pace = frames_of(record)
     frames = [frame.convert("P", palette=1, colors=64) for frame in _frames(record, rows, pace)]
     with whole(path) as draft:
         frames[0].save(
@@ -68,7 +68,7 @@ def check_movie(path: Path) -> None:
     check_place(path, "--movie")
 
 
-def chosen(record: Record) -> tuple[NDArray[np.intp], float]:
+def frames_of(record: Record) -> tuple[NDArray[np.intp], float]:
     """The rows that are shown, a frame each, and how much faster than the run they pass."""
     t = record["t"]
     contact = record["phase"] == CONTACT
@@ -85,7 +85,7 @@ def _frames(record: Record, rows: NDArray[np.intp], pace: float) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    with style.inked():
+    with style.ink():
         figure, moving = _scene(record, rows, pace)
         canvas = FigureCanvasAgg(figure)
         moving(int(rows[0]))

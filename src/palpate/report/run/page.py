@@ -16,9 +16,9 @@ from palpate.report import style
 from palpate.report.answer import Card
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, formatted
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed, scripts, text_of, thinned
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import quantity
-from palpate.report.page import embedded, render
+from palpate.report.page import data_address, render
 from palpate.report.run.figures import drawings
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
 from palpate.report.svg import svg
@@ -159,13 +159,13 @@ def _surface(content: Content) -> list[dict[str, str]]:
 
 def _pictures(record: Record) -> Iterator[dict[str, str]]:
     """Still pictures, for a browser that runs no scripts."""
-    rows = thinned(record["force_measured"], _FEWER, record["phase"] == CONTACT)
+    rows = rows_shown(record["force_measured"], _FEWER, record["phase"] == CONTACT)
     few = Record({name: column[rows] for name, column in record.columns.items()}, record.units, record.meta)
     for one in drawings(few):
         if one.name in _STILL:
-            with style.inked():
+            with style.ink():
                 picture = svg(one.draw(few))
-            yield {"source": embedded(picture, "image/svg+xml"), "caption": one.caption}
+            yield {"source": data_address(picture, "image/svg+xml"), "caption": one.caption}
 
 
 def _charts(record: Record, summary: dict[str, Any]) -> dict[str, Any]:
@@ -173,14 +173,14 @@ def _charts(record: Record, summary: dict[str, Any]) -> dict[str, Any]:
     t, phase = record["t"], record["phase"]
     touched = summary["contact_at_s"]
     near = np.zeros(len(t), dtype=bool) if touched is None else (t > touched - 1.0) & (t < touched + 2.0)
-    rows = thinned(record["force_measured"], ROWS, near)
+    rows = rows_shown(record["force_measured"], ROWS, near)
     columns = {name: values[rows] for name, values in _columns(record).items()}
     length = Arm3().length
     end = float(t[-1])
     shown_from = float(t[0]) if touched is None else max(float(t[0]), touched - 1.0)
     truth = {name: value["value"] for name, value in record.meta["truth"].items() if name in _PARAMETERS}
     return {
-        "columns": {name: packed(values) for name, values in columns.items()},
+        "columns": {name: packed_column(values) for name, values in columns.items()},
         "truth": truth,
         "ranges": _ranges(record, truth),
         "marks": _marks(t, phase),

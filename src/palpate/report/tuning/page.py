@@ -11,9 +11,9 @@ from palpate.force.describe import UNCOVERED
 from palpate.force.steps import BAND
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
-from palpate.report.answer import Answer, Card, Extent, answer_page, log_scale
+from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.figure_panels.panels import panels_of
-from palpate.report.numbers import as_html, plain, printed, quantity, quantity_between
+from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
 from palpate.report.tuning.table import rows, show
 from palpate.text import printable
 
@@ -29,7 +29,7 @@ def line(told: Tuning) -> str:
 
 def text(told: Tuning) -> str:
     """Output of `palpate tune`."""
-    return printed(lambda console: show(told, console))
+    return console_text(lambda console: show(told, console))
 
 
 def html(told: Tuning) -> str:
@@ -41,7 +41,7 @@ def html(told: Tuning) -> str:
 def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
     """The page of `palpate tune --report`; `command` is what made it."""
     gains = told.gains
-    answer = Answer(
+    answer = PageAnswer(
         title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
         sentence=sentence(told),
         about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
@@ -144,7 +144,7 @@ def _scale(told: Tuning) -> dict[str, object]:
 
 def draw(told: Tuning) -> Figure:
     """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
-    with style.inked():
+    with style.ink():
         figure, (axis,) = style.figure(height=2.9)
         axis.set(xlabel="time from the touch [s]", ylabel="force [N]")
         force = told.gains.force

@@ -14,7 +14,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import open_file
 from palpate.files.confined import read_confined
-from palpate.files.limits import GB, Budget, Limits
+from palpate.files.limits import GB, Limits, ReadingBudget
 
 
 def mujoco() -> Any:
@@ -109,7 +109,7 @@ def load_mjcf(path: Path, text: str | None = None, *, published: bool = True) ->
     open_file(path, "a model of MuJoCo").close()
     mujoco()
     arrays, notes = read_confined(
-        __name__, path, "a model of MuJoCo", Budget(path, _LIMITS), [text, published]
+        __name__, path, "a model of MuJoCo", ReadingBudget(path, _LIMITS), [text, published]
     )
     name = "model.mjb"
     return mujoco().MjModel.from_binary_path(name, {name: arrays["model"].tobytes()}), notes

@@ -12,12 +12,12 @@ from palpate.arrays import Array
 from palpate.references import Multisine
 from palpate.report import style
 from palpate.report.identification.words import CALLED
-from palpate.report.look.assets import CHARTS, TABLES, data, packed, scripts, text_of, thinned
+from palpate.report.look.assets import CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import plain, quantity
-from palpate.report.page import embedded, render
+from palpate.report.page import data_address, render
 from palpate.report.svg import svg
 from palpate_excitation import Design, Remedy
-from palpate_excitation.report.table import describe_remedy, describe_wave, percent, reached
+from palpate_excitation.report.table import describe_remedy, describe_wave, half_widths_reached, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,8 +132,8 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
     """The page as HTML."""
     told = describe_wave(found)
     codes = (*scripts(*CHARTS, *TABLES), text_of("excitation.js", _PACKAGE))
-    with style.inked():
-        still = embedded(svg(draw(found)), "image/svg+xml")
+    with style.ink():
+        still = data_address(svg(draw(found)), "image/svg+xml")
     return render(
         "excitation.html",
         _PACKAGE,
@@ -159,7 +159,7 @@ def _sentence(found: Design) -> str:
     if found.feasible:
         says = f"In {lasts} this force identifies every surface of the range to the requested precision"
         return f"{says}: {asked} (95 %)."
-    worst = reached(found.made.worst(found.seconds), found)
+    worst = half_widths_reached(found.made.worst(found.seconds), found)
     limits = "No force within these limits identifies every surface to the requested precision"
     return f"{limits}, {asked} (95 %): at best {worst}."
 
@@ -233,7 +233,7 @@ def _rows(found: Design) -> list[list[dict[str, Any]]]:
 def _charts(found: Design) -> dict[str, Any]:
     """Data of the charts, in plain values."""
     time, force = found.force()
-    rows = thinned(force, _ROWS)
+    rows = rows_shown(force, _ROWS)
     budget = found.problem.budget
     n = len(rows)
     over = {
@@ -253,7 +253,7 @@ def _charts(found: Design) -> dict[str, Any]:
         if asked is not None:
             precision[f"{name}_asked"] = np.full(len(seconds), 100 * asked)
     return {
-        "force": {name: packed(values) for name, values in over.items()},
+        "force": {name: packed_column(values) for name, values in over.items()},
         "spectrum": {
             "t": frequencies.tolist(),
             "desired": amplitudes.tolist(),

@@ -17,7 +17,7 @@ from palpate.records import Record
 from palpate.references import Multisine
 from palpate.report.terminal import bare_table
 from palpate_excitation import Design, HybridLoop, Remedy
-from palpate_excitation.force_loops import Prediction
+from palpate_excitation.force_loops import SurfaceResponse
 from palpate_excitation.problem import LONGEST
 
 
@@ -32,7 +32,7 @@ def show(found: Design, remedies: list[Remedy], console: Console) -> None:
 
 def describe_remedy(remedy: Remedy, found: Design) -> str:
     """Whether a change would be enough, in words."""
-    to = reached(remedy.reached, found)
+    to = half_widths_reached(remedy.reached, found)
     if remedy.enough:
         return f"enough, {to}"
     later = f"; enough after {ceil(remedy.needed)} s" if remedy.needed <= LONGEST else ""
@@ -63,7 +63,7 @@ def _table(found: Design) -> Table:
     return table
 
 
-def _row(prediction: Prediction, found: Design) -> list[str | Text]:
+def _row(prediction: SurfaceResponse, found: Design) -> list[str | Text]:
     widths = prediction.half_widths(found.seconds)
     values = dict(zip(("K", "B", "M"), prediction.surface.values, strict=True))
     low, high = prediction.force
@@ -89,11 +89,11 @@ def _verdict(found: Design) -> str:
     worst = found.made.worst(found.seconds)
     asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
     if found.feasible:
-        return f"every surface to within {asked} (95 %): yes, predicted {reached(worst, found)}"
-    return f"every surface to within {asked} (95 %): no; the best is {reached(worst, found)}. Remedies:"
+        return f"every surface to within {asked} (95 %): yes, predicted {half_widths_reached(worst, found)}"
+    return f"every surface to within {asked} (95 %): no; the best is {half_widths_reached(worst, found)}. Remedies:"
 
 
-def reached(widths: dict[str, float], found: Design) -> str:
+def half_widths_reached(widths: dict[str, float], found: Design) -> str:
     """The half-widths of what was asked for."""
     return ", ".join(f"{name} {percent(widths[name])}" for name in found.problem.precision)
 

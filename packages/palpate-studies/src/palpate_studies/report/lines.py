@@ -95,7 +95,7 @@ def grid(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     return drawing, axes[:count]
 
 
-def bounded(axis: Axes, values: Array) -> None:
+def limit_axis(axis: Axes, values: Array) -> None:
     """Where a metric is drawn: its bulk, so that the few from far away leave room for it; how many is said."""
     good = values[np.isfinite(values)]
     if not len(good):
@@ -129,7 +129,7 @@ def decades(values: Array) -> bool:
 
 
 @dataclass(frozen=True)
-class Line:
+class MetricLine:
     """A metric over a parameter.
 
     Args:
@@ -148,16 +148,16 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Curve:
+class LinePanel:
     """A panel of lines."""
 
     title: str
     x: Scale
-    lines: Sequence[Line]
+    lines: Sequence[MetricLine]
     log: bool = False
 
 
-def curves_figure(panels: Sequence[Curve], label: str) -> Figure:
+def curves_figure(panels: Sequence[LinePanel], label: str) -> Figure:
     """Lines with bands from the least to the largest of the seeds."""
     drawing, axes = grid(len(panels), 5.4 if len(panels) == 1 else 4.3, 3.4)
     for panel, axis in zip(panels, axes, strict=True):
@@ -185,7 +185,7 @@ def curves_figure(panels: Sequence[Curve], label: str) -> Figure:
     return drawing
 
 
-def _bars(line: Line, axis: Axes, color: str, aside: float) -> None:
+def _bars(line: MetricLine, axis: Axes, color: str, aside: float) -> None:
     """A line over what has no order: its points, each with its range, beside those of other lines."""
     ranges = np.array([line.middle - line.low, line.high - line.middle])
     axis.errorbar(line.x + aside, line.middle, ranges, fmt="o", color=color, markersize=4, label=line.label)
@@ -237,7 +237,7 @@ def clouds_figure(panels: Sequence[Cloud], label: str) -> Figure:
         if panel.words:
             axis.set_yticks(range(len(panel.words)), panel.words)
         else:
-            bounded(axis, every)
+            limit_axis(axis, every)
         axis.set_ylabel(label)
         if len(panel.kinds) > 1:
             axis.legend(fontsize=8, frameon=True, framealpha=0.85, edgecolor="none")

@@ -22,7 +22,7 @@ HALO = MAPS["map-halo"]
 
 
 @dataclass(frozen=True)
-class Bound:
+class BoundaryLine:
     """A line over a map.
 
     Args:
@@ -52,7 +52,7 @@ class Heat:
     y: Scale
     values: Array | NDArray[np.str_]
     failed: Mask
-    bounds: Sequence[Bound] = ()
+    bounds: Sequence[BoundaryLine] = ()
 
 
 def heat_figure(panels: Sequence[Heat], label: str) -> Figure:

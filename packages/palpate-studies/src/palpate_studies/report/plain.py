@@ -12,8 +12,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report.look.assets import ABSENT, CHARTS, MAPS, OUTCOMES, TABLES, data, scripts, text_of
-from palpate.report.page import Table, captioned, render
-from palpate_studies.report.lines import COLORS, Cloud, Curve, Line, Points, Scale, decades, middles
+from palpate.report.page import Table, render, with_captions
+from palpate_studies.report.lines import COLORS, Cloud, LinePanel, MetricLine, Points, Scale, decades, middles
 from palpate_studies.report.maps import Heat
 
 MOST = 1500
@@ -65,7 +65,7 @@ def _points(one: Points, words: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def curve(one: Curve) -> dict[str, Any]:
+def curve(one: LinePanel) -> dict[str, Any]:
     """Lines over a parameter; where it has numbers, also as `palpate.chart` draws them."""
     found = {
         "kind": "curve",
@@ -77,7 +77,7 @@ def curve(one: Curve) -> dict[str, Any]:
     return found | (chart(one) if one.x.numeric else {})
 
 
-def chart(one: Curve) -> dict[str, Any]:
+def chart(one: LinePanel) -> dict[str, Any]:
     """Lines over numbers as `{"spec", "columns"}` of `palpate.chart`: each with a mark at its places and its range."""
     x = np.unique(np.concatenate([line.x for line in one.lines])) if one.lines else np.zeros(0)
     columns: dict[str, Any] = {"t": numbers(x)}
@@ -105,7 +105,7 @@ def _at(x: Array, places: Array, values: Array) -> list[Any]:
     return [known.get(place, ABSENT) for place in x.tolist()]
 
 
-def _line(one: Line) -> dict[str, Any]:
+def _line(one: MetricLine) -> dict[str, Any]:
     rows = {"x": one.x, "y": one.middle, "low": one.low, "high": one.high}
     return {"label": one.label, "reference": one.reference, **{k: numbers(v) for k, v in rows.items()}}
 
@@ -129,7 +129,7 @@ def heat(one: Heat) -> dict[str, Any]:
     }
 
 
-_OF: dict[type, Any] = {Cloud: cloud, Curve: curve, Heat: heat}
+_OF: dict[type, Any] = {Cloud: cloud, LinePanel: curve, Heat: heat}
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def study_page(of: StudyPage) -> str:
         tables=of.tables,
         below=of.below,
         charts=data(of.charts) if worth else "",
-        figures=captioned(of.figures),
+        figures=with_captions(of.figures),
         command=of.command,
         study=of.study,
         origin=of.origin,

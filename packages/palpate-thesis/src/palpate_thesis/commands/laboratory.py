@@ -12,10 +12,10 @@ from cyclopts import Group, Parameter, validators
 
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.values import FolderOptions
-from palpate.cli.toolkit import console, counted, place, print_answer, say, show_table
+from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
-    from palpate_thesis.inference.result import Result
+    from palpate_thesis.inference.result import InferenceResult
     from palpate_thesis.inference.search import Runner
 
 
@@ -108,7 +108,7 @@ def laboratory(
     command, out, threads = search.command, output.out, who.cores or all_cores()
     settings = Settings(search.particles + search.particles % 2, moves=search.moves, seed=search.seed)
     try:
-        with _runner(who.scheduler, threads) as runner, counted(console(stderr=True)) as told:
+        with _runner(who.scheduler, threads) as runner, progress_of_pieces(console(stderr=True)) as told:
             inference = Inference(out, settings, runner, command, threads, search.half, told)
             result = inference.run(replace=output.replace)
     except KeyboardInterrupt:
@@ -134,7 +134,7 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
         cluster.close()
 
 
-def _show(result: Result, folder: Path, found: Mapping[str, Any] | None) -> None:
+def _show(result: InferenceResult, folder: Path, found: Mapping[str, Any] | None) -> None:
     from palpate.report.page import Table
     from palpate_thesis.inference.findings import PAGE
     from palpate_thesis.inference.result import halves, laboratories

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from palpate_thesis.claims import Done
-    from palpate_thesis.figure import Study
-    from palpate_thesis.measure import Written
+    from palpate_thesis.figure import FigureModule
+    from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
@@ -68,7 +68,7 @@ def thesis(
     """
     from palpate_thesis.figure import studies
     from palpate_thesis.laboratory.laboratory import load_laboratory
-    from palpate_thesis.measure import Written
+    from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
     if list_:
@@ -86,7 +86,7 @@ def thesis(
     where = "" if lab.chosen else f" --laboratory {laboratory}"
     command = f"palpate thesis{'' if figure is None else ' ' + figure}{where} --seeds {seeds}"
     try:
-        written = Written(command, drawn.endings, drawn.dpi)
+        written = MeasurementFormat(command, drawn.endings, drawn.dpi)
         _measure(chosen, folder, Runs(range(seeds), laboratory=lab), written, replace)
     except KeyboardInterrupt:
         say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
@@ -94,7 +94,7 @@ def thesis(
     return 0
 
 
-def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[Study]:
+def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[FigureModule]:
     """The figures to measure: all, or one; in another laboratory those that it was inferred from."""
     from palpate_thesis.figure import studies, study
     from palpate_thesis.inference.sentences import sentences
@@ -110,7 +110,9 @@ def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) ->
     return [s for s in studies() if s.NUMBER in known and figure in (None, s.NUMBER)]
 
 
-def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written, replace: bool) -> None:
+def _measure(
+    chosen: Sequence[FigureModule], folder: Path, runs: Runs, written: MeasurementFormat, replace: bool
+) -> None:
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
     from palpate_thesis.measure import measure
@@ -119,7 +121,7 @@ def _measure(chosen: Sequence[Study], folder: Path, runs: Runs, written: Written
     with bar(screen, MofNCompleteColumn(), TimeElapsedColumn()) as progress:
         task = progress.add_task("", total=len(chosen))
 
-        def start_study(one: Study) -> None:
+        def start_study(one: FigureModule) -> None:
             progress.update(task, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
 
         def say_resumed(done: int) -> None:

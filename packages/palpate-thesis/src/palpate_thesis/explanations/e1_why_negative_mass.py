@@ -13,7 +13,7 @@ from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad, butterworth2, butterworth3
-from palpate_thesis.claims import Claim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
@@ -33,7 +33,7 @@ START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
 
 
 @dataclass(frozen=True)
-class Window:
+class RegressionWindow:
     """A press with what came before it, so that filters have settled; true and measured."""
 
     x: Array  # true [m]
@@ -48,7 +48,7 @@ class Window:
     matched: Array  # M, B, K of the matched front-end at the end of the window
 
 
-def window(record: Record) -> Window:
+def window(record: Record) -> RegressionWindow:
     """The first press of a run."""
     at = int(np.argmax(record["phase"] == CONTACT))
     first = min(at, round(BEFORE / TICK))
@@ -56,7 +56,7 @@ def window(record: Record) -> Window:
     e = record.meta["experiment"]
     # A row's force is that of the physics step before its tick; at 500 N s/m those 50 us would be 25 g.
     step = 1.0 / (e["run"]["rate"] * e["run"]["steps"])
-    return Window(
+    return RegressionWindow(
         x=record["x"][rows],
         counts=record["x_measured"][rows],
         force=late(record["force"][rows], -step),
@@ -70,7 +70,7 @@ def window(record: Record) -> Window:
     )
 
 
-def estimate(press: Window, causes: Collection[str], lag: float = 0.0) -> Array:
+def estimate(press: RegressionWindow, causes: Collection[str], lag: float = 0.0) -> Array:
     """(M, B, K) by least squares over the press, with these causes on and the force late by another `lag` [s]."""
     x, v, a = _motion(press, causes)
     force = late(_force(press, causes), lag)
@@ -82,7 +82,7 @@ def estimate(press: Window, causes: Collection[str], lag: float = 0.0) -> Array:
     return np.asarray(np.linalg.solve(prior + unit.T @ unit, right) / scale)
 
 
-def _motion(press: Window, causes: Collection[str]) -> tuple[Array, Array, Array]:
+def _motion(press: RegressionWindow, causes: Collection[str]) -> tuple[Array, Array, Array]:
     position = press.counts if "counts" in causes else press.x
     if "counts" in causes:
         v = np.diff(position, prepend=position[0]) / TICK
@@ -95,7 +95,7 @@ def _motion(press: Window, causes: Collection[str]) -> tuple[Array, Array, Array
     return position - (press.x0 if "offset" in causes else press.wall), v, a
 
 
-def _force(press: Window, causes: Collection[str]) -> Array:
+def _force(press: RegressionWindow, causes: Collection[str]) -> Array:
     sensed = through_sensor(press.force, *press.sensor)
     force = sensed if "lag" in causes else press.force
     if "noise" in causes:
@@ -153,7 +153,7 @@ NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
 
 
 @dataclass(frozen=True)
-class Press:
+class EstimatesOfPress:
     """Least-squares estimates of one press, each (M, B, K)."""
 
     steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
@@ -168,8 +168,8 @@ class Press:
 class Data:
     """Presses on each surface, as chosen and varied."""
 
-    presses: dict[str, list[Press]]
-    varied: dict[str, dict[str, list[Press]]]
+    presses: dict[str, list[EstimatesOfPress]]
+    varied: dict[str, dict[str, list[EstimatesOfPress]]]
     truth: dict[str, tuple[float, float, float]]  # M, B, K
 
     def middle(self, surface: str, what: str) -> Array:
@@ -192,10 +192,10 @@ def run(runs: Runs) -> Data:
     return Data({name: runs.over_seeds(e, _press) for name, e in PARAMETERS.items()}, varied, truth)
 
 
-def _press(record: Record) -> Press:
+def _press(record: Record) -> EstimatesOfPress:
     seen = window(record)
     names = list(CAUSES)
-    return Press(
+    return EstimatesOfPress(
         steps=np.array([estimate(seen, names[:i]) for i in range(len(names) + 1)]),
         alone=np.array([estimate(seen, [name]) for name in names]),
         chains=np.array([estimate(seen, causes) for causes in CHAINS.values()]),
@@ -205,7 +205,7 @@ def _press(record: Record) -> Press:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The thesis' own reason, the lag, the wrong model, and the cure."""
     return [_smallness(data), _lag(data), _wrong_model(data), _matched_claim(data)]
 
@@ -215,7 +215,7 @@ def _masses(data: Data, surface: str, chain: str) -> list[float]:
     return [float(p.chains[at, 0]) for p in data.presses[surface]]
 
 
-def _smallness(data: Data) -> Claim:
+def _smallness(data: Data) -> ThesisClaim:
     surfaces = ("plain foam", "rubber")
     perfect = {s: _masses(data, s, "perfect signals") for s in surfaces}
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in surfaces)
@@ -258,7 +258,7 @@ def _signs(data: Data) -> str:
     return f"Friction, pose, mass and damping were varied. {' '.join(told)}"
 
 
-def _lag(data: Data) -> Claim:
+def _lag(data: Data) -> ThesisClaim:
     parts, worst = [], 0.0
     for surface in ("plain foam", "rubber"):
         M, B, K = data.truth[surface]
@@ -294,12 +294,12 @@ def _reach(data: Data) -> str:
     return f"For M it is within a quarter of the shift up to {' and '.join(parts)} (tried up to {1e3 * LAGS[-1]:g} ms)."
 
 
-def _wrong_model(data: Data) -> Claim:
+def _wrong_model(data: Data) -> ThesisClaim:
     masses = _masses(data, "relaxing foam", "perfect signals")
     return claim("negative-mass.model", max(masses) < 0.0, masses=masses)
 
 
-def _matched_claim(data: Data) -> Claim:
+def _matched_claim(data: Data) -> ThesisClaim:
     parts, good = [], True
     for surface in ("plain foam", "rubber"):
         truth = dict(zip("MBK", data.truth[surface], strict=True))

@@ -13,7 +13,7 @@ from palpate.bench import Experiment, changed
 from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.force_control.panels import limits, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
@@ -25,7 +25,7 @@ from palpate_thesis.force_control.tracking import (
     tracking,
     variations,
 )
-from palpate_thesis.force_control.weights import COLUMN, HOLD, TORQUES, Look, hold, watch
+from palpate_thesis.force_control.weights import COLUMN, HOLD, TORQUES, WeightsAtMoment, hold, watch
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
@@ -53,7 +53,7 @@ OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
 
 
 @dataclass(frozen=True)
-class Pair:
+class BothControllers:
     """An experiment under both controllers."""
 
     network: Record
@@ -68,7 +68,7 @@ class Pair:
 class Data:
     """Measured values for `check` and `plot`."""
 
-    pairs: dict[str, Pair]
+    pairs: dict[str, BothControllers]
     gains: dict[str, Array]  # by surface: (rates, seeds) [1/s]
 
 
@@ -79,7 +79,7 @@ def run(runs: Runs) -> Data:
     return Data(pairs, gains)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Gains and errors have to agree within a tenth."""
     at = RATES.index(RATE)
     small = [i for i, rate in enumerate(RATES) if rate <= 1e-4]
@@ -131,7 +131,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _overlay(axis: Axes, name: str, pair: Pair) -> None:
+def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
     axis.plot(
         pair.network["t"],
         pair.network["force"],
@@ -169,7 +169,7 @@ def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
     style.legend(axis, ncols=5, columnspacing=0.9, handletextpad=0.4)
 
 
-def _ratio_panel(axis: Axes, pairs: Mapping[str, Pair]) -> None:
+def _ratio_panel(axis: Axes, pairs: Mapping[str, BothControllers]) -> None:
     colors = (*style.SERIES, style.INK)
     names = list(dict.fromkeys(name for p in pairs.values() for name in p.ratios))
     for i, name in enumerate(names):
@@ -197,7 +197,7 @@ def _ratio_panel(axis: Axes, pairs: Mapping[str, Pair]) -> None:
     style.legend(axis, ncols=4, columnspacing=0.7, handletextpad=0.1)
 
 
-def _pair(runs: Runs, experiment: Experiment) -> Pair:
+def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
     measure = tracking(*JUDGED)
     plain = changed(experiment, PI)
     found, pi_found = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
@@ -209,7 +209,7 @@ def _pair(runs: Runs, experiment: Experiment) -> Pair:
             ratios[name] = [network.rms / pi.rms]
             held[name] = _error_without_torques(runs, e) / pi.rms
     network_shown, pi_shown = (slot(runs.one(e), *JUDGED) for e in (experiment, plain))
-    return Pair(network_shown, pi_shown, found, pi_found, ratios, held)
+    return BothControllers(network_shown, pi_shown, found, pi_found, ratios, held)
 
 
 def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
@@ -217,7 +217,7 @@ def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
     zero = hold(TORQUES)
     errors: list[Array] = []
 
-    def look(one: Look) -> None:
+    def look(one: WeightsAtMoment) -> None:
         zero(one)
         if JUDGED[0] <= one.t < JUDGED[1]:
             errors.append(one.rows[:, COLUMN["force"]] - one.rows[:, COLUMN["force_desired"]])

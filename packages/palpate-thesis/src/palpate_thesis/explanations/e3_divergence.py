@@ -12,12 +12,21 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, changed
 from palpate.controllers.neural import NeuralState
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import RELAXING_FOAM, move_wall, rougher
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.panels import across, legend_inside, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
-from palpate_thesis.force_control.weights import HOLD, POSES, TORQUE1, TORQUES, Look, hold, layers, watch
+from palpate_thesis.force_control.weights import (
+    HOLD,
+    POSES,
+    TORQUE1,
+    TORQUES,
+    WeightsAtMoment,
+    hold,
+    layers,
+    watch,
+)
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
@@ -33,7 +42,7 @@ PARTS = (
 
 
 @dataclass(frozen=True)
-class Course:
+class LongRun:
     """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
 
     t: Array  # (n,) [s]
@@ -52,7 +61,7 @@ class Loss:
     true: Array  # contact force [N]
 
 
-def weights_panel(axis: Axes, course: Course, name: str) -> None:
+def weights_panel(axis: Axes, course: LongRun, name: str) -> None:
     """Sizes of the weights over a run."""
     colors = style.SERIES[:5]
     for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
@@ -63,7 +72,7 @@ def weights_panel(axis: Axes, course: Course, name: str) -> None:
     axis.set_title(f"{name}, eta 5e-5")
 
 
-def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
+def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
     """Gain from the torques to the force, on each surface."""
     for (name, found), color in zip(courses.items(), style.SERIES[:3], strict=True):
         course = found[5e-5][0]
@@ -95,7 +104,7 @@ def loss_panel(axis: Axes, loss: Loss | None) -> None:
     legend_inside(axis, loc="upper left")
 
 
-def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[Course]]]) -> None:
+def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
     """Times of loss over the learning rate, on each surface."""
     for (name, found), color, shift in zip(
         found_on.items(), style.SERIES[:3], (1.0, 0.94, 1.06), strict=True
@@ -117,7 +126,7 @@ def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None],
         )
 
 
-def steps_panel(axis: Axes, found: Mapping[float, Sequence[Course]]) -> None:
+def steps_panel(axis: Axes, found: Mapping[float, Sequence[LongRun]]) -> None:
     """Growth of the output weights of the force over the steps asked for, at each learning rate."""
     for (rate, courses), color in zip(found.items(), style.SERIES[:5], strict=True):
         one = courses[0]
@@ -185,7 +194,7 @@ HELD: Mapping[str, slice] = {
 class Data:
     """Measured values for `check` and `plot`."""
 
-    courses: dict[str, dict[float, list[Course]]]  # by surface and learning rate
+    courses: dict[str, dict[float, list[LongRun]]]  # by surface and learning rate
     pi: dict[str, list[float | None]]  # times of loss under the PI, by surface
     causes: dict[str, list[float | None]]  # times of loss
     loss: Loss | None
@@ -193,7 +202,7 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """All the long runs."""
-    courses: dict[str, dict[float, list[Course]]] = {}
+    courses: dict[str, dict[float, list[LongRun]]] = {}
     for name, e in PARAMETERS.items():
         rates, seeds = (RATES, runs.seeds[:5]) if e is RELAXING else (FEW_RATES, runs.seeds[:1])
         cases = [(changed(e, {"controller.learning_rate": r}), s) for r in rates for s in seeds]
@@ -209,7 +218,7 @@ def run(runs: Runs) -> Data:
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """A loss at every rate where the PI is steady; and, apart from that, on every surface."""
     relaxing = data.courses["foam that relaxes"]
     times = [c.lost for found in relaxing.values() for c in found]
@@ -251,19 +260,19 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _course(runs: Runs, experiment: Experiment, seed: int) -> Course:
+def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:
     t: list[float] = []
     sizes: list[Array] = []
     gains: list[Array] = []
 
-    def look(one: Look) -> None:
+    def look(one: WeightsAtMoment) -> None:
         assert one.neural is not None
         t.append(one.t)
         sizes.append(sizes_of(one.neural))
         gains.append(torque_gains_of(one.neural))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
-    return Course(np.array(t), np.array(sizes), np.array(gains), lost)
+    return LongRun(np.array(t), np.array(sizes), np.array(gains), lost)
 
 
 def sizes_of(state: NeuralState) -> Array:
@@ -298,7 +307,7 @@ def _loss(runs: Runs, lost: float | None) -> Loss | None:
     return Loss(t[last], *columns)
 
 
-def _table(found: Mapping[float, Sequence[Course]]) -> str:
+def _table(found: Mapping[float, Sequence[LongRun]]) -> str:
     """Times of loss by learning rate."""
     return ", ".join(f"{rate:g} after {_range([c.lost for c in courses])}" for rate, courses in found.items())
 

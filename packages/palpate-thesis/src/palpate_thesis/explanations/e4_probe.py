@@ -11,12 +11,12 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import changed
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.claims import share_of_starts
-from palpate_thesis.neural_identifier.network import STARTS, Answer, Choice, Press
+from palpate_thesis.neural_identifier.network import STARTS, NetworkAnswer, NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ TITLES = (
 )
 
 
-def causes(data: Mapping[str, Surface], fixed: Choice, straight: Choice) -> Figure:
+def causes(data: Mapping[str, SurfaceResults], fixed: NetworkChoice, straight: NetworkChoice) -> Figure:
     """Eight panels; `fixed` and `straight` are shown beside the networks as chosen in (a) and (b)."""
     drawing, axes = panels.grid(5)
     tall = _merge(drawing, axes)
@@ -44,7 +44,7 @@ def causes(data: Mapping[str, Surface], fixed: Choice, straight: Choice) -> Figu
         panels.set_title(axis, letter, title)
     foam = data["foam"]
     kinds = {
-        "as chosen": (Choice(), style.SERIES[0]),
+        "as chosen": (NetworkChoice(), style.SERIES[0]),
         "thresholds at zero": (fixed, style.SERIES[1]),
         "zero, 200 N, 0.1": (straight, style.SERIES[2]),
     }
@@ -72,7 +72,7 @@ def _merge(drawing: Figure, axes: list[Axes]) -> list[Axes]:
 
 
 def _draw_known_force(
-    force: Axes, stiffness: Axes, surface: Surface, kinds: Mapping[str, tuple[Choice, str]]
+    force: Axes, stiffness: Axes, surface: SurfaceResults, kinds: Mapping[str, tuple[NetworkChoice, str]]
 ) -> None:
     press = surface.press
     x = np.linspace(0.0, 2.0 * press.rest, 80)
@@ -92,7 +92,7 @@ def _draw_known_force(
         1e3 * x[1:], truth[1:] / x[1:] / press.ratio, color=style.INK, linewidth=1.3, linestyle="--"
     )
     stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
-    asked = 1e3 * Choice().probe(press.surface, 0).values[0]
+    asked = 1e3 * NetworkChoice().probe(press.surface, 0).values[0]
     for axis in (force, stiffness):
         axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
         axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
@@ -102,7 +102,7 @@ def _draw_known_force(
     force.legend(ncols=2, loc="lower right")
 
 
-def _toggles(axis: Axes, surface: Surface, *, named: bool) -> None:
+def _toggles(axis: Axes, surface: SurfaceResults, *, named: bool) -> None:
     names = list(surface.toggled)
     for i, name in enumerate(names):
         some = surface.toggled[name]
@@ -125,7 +125,7 @@ def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
     axis.plot(np.median(values), y, "|", color=style.INK, markersize=9, markeredgewidth=1.4)
 
 
-def _masses(axis: Axes, surface: Surface) -> None:
+def _masses(axis: Axes, surface: SurfaceResults) -> None:
     order = np.argsort(np.median(surface.masses, axis=0))
     rows = np.arange(len(MANY_STARTS))
     axis.plot(
@@ -139,11 +139,11 @@ def _masses(axis: Axes, surface: Surface) -> None:
     axis.legend(handles, ["untrained", "after 4 s, each noise seed"], loc="upper left")
 
 
-def _lasting(axis: Axes, surface: Surface) -> None:
+def _lasting(axis: Axes, surface: SurfaceResults) -> None:
     press = surface.long
     t = (np.arange(len(press.force)) + 1) * network.TICK
     for start in SHOWN_STARTS[:5]:
-        _, curve = network.learn(press, Choice(), start)
+        _, curve = network.learn(press, NetworkChoice(), start)
         axis.plot(t, curve[:, 0] / press.ratio, color=style.SERIES[0], linewidth=0.9)
     axis.plot(t, press.squares[:, 2] / press.ratio, color=style.MEASURED, linewidth=1.0, linestyle="--")
     axis.axhline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
@@ -154,7 +154,7 @@ def _lasting(axis: Axes, surface: Surface) -> None:
     axis.set_ylabel("K over f/x")
 
 
-def _draw_conditions(axis: Axes, data: Mapping[str, Surface]) -> None:
+def _draw_conditions(axis: Axes, data: Mapping[str, SurfaceResults]) -> None:
     names = list(dict.fromkeys(name for s in data.values() for name in s.varied))
     for shift, (surface, color) in enumerate(zip(data.values(), style.SERIES[:2], strict=True)):
         for i, name in enumerate(names):
@@ -174,32 +174,32 @@ PARAMETERS = {
 FEW = 2
 """Noise seeds for the toggles, with ten starts on each."""
 MANY_STARTS = tuple(range(30))
-STRAIGHT = Choice(200.0, 0.1, thresholds=False)
+STRAIGHT = NetworkChoice(200.0, 0.1, thresholds=False)
 
 
-CHOSEN = Choice()
+CHOSEN = NetworkChoice()
 
 
 @dataclass(frozen=True)
 class Toggle:
     """One change against the networks as chosen."""
 
-    choice: Choice = CHOSEN
+    choice: NetworkChoice = CHOSEN
     displacement: float | None = 1.0  # of the probe, in multiples of the thesis'; None: where the press rests
     duration: float = network.PRESS  # of contact [s]
 
 
 TOGGLES = {
     "as chosen": Toggle(),
-    "thresholds at zero": Toggle(Choice(thresholds=False)),
+    "thresholds at zero": Toggle(NetworkChoice(thresholds=False)),
     "zero, 200 N, weights 0.1": Toggle(STRAIGHT),
-    "weights to 0.01": Toggle(Choice(weights=0.01)),
-    "weights to 2": Toggle(Choice(weights=2.0)),
-    "amplitude 25 N": Toggle(Choice(amplitude=25.0)),
-    "amplitude 100 N": Toggle(Choice(amplitude=100.0)),
-    "rate 1e-5": Toggle(Choice(rate=1e-5)),
-    "rate 1e-3": Toggle(Choice(rate=1e-3)),
-    "inputs not scaled": Toggle(Choice(scale=(1.0, 1.0, 1.0))),
+    "weights to 0.01": Toggle(NetworkChoice(weights=0.01)),
+    "weights to 2": Toggle(NetworkChoice(weights=2.0)),
+    "amplitude 25 N": Toggle(NetworkChoice(amplitude=25.0)),
+    "amplitude 100 N": Toggle(NetworkChoice(amplitude=100.0)),
+    "rate 1e-5": Toggle(NetworkChoice(rate=1e-5)),
+    "rate 1e-3": Toggle(NetworkChoice(rate=1e-3)),
+    "inputs not scaled": Toggle(NetworkChoice(scale=(1.0, 1.0, 1.0))),
     "probe at half": Toggle(displacement=0.5),
     "probe where it rests": Toggle(displacement=None),
     "probe at twice": Toggle(displacement=2.0),
@@ -218,15 +218,15 @@ class Looked:
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceResults:
     """Results on one surface."""
 
-    press: Press  # of the first noise seed, 4 s
-    long: Press  # the same, gone on with
+    press: NetworkPress  # of the first noise seed, 4 s
+    long: NetworkPress  # the same, gone on with
     stiffness: float  # of the surface [N/m]
     perfect: float  # K over f/x of a network that knows the surface without error
     toggled: dict[str, list[Looked]]
-    nominal: list[Answer]  # every start of MANY_STARTS on the press of every noise seed
+    nominal: list[NetworkAnswer]  # every start of MANY_STARTS on the press of every noise seed
     before: Array  # M of each start before it has learned anything [kg]
     far: list[
         tuple[float, bool]
@@ -235,7 +235,7 @@ class Surface:
     gap: tuple[
         float, float
     ]  # from the probes for K and for M to the nearest sample, in the network's scaled inputs
-    varied: dict[str, list[Answer]]
+    varied: dict[str, list[NetworkAnswer]]
 
     @property
     def masses(self) -> Array:
@@ -243,7 +243,7 @@ class Surface:
         return np.array([a.M for a in self.nominal]).reshape(-1, len(MANY_STARTS))
 
 
-Data = dict[str, Surface]
+Data = dict[str, SurfaceResults]
 
 
 def run(runs: Runs) -> Data:
@@ -251,23 +251,23 @@ def run(runs: Runs) -> Data:
     return {name: _surface(runs, name) for name in PARAMETERS}
 
 
-def _surface(runs: Runs, name: str) -> Surface:
+def _surface(runs: Runs, name: str) -> SurfaceResults:
     experiment = PARAMETERS[name]
     whole = network.presses(runs, experiment, name, list(runs.seeds)[:FEW])
     some = network.presses(runs, changed(experiment, {"run.press": network.PRESS}), name)
     cases = [(t, p, s) for t in TOGGLES.values() for p in whole for s in network.STARTS]
     looked = iter(runs.map(lambda case: look(*case), cases))
-    x = Choice().probe(name, 0).values[0]
+    x = NetworkChoice().probe(name, 0).values[0]
     switch, stiffness = experiment.approach.switch, experiment.surface.stiffness
     far, near = _truths(runs, some, switch, stiffness, float(x))
-    return Surface(
+    return SurfaceResults(
         press=some[0],
         long=whole[0],
         stiffness=stiffness,
         perfect=float((switch / x + stiffness) / np.median([press.ratio for press in some])),
         toggled={t: [next(looked) for _ in range(len(whole) * len(network.STARTS))] for t in TOGGLES},
-        nominal=network.answers(runs, some, Choice(), MANY_STARTS),
-        before=np.array([Choice().probe(name, start).probe().mass for start in MANY_STARTS]),
+        nominal=network.answers(runs, some, NetworkChoice(), MANY_STARTS),
+        before=np.array([NetworkChoice().probe(name, start).probe().mass for start in MANY_STARTS]),
         far=far,
         near=near,
         gap=gap(some[0]),
@@ -277,7 +277,7 @@ def _surface(runs: Runs, name: str) -> Surface:
     )
 
 
-def look(toggle: Toggle, press: Press, start: int) -> Looked:
+def look(toggle: Toggle, press: NetworkPress, start: int) -> Looked:
     """Lets a network learn for as long as the toggle says, and asks it."""
     seen = network.cut(press, toggle.duration)
     probe, _ = network.learn(seen, toggle.choice, start)
@@ -288,13 +288,13 @@ def look(toggle: Toggle, press: Press, start: int) -> Looked:
 
 
 def _truths(
-    runs: Runs, some: Sequence[Press], switch: float, stiffness: float, x: float
+    runs: Runs, some: Sequence[NetworkPress], switch: float, stiffness: float, x: float
 ) -> tuple[list[tuple[float, bool]], list[float]]:
     """The network's force over the surface's, at twice the largest displacement and at the probe; a start a press."""
 
-    def work(case: tuple[int, Press]) -> tuple[tuple[float, bool], float]:
+    def work(case: tuple[int, NetworkPress]) -> tuple[tuple[float, bool], float]:
         start, press = case
-        probe, _ = network.learn(press, Choice(), start)
+        probe, _ = network.learn(press, NetworkChoice(), start)
         far = 2.0 * float(probe.range_learned[1, 0])
         at_far, at_probe = (probe.force((d, 0.0, 0.0)) / (switch + stiffness * d) for d in (far, x))
         return (at_far, bool(probe.probe(displacement=far).warnings)), at_probe
@@ -303,9 +303,9 @@ def _truths(
     return [f for f, _ in found], [n for _, n in found]
 
 
-def gap(press: Press) -> tuple[float, float]:
+def gap(press: NetworkPress) -> tuple[float, float]:
     """How far the nearest sample is from where K and M are asked, in the units that the network sees."""
-    probe = Choice().probe(press.surface, 0)
+    probe = NetworkChoice().probe(press.surface, 0)
     seen = press.inputs * probe.scale
     asked = probe.values * probe.scale
     for_stiffness, for_mass = (
@@ -327,12 +327,12 @@ FAR = 0.10
 """A force is wrong when it is off by more than this share of the surface's."""
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Results of an earlier study, and the statements of sections 5.2 and 6.2 on dummy values and scaling."""
     return [_stiffness(data), _mass(data), _outside(data), _scaling(data)]
 
 
-def _stiffness(data: Data) -> Claim:
+def _stiffness(data: Data) -> ThesisClaim:
     inside = {name: [STUDY[0] <= a.over <= STUDY[1] for a in s.nominal] for name, s in data.items()}
     foam, rubber = data["foam"], data["rubber"]
     chosen = [a.over for s in data.values() for a in s.nominal]
@@ -371,7 +371,7 @@ def _stiffness(data: Data) -> Claim:
     )
 
 
-def _mass(data: Data) -> Claim:
+def _mass(data: Data) -> ThesisClaim:
     firm = {name: firm_signs(s.masses) for name, s in data.items()}
     both = all((s.masses > 0).any() and (s.masses < 0).any() for s in data.values())
     holds = both and all(often(f) for f in firm.values())
@@ -415,7 +415,7 @@ def _steady_conditions(data: Data) -> tuple[int, int]:
     return sum(map(bool, kept)), len(kept)
 
 
-def _outside(data: Data) -> Claim:
+def _outside(data: Data) -> ThesisClaim:
     wrong = [abs(force - 1.0) > FAR and warned for s in data.values() for force, warned in s.far]
     near = [force for s in data.values() for force in s.near]
     return claim(
@@ -432,7 +432,7 @@ def _outside(data: Data) -> Claim:
     )
 
 
-def _scaling(data: Data) -> Claim:
+def _scaling(data: Data) -> ThesisClaim:
     slopes = {
         name: [[abs(look.tangent) for look in s.toggled[t]] for t in ("as chosen", "inputs not scaled")]
         for name, s in data.items()
@@ -452,11 +452,11 @@ def _scaling(data: Data) -> Claim:
     )
 
 
-def _median(surface: Surface, toggle: str) -> float:
+def _median(surface: SurfaceResults, toggle: str) -> float:
     return float(np.median([look.over for look in surface.toggled[toggle]]))
 
 
-def _percent(surface: Surface) -> str:
+def _percent(surface: SurfaceResults) -> str:
     part = share_of_starts([a.M for a in surface.nominal], len(MANY_STARTS))
     return "over 99 %" if part > 0.99 else f"{100 * part:.0f} %"
 
@@ -468,4 +468,4 @@ def _spread(values: Sequence[float], unit: str) -> str:
 
 def plot(data: Data) -> Figure:
     """Learned force, K by probing, every variation, and M by initial weights."""
-    return causes(data, replace(Choice(), thresholds=False), STRAIGHT)
+    return causes(data, replace(NetworkChoice(), thresholds=False), STRAIGHT)

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.bench import Experiment, changed
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.force_control.panels import legend_inside, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, Tracking, tracking
@@ -72,7 +72,7 @@ def run(runs: Runs) -> Data:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """A question of the thesis, not a claim: it gets an answer and no verdict."""
     best = {name: min(found, key=lambda rate: _error(found[rate])) for name, found in data.network.items()}
     errors = [_rms(found) for found in data.sizes.values()]

@@ -16,7 +16,7 @@ from palpate.bench.metrics.window import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -54,7 +54,7 @@ class Recovery:
         return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
 
 
-def found_again(found: Sequence[Recovery]) -> Claim:
+def found_again(found: Sequence[Recovery]) -> ThesisClaim:
     """Whether contact comes back in time, and gently."""
     return claim(
         "contact-regained",
@@ -169,17 +169,17 @@ def run(runs: Runs) -> Data:
     return Data(traces, plain, hammer, sweep, _ratios(runs), regains, slot(drawn_back(runs.seeds[0])))
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The listing's rule; a blend that acts; the blend of the listing, acting; loss and regain."""
     return [_never(data), _acting(data), _hammer(data), found_again(data.regains)]
 
 
-def _never(data: Data) -> Claim:
+def _never(data: Data) -> ThesisClaim:
     factors = [h.factor for h in data.plain]
     return claim("friction-compensation.printed", often(f >= 0.9 for f in factors), factors=factors)
 
 
-def _acting(data: Data) -> Claim:
+def _acting(data: Data) -> ThesisClaim:
     nominal = data.varied["foam"]
     wide = [np.median([h.error for h in found]) for found in data.sweep]
     best = BLENDS[int(np.argmin(wide))]
@@ -194,7 +194,7 @@ def _acting(data: Data) -> Claim:
     )
 
 
-def _hammer(data: Data) -> Claim:
+def _hammer(data: Data) -> ThesisClaim:
     still = [h.shaking for h in data.plain]
     shares = [h.shaking / p for h, p in zip(data.printed_blend, still, strict=True)]
     return claim(

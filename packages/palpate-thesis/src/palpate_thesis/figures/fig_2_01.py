@@ -17,7 +17,7 @@ from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -46,7 +46,7 @@ LAWS = ("without dynamics", "with dynamics")
 
 
 @dataclass(frozen=True)
-class Pressed:
+class StepResponse:
     """How a run answered its steps of force."""
 
     overshoot: float  # over the size of the step, mean over the steps
@@ -55,11 +55,11 @@ class Pressed:
 
 
 @dataclass(frozen=True)
-class Pair:
+class BothLaws:
     """Both laws in the same world."""
 
-    original: Pressed
-    dynamic: Pressed
+    original: StepResponse
+    dynamic: StepResponse
 
     @property
     def phi(self) -> float:
@@ -78,7 +78,7 @@ class Data:
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
-    varied: dict[str, list[Pair]]
+    varied: dict[str, list[BothLaws]]
     growth: Array  # of the original over the workspace, shape (y, x) [1/s]; NaN out of reach
     any_gain: Array  # the same with a tenth and ten times the gains: the least of the three
 
@@ -89,19 +89,19 @@ def run(runs: Runs) -> Data:
     worlds = {n: changed(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
     original = by_condition(runs, worlds, lambda e, s: _measure(runs.one(e, s)), {"foam"})
     dynamic = by_condition(runs, worlds, lambda e, s: _measure(runs.one(changed(e, DYNAMIC), s)), {"foam"})
-    varied = {n: [Pair(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
+    varied = {n: [BothLaws(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
     traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(changed(PARAMETERS, DYNAMIC)))}
     growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Problems of the original, and what leaving out the dynamics does."""
     return [_problems(data), _dynamics(data)]
 
 
-def _problems(data: Data) -> Claim:
+def _problems(data: Data) -> ThesisClaim:
     reach = np.isfinite(data.growth)
     share = float((data.growth[reach] > GROWS).mean())
     always = float((data.any_gain[reach] > GROWS).mean())
@@ -129,7 +129,7 @@ def _losses_in_words(data: Data) -> str:
     return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
 
 
-def _dynamics(data: Data) -> Claim:
+def _dynamics(data: Data) -> ThesisClaim:
     foam = data.varied["foam"]
     return claim(
         "original-hybrid.dynamics",
@@ -212,16 +212,16 @@ def growth_over(gain: float, where: Mask) -> Array:
     return found
 
 
-def _measure(record: Record) -> Pressed:
+def _measure(record: Record) -> StepResponse:
     t, force, phi = since_contact(record), record["force"], record["phi"]
     over, strays = [], []
     for at in STEPS:
         after = (t >= at) & (t < at + 1.0)
         before = (t >= at - 0.1) & (t < at - 5e-7)
         if not after.any():
-            return Pressed(np.nan, np.nan, losses(record))
+            return StepResponse(np.nan, np.nan, losses(record))
         desired, was = record["force_desired"][after][0], record["force_desired"][before][0]
         beyond = (force[after] - desired) * np.sign(desired - was)
         over.append(max(0.0, float(beyond.max())) / abs(desired - was))
         strays.append(float(np.abs(phi[after] - phi[before].mean()).max()))
-    return Pressed(float(np.mean(over)), float(np.degrees(np.mean(strays))), losses(record))
+    return StepResponse(float(np.mean(over)), float(np.degrees(np.mean(strays))), losses(record))

@@ -16,7 +16,7 @@ from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -47,7 +47,7 @@ TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 
 
 @dataclass(frozen=True)
-class Found:
+class ArmImpedance:
     """Estimated impedance of the arm over its target."""
 
     K: float  # slope of force over displacement at the ends of the intervals
@@ -65,7 +65,7 @@ class Data:
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
-    varied: dict[str, list[Found]]
+    varied: dict[str, list[ArmImpedance]]
 
 
 def run(runs: Runs) -> Data:
@@ -81,12 +81,12 @@ def run(runs: Runs) -> Data:
     return Data(traces, varied)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Spring, damper and mass, each by itself, on foam and rubber."""
     return [_claim(data, name) for name in TARGET]
 
 
-def _claim(data: Data, name: str) -> Claim:
+def _claim(data: Data, name: str) -> ThesisClaim:
     foam, rubber = (data.varied[surface] for surface in _ALL)
     return claim(
         f"impedance-holds.{name}",
@@ -165,20 +165,20 @@ def record_jumps(experiment: Experiment, seed: int) -> Record:
     return run_with(experiment, seed, disturbances)
 
 
-def found_in(record: Record) -> Found:
+def found_in(record: Record) -> ArmImpedance:
     """Spring from the ends of the intervals; damper and mass by least squares on the true motion between the jumps."""
     t, f, x = since_contact(record), record["force"], record["x"]
     interval = np.clip(np.floor(t + 5e-7).astype(int), 0, len(DEPTHS) - 1)
     away = record.meta["experiment"]["wall"]["x"] + np.array(DEPTHS)[interval] - x
     ends = [(t >= i + 0.8) & (t < i + 1.0) for i in range(len(DEPTHS))]
     if losses(record) or not all(e.any() for e in ends):
-        return Found(np.nan, np.nan, np.nan, losses(record))
+        return ArmImpedance(np.nan, np.nan, np.nan, losses(record))
     K = np.polyfit([away[e].mean() for e in ends], [f[e].mean() for e in ends], 1)[0]
     v = np.gradient(x, record["t"])
     a = np.gradient(v, record["t"])
     used = (t >= 0.5) & (np.mod(t, 1.0) >= 0.004) & (np.mod(t, 1.0) < 0.996)
     _, B, M = np.linalg.lstsq(np.column_stack([away, -v, -a])[used], f[used])[0]
-    return Found(K / TARGET["K"], B / TARGET["B"], M / TARGET["M"], 0)
+    return ArmImpedance(K / TARGET["K"], B / TARGET["B"], M / TARGET["M"], 0)
 
 
 def ideal_trace() -> Record:

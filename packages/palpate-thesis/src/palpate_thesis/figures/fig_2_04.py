@@ -18,7 +18,7 @@ from palpate.friction import LuGre
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.look import Axes, Figure
@@ -30,7 +30,7 @@ TITLE, CAPTION = texts(NUMBER)
 
 
 @dataclass(frozen=True)
-class World:
+class JointWorld:
     """The joint's surface and friction."""
 
     surface: KelvinVoigt | StandardLinearSolid
@@ -40,7 +40,7 @@ class World:
     """Scale of the forces at the network's inputs [N]."""
 
 
-FOAM, RUBBER = World(KelvinVoigt(5200.0, 200.0, 0.10)), World(KelvinVoigt(34500.0, 480.0, 0.05))
+FOAM, RUBBER = JointWorld(KelvinVoigt(5200.0, 200.0, 0.10)), JointWorld(KelvinVoigt(34500.0, 480.0, 0.05))
 RATE = 5e-5
 _RUBS: Any = JOINT_FRICTION
 PARAMETERS = {
@@ -50,11 +50,11 @@ PARAMETERS = {
     "worlds": {
         "foam": FOAM,
         "rubber": RUBBER,
-        "relaxing\nfoam": World(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
-        "friction\nhalf": World(FOAM.surface, _RUBS.scaled(0.5)),
-        "friction\ndouble": World(FOAM.surface, _RUBS.scaled(2.0)),
-        "noise\ndouble": World(FOAM.surface, noise=1.2),
-        "inputs\nin N": World(FOAM.surface, force=1.0),
+        "relaxing\nfoam": JointWorld(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
+        "friction\nhalf": JointWorld(FOAM.surface, _RUBS.scaled(0.5)),
+        "friction\ndouble": JointWorld(FOAM.surface, _RUBS.scaled(2.0)),
+        "noise\ndouble": JointWorld(FOAM.surface, noise=1.2),
+        "inputs\nin N": JointWorld(FOAM.surface, force=1.0),
     },
 }
 """Other noise and other weights in each run; lever, inertia and motor are joint 2's, see `one_joint`."""
@@ -70,7 +70,7 @@ FOLLOWS = (
 
 
 @dataclass(frozen=True)
-class Pressed:
+class RunAfterStart:
     """How a run went from `FROM` on."""
 
     settled: float  # RMS error outside the steps [N]
@@ -89,14 +89,14 @@ class Data:
     """Measured values for `check` and `plot`."""
 
     record: dict[str, Array]
-    worlds: dict[str, list[Pressed]]
-    integral: dict[str, list[Pressed]]  # with the gain that the network had, run by run
-    rates: dict[str, list[list[Pressed]]]  # by surface, then by rate
+    worlds: dict[str, list[RunAfterStart]]
+    integral: dict[str, list[RunAfterStart]]  # with the gain that the network had, run by run
+    rates: dict[str, list[list[RunAfterStart]]]  # by surface, then by rate
 
 
 def run(runs: Runs) -> Data:
     """All worlds at one rate, all rates on two surfaces, and the plain integral of the same gain."""
-    worlds: dict[str, World] = PARAMETERS["worlds"]  # type: ignore[assignment]
+    worlds: dict[str, JointWorld] = PARAMETERS["worlds"]  # type: ignore[assignment]
     two = {"foam": FOAM, "rubber": RUBBER}
     pressed = {
         name: runs.map(partial(by_network, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
@@ -115,12 +115,12 @@ def run(runs: Runs) -> Data:
     return Data(dict(record.columns), pressed, integral, rates)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """That it follows; and that it is an integral."""
     return [_follows(data), _is_integral(data)]
 
 
-def _follows(data: Data) -> Claim:
+def _follows(data: Data) -> ThesisClaim:
     both = {n: data.worlds[n] for n in ("foam", "rubber")}
     told = "; ".join(
         f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by "
@@ -139,7 +139,7 @@ def _follows(data: Data) -> Claim:
     )
 
 
-def _is_integral(data: Data) -> Claim:
+def _is_integral(data: Data) -> ThesisClaim:
     shares = {
         n: [b.rms / a.rms for a, b in zip(data.worlds[n], data.integral[n], strict=True)]
         for n in data.integral
@@ -214,27 +214,27 @@ def _schedule() -> ForceSchedule:
     return PARAMETERS["schedule"]  # type: ignore[return-value]
 
 
-def _network(world: World, rate: float, seed: int) -> DirectNeural:
+def _network(world: JointWorld, rate: float, seed: int) -> DirectNeural:
     return direct_neural(rate, hidden=6, force=world.force, seed=seed)
 
 
-def by_network(world: World, rate: float, seed: int) -> Pressed:
+def by_network(world: JointWorld, rate: float, seed: int) -> RunAfterStart:
     """The network alone on one joint, at a learning rate."""
     link = Link(world.friction)
     bench = one_joint(world.surface, _network(world, rate, seed), _schedule(), link=link, noise=world.noise)
     return _measure(bench.run(DURATION, seed), bench.loop.joint.lever)
 
 
-def _integral(world: World, case: tuple[Pressed, int]) -> Pressed:
+def _integral(world: JointWorld, case: tuple[RunAfterStart, int]) -> RunAfterStart:
     (network, seed), link = case, Link(world.friction)
     controller = DirectIntegral(network.gain * 1e-3 * link.lever)
     bench = one_joint(world.surface, controller, _schedule(), link=link, noise=world.noise)
     return _measure(bench.run(DURATION, seed), link.lever)
 
 
-def _measure(record: Record, lever: float) -> Pressed:
+def _measure(record: Record, lever: float) -> RunAfterStart:
     if record.meta["end"] != "done":
-        return Pressed(np.nan, np.nan, np.inf, np.nan)
+        return RunAfterStart(np.nan, np.nan, np.inf, np.nan)
     t, desired = record["t"], record["force_desired"]
     late = t >= FROM - 5e-7
     error = record["force"] - desired
@@ -243,4 +243,4 @@ def _measure(record: Record, lever: float) -> Pressed:
     ends = [late & (interval == i) & (since >= _schedule().period - 1.0) for i in np.unique(interval[late])]
     off = max(abs(float(error[e].mean())) / float(desired[e].mean()) for e in ends)
     gain = float(record["gain"][late].mean()) / 1e-3 / lever
-    return Pressed(rms(error[late & (since >= SETTLE)]), rms(error[late]), off, gain)
+    return RunAfterStart(rms(error[late & (since >= SETTLE)]), rms(error[late]), off, gain)

@@ -13,7 +13,7 @@ from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -67,12 +67,12 @@ def run(runs: Runs) -> Data:
     return Data(slot(turned_into_rubber(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Surfaces, poses, a surface that changes, and whether it is the network that does it."""
     return [_environment(data), _configuration(data), _network(data)]
 
 
-def _environment(data: Data) -> Claim:
+def _environment(data: Data) -> ThesisClaim:
     found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
     return claim(
         "self-tuning-robust.environment",
@@ -87,7 +87,7 @@ def _environment(data: Data) -> Claim:
     )
 
 
-def _configuration(data: Data) -> Claim:
+def _configuration(data: Data) -> ThesisClaim:
     found = {n: data.tuned[n] for n in _POSES}
     reach = spread([100 * f.saturated for f in data.tuned["wall at\n0.40 m"]], "%", 2)
     return claim(
@@ -100,7 +100,7 @@ def _configuration(data: Data) -> Claim:
     )
 
 
-def _network(data: Data) -> Claim:
+def _network(data: Data) -> ThesisClaim:
     shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
     return claim(
         "self-tuning-robust.tuning",

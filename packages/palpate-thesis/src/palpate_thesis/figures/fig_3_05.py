@@ -14,7 +14,7 @@ from palpate.instruments import analog_filter_190
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.least_squares.press_runs import conditions, nearer
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
@@ -114,12 +114,12 @@ def _amplitudes(line: Array) -> Array:
     return 2.0 * np.abs(np.fft.rfft(sampled)) / SEGMENT
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Agreement below 120 Hz; where 480 Hz goes."""
     return [_agreement(data), _folding(data)]
 
 
-def _agreement(data: Data) -> Claim:
+def _agreement(data: Data) -> ThesisClaim:
     worst = max(data.varied, key=lambda name: data.varied[name])
     return claim(
         "anti-alias-spectra",
@@ -131,7 +131,7 @@ def _agreement(data: Data) -> Claim:
     )
 
 
-def _folding(data: Data) -> Claim:
+def _folding(data: Data) -> ThesisClaim:
     stays = _peak(data, "480 Hz")
     folds, past = _peak(data, "960 Hz"), _peak(data, "960 Hz, filtered")
     loss = 20.0 * np.log10(past[1] / folds[1])

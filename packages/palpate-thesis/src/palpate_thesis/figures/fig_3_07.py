@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
@@ -78,12 +78,12 @@ def _cutoff(values: Array) -> float:
     return float(corner * np.sqrt((-b + np.sqrt(b * b + 4.0)) / 2.0))
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The corner is where it was designed; the cut-off is not."""
     return [_design_claim(data), _half_power(data)]
 
 
-def _design_claim(data: Data) -> Claim:
+def _design_claim(data: Data) -> ThesisClaim:
     return claim(
         "anti-alias-components",
         abs(data.corner / 190.0 - 1.0) < NEAR,
@@ -92,7 +92,7 @@ def _design_claim(data: Data) -> Claim:
     )
 
 
-def _half_power(data: Data) -> Claim:
+def _half_power(data: Data) -> ThesisClaim:
     low, high = data.cutoffs
     return claim(
         "anti-alias-components.cutoff",

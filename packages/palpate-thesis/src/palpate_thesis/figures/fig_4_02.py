@@ -12,7 +12,7 @@ from palpate.bench import changed, load
 from palpate.bench.force_input import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.panels import set_title
 from palpate_thesis.look import Axes, Figure
@@ -93,12 +93,12 @@ def switch_of(record: Record) -> Switch:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The switch is clean, and 5 N is a threshold that noise does not reach."""
     return [_clean(data), _threshold(data)]
 
 
-def _clean(data: Data) -> Claim:
+def _clean(data: Data) -> ThesisClaim:
     good = {name: sum(s.clean for s in some) for name, some in data.switches.items()}
     fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
     foam, rubber = data.switches["foam"], data.switches["rubber"]
@@ -119,7 +119,7 @@ def _false(some: Sequence[Switch]) -> float:
     return sum(s.true_force <= 0.0 for s in some) / len(some)
 
 
-def _threshold(data: Data) -> Claim:
+def _threshold(data: Data) -> ThesisClaim:
     early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
     enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
     chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]

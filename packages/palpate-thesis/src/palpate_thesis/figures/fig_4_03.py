@@ -14,7 +14,7 @@ from palpate.bench.metrics.window import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import SHORT, VARIED_SEEDS, rougher
 from palpate_thesis.force_control.panels import across, panels
 from palpate_thesis.force_control.tracking import since_contact
@@ -26,7 +26,7 @@ TICK = 1e-3
 
 
 @dataclass(frozen=True)
-class ForceLoop:
+class LoopParameters:
     """Parameters that decide the stability, besides the surface's stiffness.
 
     Args:
@@ -177,12 +177,12 @@ def run(runs: Runs) -> Data:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
     return [_linear(data), _whole(data), _slow(data)]
 
 
-def _linear(data: Data) -> Claim:
+def _linear(data: Data) -> ThesisClaim:
     told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
     return claim(
         "force-loop-stable",
@@ -194,7 +194,7 @@ def _linear(data: Data) -> Claim:
     )
 
 
-def _whole(data: Data) -> Claim:
+def _whole(data: Data) -> ThesisClaim:
     kept = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
     holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
@@ -214,7 +214,7 @@ def _whole(data: Data) -> Claim:
     )
 
 
-def _slow(data: Data) -> Claim:
+def _slow(data: Data) -> ThesisClaim:
     slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
     return claim(
         "low-pass-destabilises",
@@ -275,9 +275,9 @@ def _cutoff_panel(axis: Axes, data: Data) -> None:
     axis.set_title("against the force filter, damping 200 N s/m; dashed: as used")
 
 
-def loop(kf: float, ki: float, damping: float, smoothing: float = 120.0) -> ForceLoop:
+def loop(kf: float, ki: float, damping: float, smoothing: float = 120.0) -> LoopParameters:
     """The linear loop of the bench's arm."""
-    return ForceLoop(kf, ki, damping, TIP, smoothing=smoothing)
+    return LoopParameters(kf, ki, damping, TIP, smoothing=smoothing)
 
 
 def _cases() -> list[tuple[float, float, float]]:

@@ -12,7 +12,7 @@ from palpate.bench import changed, load
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
@@ -41,7 +41,7 @@ def run(runs: Runs) -> Data:
     return Data(t, sampled, filtered, [r[0] for r in ranges], [r[1] for r in ranges])
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The half-range has to be 2 N within a quarter."""
     middle = float(np.median(data.half_range))
     return [

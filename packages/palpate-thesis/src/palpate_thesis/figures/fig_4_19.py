@@ -15,7 +15,7 @@ from palpate.bench.metrics.following import SHARE
 from palpate.bench.metrics.window import losses
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -51,7 +51,7 @@ class Stray:
 
 
 @dataclass(frozen=True)
-class Pair:
+class CoupledAndDecoupled:
     """The coupled law and the decoupled one, in the same world."""
 
     coupled: Stray
@@ -69,17 +69,19 @@ class Pair:
         return self.decoupled.y / self.coupled.y
 
 
-def pair_of(case: tuple[Experiment, int, Mapping[str, Any]]) -> Pair:
+def pair_of(case: tuple[Experiment, int, Mapping[str, Any]]) -> CoupledAndDecoupled:
     """Both laws in a world, with a seed, after K_e was identified there; changes of the decoupled law, if any."""
     world, seed, law = case
     stiffness = identify_stiffness(world, seed)
     used = stiffness * law.get("wrong", 1.0)
     changes = {"controller.stiffness": used, **{k: v for k, v in law.items() if k != "wrong"}}
     coupled, decoupled = changed(world, COUPLED), changed(world, changes)
-    return Pair(stray(press_with_jumps(coupled, seed)), stray(press_with_jumps(decoupled, seed)), stiffness)
+    return CoupledAndDecoupled(
+        stray(press_with_jumps(coupled, seed)), stray(press_with_jumps(decoupled, seed)), stiffness
+    )
 
 
-def as_printed(case: tuple[Pair, Experiment, int]) -> Pair:
+def as_printed(case: tuple[CoupledAndDecoupled, Experiment, int]) -> CoupledAndDecoupled:
     """A pair with the law as printed in place of the corrected one."""
     pair, world, seed = case
     law = {"controller.stiffness": pair.stiffness, **PRINTED}
@@ -138,9 +140,9 @@ class Data:
     """Measured values for `check` and `plot`."""
 
     traces: list[dict[str, Record]]  # as chosen, and with hardly any friction
-    nominal: list[Pair]
-    printed: list[Pair]
-    varied: dict[str, list[Pair]]
+    nominal: list[CoupledAndDecoupled]
+    printed: list[CoupledAndDecoupled]
+    varied: dict[str, list[CoupledAndDecoupled]]
 
 
 def run(runs: Runs) -> Data:
@@ -154,7 +156,7 @@ def run(runs: Runs) -> Data:
         for seed in runs.seeds[:VARIED_SEEDS]
         for name, (e, law) in _variations().items()
     ]
-    varied: dict[str, list[Pair]] = {"as\nchosen": nominal}
+    varied: dict[str, list[CoupledAndDecoupled]] = {"as\nchosen": nominal}
     for (name, _), pair in zip(named, runs.map(pair_of, [case for _, case in named]), strict=True):
         varied.setdefault(name, []).append(pair)
     k = nominal[0].stiffness
@@ -162,7 +164,7 @@ def run(runs: Runs) -> Data:
     return Data(traces, nominal, printed, varied)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """As printed all has to hold at once; corrected, each direction by itself."""
     same = {
         "source": "eq. 4.19-4.21, sec. 4.4",
@@ -171,7 +173,7 @@ def check(data: Data) -> Sequence[Claim]:
     return [_as_printed(data, same), _angle(data, same), _side(data, same), _force(data, same)]
 
 
-def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
+def _as_printed(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
     return claim(
         "decoupled-control",
         often(map(_all, data.printed)),
@@ -182,7 +184,7 @@ def _as_printed(data: Data, same: Mapping[str, Any]) -> Claim:
     )
 
 
-def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
+def _angle(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
     free = data.varied["hardly any\nfriction"]
     return claim(
         "decoupled-control.angle",
@@ -195,7 +197,7 @@ def _angle(data: Data, same: Mapping[str, Any]) -> Claim:
     )
 
 
-def _side(data: Data, same: Mapping[str, Any]) -> Claim:
+def _side(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
     free = data.varied["hardly any\nfriction"]
     return claim(
         "decoupled-control.y",
@@ -208,7 +210,7 @@ def _side(data: Data, same: Mapping[str, Any]) -> Claim:
     )
 
 
-def _force(data: Data, same: Mapping[str, Any]) -> Claim:
+def _force(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
     free = data.varied["hardly any\nfriction"]
     return claim(
         "decoupled-control.force",
@@ -279,21 +281,21 @@ def _limits(signals: Sequence[Array]) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def angle_kept(pair: Pair) -> bool:
+def angle_kept(pair: CoupledAndDecoupled) -> bool:
     """Whether contact is kept and the angle strays at most half as far as under (4.13)."""
     return pair.decoupled.lost == 0 and pair.angle <= HALF
 
 
-def _side_kept(pair: Pair) -> bool:
+def _side_kept(pair: CoupledAndDecoupled) -> bool:
     return pair.decoupled.lost == 0 and pair.side <= HALF
 
 
-def force_kept(pair: Pair) -> bool:
+def force_kept(pair: CoupledAndDecoupled) -> bool:
     """Whether contact is kept and the force strays little."""
     return pair.decoupled.lost == 0 and pair.decoupled.force <= SHARE
 
 
-def _all(pair: Pair) -> bool:
+def _all(pair: CoupledAndDecoupled) -> bool:
     return angle_kept(pair) and _side_kept(pair) and force_kept(pair)
 
 

@@ -12,9 +12,9 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, Numbered, claim, spread
+from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.least_squares.press_runs import Found, median
+from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
@@ -33,11 +33,11 @@ class Data:
     """Data and criteria of a figure of the first seconds."""
 
     shown: dict[str, Record]  # one press of each surface
-    found: dict[str, list[Found]]  # over the seeds
+    found: dict[str, list[PressEstimates]]  # over the seeds
     started: dict[
         str, dict[tuple[str, str], Array]
     ]  # time to settle of M, B, K by P(0), by K(0) and its shape
-    varied: dict[str, list[Found]]  # of the first surface
+    varied: dict[str, list[PressEstimates]]  # of the first surface
 
 
 def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
@@ -75,7 +75,7 @@ def _by_start(press: Record) -> dict[tuple[str, str], Array]:
     }
 
 
-def _settling_claim(data: Data, surface: str, id_: str, limit: float, key: str) -> Claim:
+def _settling_claim(data: Data, surface: str, id_: str, limit: float, key: str) -> ThesisClaim:
     times = {name: [getattr(f, f"settled_{key}") for f in some] for name, some in data.found.items()}
     others = [name for name in data.found if name != surface]
     fails = press_runs.failing(data.varied, lambda f: bool(getattr(f, f"settled_{key}") <= limit))
@@ -209,7 +209,7 @@ def _conditions(axis: Axes, data: Data, limit: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class FirstSeconds(Numbered):
+class LeastSquaresFirstSeconds(Numbered):
     """The figure of one surface."""
 
     PARAMETERS: Mapping[str, Experiment]
@@ -221,7 +221,7 @@ class FirstSeconds(Numbered):
         """One press a seed on each surface."""
         return run(runs, self.PARAMETERS)
 
-    def check(self, data: Data) -> Sequence[Claim]:
+    def check(self, data: Data) -> Sequence[ThesisClaim]:
         """K, B and M one by one: settled for good within the limit?"""
         return [_settling_claim(data, self.surface, self.claim, self.limit, key) for key in "KBM"]
 
@@ -230,6 +230,8 @@ class FirstSeconds(Numbered):
         return plot(data, self.limit)
 
 
-FOAM = FirstSeconds("6.1", press_runs.FOAMS, "plain foam", "least-squares-foam-settles", 0.12)
-RUBBER = FirstSeconds("6.4", {"rubber": press_runs.RUBBER}, "rubber", "least-squares-rubber-settles", 0.05)
+FOAM = LeastSquaresFirstSeconds("6.1", press_runs.FOAMS, "plain foam", "least-squares-foam-settles", 0.12)
+RUBBER = LeastSquaresFirstSeconds(
+    "6.4", {"rubber": press_runs.RUBBER}, "rubber", "least-squares-rubber-settles", 0.05
+)
 STUDIES = (FOAM, RUBBER)

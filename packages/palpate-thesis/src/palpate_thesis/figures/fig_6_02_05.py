@@ -13,10 +13,10 @@ from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, Numbered, claim, spread
+from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
 from palpate_thesis.laboratory.laboratory import own_damping
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.least_squares.press_runs import Found, median
+from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
@@ -36,8 +36,8 @@ class Data:
     """Data and criteria of a figure of the later slot."""
 
     shown: dict[str, Record]  # one press of each surface
-    found: dict[str, list[Found]]  # over the seeds
-    varied: dict[str, dict[str, list[Found]]]  # of the first surface, or of each
+    found: dict[str, list[PressEstimates]]  # over the seeds
+    varied: dict[str, dict[str, list[PressEstimates]]]  # of the first surface, or of each
     ratios: dict[
         str, Array
     ]  # of the first surface: quantiles of K, B, M from single samples, shape (seeds, 3)
@@ -92,11 +92,11 @@ def _middle(values: Array) -> float:
 def found_claim(
     data: Data,
     id_: str,
-    measure: Callable[[Found], float],
-    holds: Callable[[Found], bool],
+    measure: Callable[[PressEstimates], float],
+    holds: Callable[[PressEstimates], bool],
     unit: str,
     **numbers: Any,
-) -> Claim:
+) -> ThesisClaim:
     """A row that holds if it does for most of the seeds on the first surface.
 
     Args:
@@ -120,7 +120,7 @@ def found_claim(
     )
 
 
-def _ratio_claim(data: Data, id_: str) -> Claim:
+def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
     """The ratios of sec. 5.1: is it difficult to obtain B and M with them?"""
     low, high = (data.ratios["B"][:, i] / data.truth["B"] for i in (0, 2))
     m_low, _, m_high = (data.ratios["M"][:, i] for i in range(3))
@@ -198,7 +198,7 @@ def _ratios(axis: Axes, data: Data) -> None:
     axis.legend(loc="upper left")
 
 
-def plausible(found: Found) -> bool:
+def plausible(found: PressEstimates) -> bool:
     """Whether B_e is near the surface's own B, which the thesis could only state and the bench can measure."""
     return abs(found.B / found.true_B - 1.0) < PLAUSIBLE
 
@@ -218,7 +218,7 @@ class Later(Numbered):
         """One press a seed on each surface."""
         return run(runs, self.PARAMETERS, vary=len(self.PARAMETERS))
 
-    def check(self, data: Data) -> Sequence[Claim]:
+    def check(self, data: Data) -> Sequence[ThesisClaim]:
         """How near K_e is to f/x, its level, B and M, and the ratios."""
         found, id_, kilo = data.found[self.judged], self.claim, 1e3 * self.level
         early, late = (100.0 * median([getattr(f, a) for f in found]) for a in ("early_apart", "apart"))
@@ -232,7 +232,7 @@ class Later(Numbered):
             _ratio_claim(data, self.ratio),
         ]
 
-    def near(self, found: Found) -> bool:
+    def near(self, found: PressEstimates) -> bool:
         """Whether K_e is near f/x."""
         return abs(found.apart) < self.apart
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from palpate.bench import Experiment, changed
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.least_squares.press_runs import Found
+from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
@@ -41,7 +41,7 @@ PARAMETERS = {
     **{f"{k / 1000:g} kN/m, {t:g} s, B {b:g}": _relaxing(k, t, b) for k, t, b in BRANCHES},
 }
 """The foams that are tried: without memory, and with a relaxing branch of so much stiffness and time."""
-SHOWS: dict[str, Callable[[Found], bool]] = {
+SHOWS: dict[str, Callable[[PressEstimates], bool]] = {
     "K in 0.12 s": lambda f: f.settled_K <= 0.12,
     "B in 0.12 s": lambda f: f.settled_B <= 0.12,
     "K = f/x": lambda f: abs(f.apart) < NEAR,
@@ -59,7 +59,7 @@ class Data:
     """The press of figure 6.2 from raw signals, and what each foam shows."""
 
     later: later.Data
-    foams: dict[str, Found]
+    foams: dict[str, PressEstimates]
 
     @property
     def table(self) -> dict[str, list[bool]]:
@@ -76,7 +76,7 @@ def run(runs: Runs) -> Data:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Signs of M and B, K, and all at once."""
     return [*_raw_signs(data), _together(data)]
 
@@ -87,7 +87,7 @@ def _count(data: Data, *what: str) -> str:
     return f"{good} of the {len(data.foams)} foams tried"
 
 
-def _raw_signs(data: Data) -> list[Claim]:
+def _raw_signs(data: Data) -> list[ThesisClaim]:
     """Signs of M and B, and K, from raw signals."""
     shown = partial(_count, data)
     both = ("raw: B < 0", "raw: M < 0")
@@ -121,7 +121,7 @@ def _raw_signs(data: Data) -> list[Claim]:
     ]
 
 
-def _together(data: Data) -> Claim:
+def _together(data: Data) -> ThesisClaim:
     counts = {name: sum(row) for name, row in data.table.items()}
     most = max(counts.values())
     best = next(name for name, count in counts.items() if count == most)

@@ -9,11 +9,11 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import network
-from palpate_thesis.neural_identifier.network import Answer, Press
+from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkPress
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.6"
@@ -33,10 +33,12 @@ OTHERS = (25.0, 100.0)
 class Data:
     """Data of the figure: one press learned at several rates, and the times over seeds and conditions."""
 
-    press: Press
+    press: NetworkPress
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start
-    found: dict[float, dict[float, list[Answer]]]  # by amplitude and rate, a press and a start for each seed
-    varied: dict[str, dict[float, list[Answer]]]  # by condition and rate
+    found: dict[
+        float, dict[float, list[NetworkAnswer]]
+    ]  # by amplitude and rate, a press and a start for each seed
+    varied: dict[str, dict[float, list[NetworkAnswer]]]  # by condition and rate
     amplitude: float  # of the network as chosen [N]
 
 
@@ -56,19 +58,19 @@ def run(runs: Runs) -> Data:
 
 
 def _by_rate(
-    runs: Runs, some: Sequence[Press], amplitude: float, rates: Sequence[float]
-) -> dict[float, list[Answer]]:
+    runs: Runs, some: Sequence[NetworkPress], amplitude: float, rates: Sequence[float]
+) -> dict[float, list[NetworkAnswer]]:
     choices = [replace(network.network_of(runs), amplitude=amplitude, rate=rate) for rate in rates]
     return {choice.rate: found for choice, found in network.sweep(runs, some, choices).items()}
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Smaller takes longer; too large never converges."""
     found = data.found[data.amplitude]
     return [_slower(data, found), _too_large(data, found)]
 
 
-def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
+def _slower(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
     times = [f"{rate:g}: {spread([a.error_gone for a in found[rate]], 's', 2)}" for rate in SMALLER]
     bad = [name for name, by_rate in data.varied.items() if not often(slower_throughout(by_rate))]
     other = [f"{a:g} N" for a in OTHERS if not often(slower_throughout(data.found[a]))]
@@ -89,7 +91,7 @@ def _slower(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
 
 
-def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
+def _too_large(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
     first = {a: stuck_from(by_rate) for a, by_rate in data.found.items()}
     told = (
         ", ".join(f"{rate:g} at {a:g} N" for a, rate in first.items() if np.isfinite(rate))
@@ -107,19 +109,19 @@ def _too_large(data: Data, found: Mapping[float, Sequence[Answer]]) -> Claim:
     )
 
 
-def slower_throughout(by_rate: Mapping[float, Sequence[Answer]]) -> list[bool]:
+def slower_throughout(by_rate: Mapping[float, Sequence[NetworkAnswer]]) -> list[bool]:
     """For each run, whether every smaller rate takes longer."""
     times = np.array([[a.error_gone for a in by_rate[rate]] for rate in SMALLER])
     finite = np.where(np.isfinite(times), times, 1e3)
     return [bool(ok) for ok in np.all(np.diff(finite, axis=0) > 0.0, axis=0)]
 
 
-def stuck(answer: Answer) -> bool:
+def stuck(answer: NetworkAnswer) -> bool:
     """Whether the error is still there at the end."""
     return not np.isfinite(answer.error_gone)
 
 
-def stuck_from(by_rate: Mapping[float, Sequence[Answer]]) -> float:
+def stuck_from(by_rate: Mapping[float, Sequence[NetworkAnswer]]) -> float:
     """The smallest rate above the thesis' from which on all are too large; infinite if there is none."""
     large = [rate for rate in RATES if rate > SMALLER[0]]
     hopeless = [often([stuck(a) for a in by_rate[rate]]) for rate in large]
@@ -166,7 +168,7 @@ def _curves(axes: list[Axes], data: Data) -> None:
     axes[0].legend(ncols=2, loc="upper right", bbox_to_anchor=(1.0, 0.92))
 
 
-def _times(axis: Axes, by_rate: Mapping[float, Sequence[Answer]], label: str, color: str) -> None:
+def _times(axis: Axes, by_rate: Mapping[float, Sequence[NetworkAnswer]], label: str, color: str) -> None:
     times = np.array([[a.error_gone for a in found] for found in by_rate.values()])
     rates = np.repeat(np.array(list(by_rate))[:, None], times.shape[1], axis=1)
     done = np.isfinite(times)

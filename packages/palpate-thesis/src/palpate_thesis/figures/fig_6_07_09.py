@@ -12,12 +12,19 @@ from palpate.bench import Experiment
 from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, Numbered
+from palpate_thesis.claims import Numbered, ThesisClaim
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import claims, network
-from palpate_thesis.neural_identifier.claims import SMALL, Grounds, Part, share
-from palpate_thesis.neural_identifier.network import AMPLITUDES, STARTS, WEIGHTS, Answer, Choice, Press
+from palpate_thesis.neural_identifier.claims import SMALL, ClaimPart, Grounds, share
+from palpate_thesis.neural_identifier.network import (
+    AMPLITUDES,
+    STARTS,
+    WEIGHTS,
+    NetworkAnswer,
+    NetworkChoice,
+    NetworkPress,
+)
 from palpate_thesis.runs import Runs
 
 SHOWN_STARTS = 5
@@ -30,7 +37,7 @@ NAMES = {"foam": "plain foam", "rubber": "rubber"}
 class Data:
     """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
 
-    press: Press  # that of the first noise seed
+    press: NetworkPress  # that of the first noise seed
     curves: list[Array]  # K, B, M and error of a few starts on it
     grounds: Grounds
 
@@ -45,7 +52,7 @@ def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
     )
 
 
-def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Press]) -> Grounds:
+def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[NetworkPress]) -> Grounds:
     """Grounds of the claims about a surface."""
     x = SETTINGS[surface].values[0]
     at_probe = experiment.approach.switch + runs.laboratory.of(experiment).surface.stiffness * x
@@ -59,7 +66,7 @@ def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[Pre
     )
 
 
-def plot(data: Data, parts: Sequence[Part], band: float) -> Figure:
+def plot(data: Data, parts: Sequence[ClaimPart], band: float) -> Figure:
     """Six panels as in the thesis; (g), (h) where in the sweep each part holds; (i) under conditions; (j) all answers.
 
     Args:
@@ -119,11 +126,15 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
 
 
 def _map(
-    axis: Axes, swept: Mapping[Choice, Sequence[Answer]], parts: Sequence[Part], *, thresholds: bool
+    axis: Axes,
+    swept: Mapping[NetworkChoice, Sequence[NetworkAnswer]],
+    parts: Sequence[ClaimPart],
+    *,
+    thresholds: bool,
 ) -> None:
     shares = np.array(
         [
-            [share(swept[Choice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
+            [share(swept[NetworkChoice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
             for part in parts
         ]
     )
@@ -136,7 +147,7 @@ def _map(
     axis.set_xlabel(f"output amplitude [N]; within each, weights {WEIGHTS[0]:g} to {WEIGHTS[-1]:g}")
 
 
-def _conditions(axis: Axes, grounds: Grounds, parts: Sequence[Part]) -> None:
+def _conditions(axis: Axes, grounds: Grounds, parts: Sequence[ClaimPart]) -> None:
     cases = {"as chosen": grounds.nominal, **grounds.varied}
     shares = np.array([[share(some, part) for some in cases.values()] for part in parts])
     _shares(axis, shares, [part.suffix for part in parts])
@@ -182,19 +193,19 @@ def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class FirstSeconds(Numbered):
+class NetworkFirstSeconds(Numbered):
     """The figure of one surface."""
 
     PARAMETERS: Experiment
     surface: str
-    parts: Sequence[Part]  # of the thesis' claims
+    parts: Sequence[ClaimPart]  # of the thesis' claims
     band: float  # of K over f/x around 1 in which the claim holds
 
     def run(self, runs: Runs) -> Data:
         """One press a noise seed, ten starts on each."""
         return run(runs, self.PARAMETERS, self.surface)
 
-    def check(self, data: Data) -> Sequence[Claim]:
+    def check(self, data: Data) -> Sequence[ThesisClaim]:
         """Settling times and values of K, B and M."""
         return claims.claims(data.grounds, self.parts)
 
@@ -203,6 +214,6 @@ class FirstSeconds(Numbered):
         return plot(data, self.parts, self.band)
 
 
-FOAM = FirstSeconds("6.7", network.FOAM, "foam", claims.FOAM, claims.FOAM_BAND)
-RUBBER = FirstSeconds("6.9", network.RUBBER, "rubber", claims.RUBBER, claims.RUBBER_BAND)
+FOAM = NetworkFirstSeconds("6.7", network.FOAM, "foam", claims.FOAM, claims.FOAM_BAND)
+RUBBER = NetworkFirstSeconds("6.9", network.RUBBER, "rubber", claims.RUBBER, claims.RUBBER_BAND)
 STUDIES = (FOAM, RUBBER)

@@ -9,18 +9,18 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate_thesis.claims import Claim, texts
+from palpate_thesis.claims import ThesisClaim, texts
 from palpate_thesis.figures import fig_6_07_09 as first_seconds
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import claims, network
-from palpate_thesis.neural_identifier.network import AMPLITUDES, WEIGHTS, Choice
+from palpate_thesis.neural_identifier.network import AMPLITUDES, WEIGHTS, NetworkChoice
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.8"
 TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = network.FOAM
-NEAR = Choice(amplitude=25.0, weights=0.01)
+NEAR = NetworkChoice(amplitude=25.0, weights=0.01)
 """An amplitude just above the force and weights as small as those in the listing of the controller."""
 
 
@@ -38,7 +38,7 @@ def run(runs: Runs) -> Data:
     return Data(shown, network.learn(shown.press, NEAR, 0)[1][:, 3])
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """When the error is almost zero."""
     return claims.claims(data.shown.grounds, (claims.ERROR,))
 
@@ -67,7 +67,7 @@ def _times(axis: Axes, data: Data, *, thresholds: bool) -> None:
     colors = style.SERIES[:5]
     swept = data.shown.grounds.swept
     for weights, color in zip(WEIGHTS, colors, strict=True):
-        found = [[a.error_gone for a in swept[Choice(a, weights, thresholds)]] for a in AMPLITUDES]
+        found = [[a.error_gone for a in swept[NetworkChoice(a, weights, thresholds)]] for a in AMPLITUDES]
         middle = np.median(found, axis=1)
         axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
     axis.axhspan(*claims.TIME, color=style.FAIL, alpha=0.12, linewidth=0)

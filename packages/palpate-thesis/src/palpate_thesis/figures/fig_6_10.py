@@ -10,7 +10,7 @@ import numpy as np
 from palpate.bench import changed
 from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, robustness, since_contact, slot
@@ -51,7 +51,7 @@ def run(runs: Runs) -> Data:
     return Data(slot(runs.one(PARAMETERS), *SHOWN), nominal, varied, varied["rubber"])
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """At both levels the error has to be more than a tenth of the desired force."""
     return [
         claim(

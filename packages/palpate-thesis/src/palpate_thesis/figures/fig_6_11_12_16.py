@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.bench import Experiment, changed
-from palpate_thesis.claims import Claim, Numbered, claim
+from palpate_thesis.claims import Numbered, ThesisClaim, claim
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control import tracking
 from palpate_thesis.force_control.panels import tracked_figure
@@ -31,7 +31,7 @@ class Steps(Numbered):
         """Fifteen seconds of contact, the last five judged."""
         return track(runs, self.PARAMETERS, self.shown, JUDGED)
 
-    def check(self, data: Tracked) -> Sequence[Claim]:
+    def check(self, data: Tracked) -> Sequence[ThesisClaim]:
         """The force has to follow from 10 to 15 s, by the same limits for every desired force."""
         return [
             claim(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from palpate.bench import changed
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control.panels import tracked_figure
 from palpate_thesis.force_control.tracking import FOAM, FOLLOWING, Tracked, Tracking, describe, track
@@ -24,7 +24,7 @@ def run(runs: Runs) -> Tracked:
     return track(runs, PARAMETERS, WINDOW, WINDOW)
 
 
-def check(data: Tracked) -> Sequence[Claim]:
+def check(data: Tracked) -> Sequence[ThesisClaim]:
     """The force must not follow in the first ten seconds."""
     return [
         claim(

@@ -15,7 +15,7 @@ from palpate.bench.metrics.following import LIMIT
 from palpate.bench.metrics.window import SETTLE, rms
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.figures.fig_6_13 import SLOW
 from palpate_thesis.force_control.panels import force_panel, panels
@@ -45,7 +45,7 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
 
 
 @dataclass(frozen=True)
-class Course:
+class CycleErrors:
     """The error of each cycle outside the steps [N], up to the first loss of contact."""
 
     error: Array  # (cycles,)
@@ -58,7 +58,7 @@ class Data:
 
     shown: Record
     nominal: list[Tracking]
-    courses: dict[str, list[Course]]
+    courses: dict[str, list[CycleErrors]]
 
 
 def run(runs: Runs) -> Data:
@@ -71,7 +71,7 @@ def run(runs: Runs) -> Data:
     return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The force has to follow from 180 to 190 s."""
     first = spread([float(c.error[:2].mean()) for c in data.courses["foam"]], "N")
     plain = spread([float(c.error[-2:].mean()) for c in data.courses["PI, K_i = 1 per second"]], "N")
@@ -113,7 +113,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def course_of(record: Record) -> Course:
+def course_of(record: Record) -> CycleErrors:
     """The error of each whole cycle up to the first loss of contact."""
     t, phase = since_contact(record), record["phase"]
     gone = np.nonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT))[0]
@@ -122,4 +122,4 @@ def course_of(record: Record) -> Course:
     settled = (t >= 0.0) & (np.mod(t + 5e-7, 2.5) >= SETTLE)
     starts = CYCLE * np.arange(int((end + 1e-6) // CYCLE))
     values = [rms(error[settled & (t >= a) & (t < a + CYCLE)]) for a in starts]
-    return Course(np.array(values), end if len(gone) else None)
+    return CycleErrors(np.array(values), end if len(gone) else None)

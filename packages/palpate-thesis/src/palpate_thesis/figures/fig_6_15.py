@@ -12,7 +12,7 @@ from palpate.bench import changed, load
 from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import VARIED_SEEDS, rougher
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
@@ -71,12 +71,12 @@ def run(runs: Runs) -> Data:
     return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """Whether the errors are there, and whether the thesis' two reasons are."""
     return [_not_zero(data), _there_before(data), _sticks(data)]
 
 
-def _not_zero(data: Data) -> Claim:
+def _not_zero(data: Data) -> ThesisClaim:
     nominal = data.varied["as\nchosen"]
     y, phi = _y(nominal), [float(np.degrees(e.phi)) for e in nominal]
     half = np.median(_y(data.varied["friction\nhalf"])) / np.median(y)
@@ -91,7 +91,7 @@ def _not_zero(data: Data) -> Claim:
     )
 
 
-def _there_before(data: Data) -> Claim:
+def _there_before(data: Data) -> ThesisClaim:
     before = [1e3 * e.y_switch for e in data.varied["as\nchosen"]]
     return claim(
         "neural-free-directions.before",
@@ -101,7 +101,7 @@ def _there_before(data: Data) -> Claim:
     )
 
 
-def _sticks(data: Data) -> Claim:
+def _sticks(data: Data) -> ThesisClaim:
     free = _y(data.varied["no sticking\nto the foam"])
     taken = 1.0 - np.median(free) / np.median(_y(data.varied["as\nchosen"]))
     return claim("neural-free-directions.sticks", bool(taken >= SHARE), free=free, taken=taken, share=SHARE)

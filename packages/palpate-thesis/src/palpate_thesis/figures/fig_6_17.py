@@ -12,7 +12,7 @@ from palpate.bench import changed
 from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Claim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control.panels import following_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import (
@@ -58,7 +58,7 @@ def run(runs: Runs) -> Data:
     )
 
 
-def check(data: Data) -> Sequence[Claim]:
+def check(data: Data) -> Sequence[ThesisClaim]:
     """The force has to follow from the start; and adapting has to take from 2.5 to 7.5 s."""
     found = data.tracked
     limited = 100 * float(np.median([one.saturated for one in found.nominal]))

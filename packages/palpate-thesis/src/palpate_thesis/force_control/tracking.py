@@ -11,7 +11,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.force_input import CONTACT
-from palpate.bench.metrics import Look
+from palpate.bench.metrics import Window
 from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
 from palpate.bench.metrics.window import SETTLE, losses, rms
 from palpate.records import Record
@@ -67,7 +67,7 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
     """Measures a record from `start` to `end` after contact [s]."""
 
     def measure(record: Record) -> Tracking:
-        look = Look(record, (start, end))
+        look = Window(record, (start, end))
         if not look.touched:
             return NEVER
         if not len(look.error):

@@ -19,7 +19,7 @@ COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 
 @dataclass(frozen=True)
-class Look:
+class WeightsAtMoment:
     """The controller at a moment, and what went on since the look before."""
 
     t: float  # since contact [s]
@@ -31,7 +31,7 @@ def watch(
     experiment: Experiment,
     seed: int,
     duration: float,
-    look: Callable[[Look], None],
+    look: Callable[[WeightsAtMoment], None],
     waiting: Callable[[], None] | None = None,
     every: int = LOOK,
 ) -> float | None:
@@ -60,7 +60,7 @@ def watch(
             return (march.ticks - every + int(np.argmax(gone)) - march.contact) * march.loop.tick
         _, own = alone(march.loop.controller, march.state.controller)
         neural = own if isinstance(own, NeuralState) else None
-        look(Look(march.since_contact, rows[phase == CONTACT], neural))
+        look(WeightsAtMoment(march.since_contact, rows[phase == CONTACT], neural))
         if march.since_contact >= duration:
             return None
     return None if march.contact is not None else float("nan")
@@ -78,10 +78,10 @@ def layers(state: NeuralState) -> tuple[Array, Array]:
     return w[:120].reshape(12, 10), w[120:].reshape(3, 13)
 
 
-def hold(columns: slice) -> Callable[[Look], None]:
+def hold(columns: slice) -> Callable[[WeightsAtMoment], None]:
     """A look that sets these columns of the hidden weights to zero, so that they cannot grow."""
 
-    def look(one: Look) -> None:
+    def look(one: WeightsAtMoment) -> None:
         if one.neural is not None:
             layers(one.neural)[0][:, columns] = 0.0
 

@@ -17,7 +17,7 @@ from palpate.files.ownership import SQLITE_ID
 T = TypeVar("T")
 
 
-class Head(msgspec.Struct, frozen=True):
+class SearchIdentity(msgspec.Struct, frozen=True):
     """Identity of a search: an archive of another one is not resumed.
 
     Args:
@@ -66,14 +66,14 @@ class Archive:
 
 
 @contextmanager
-def open_archive(path: Path, head: Head) -> Iterator[Archive]:
+def open_archive(path: Path, head: SearchIdentity) -> Iterator[Archive]:
     """The archive at `path`: begun, or resumed if it is of the same search and sources.
 
     Raises:
         InputError: it is of another search, or no archive.
     """
     with _report_errors(path), closing(_connection(path)) as connection:
-        begun = _get(connection, "head", Head)
+        begun = _get(connection, "head", SearchIdentity)
         if begun is None:
             _put(connection, "head", head)
         elif begun != head:
@@ -84,14 +84,14 @@ def open_archive(path: Path, head: Head) -> Iterator[Archive]:
         yield Archive(path, connection, _laboratories(connection))
 
 
-def read(path: Path) -> tuple[Head | None, dict[int, Tried]]:
+def read(path: Path) -> tuple[SearchIdentity | None, dict[int, Tried]]:
     """Head, and laboratories by number.
 
     Raises:
         InputError: it is no archive.
     """
     with _report_errors(path), closing(_connection(path)) as connection:
-        return _get(connection, "head", Head), _laboratories(connection)
+        return _get(connection, "head", SearchIdentity), _laboratories(connection)
 
 
 def remember(path: Path, key: str, kind: type[T], compute: Callable[[], T]) -> T:

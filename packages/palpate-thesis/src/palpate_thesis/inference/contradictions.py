@@ -38,7 +38,7 @@ class Bred:
     shares: tuple[float, ...]
 
 
-def breed(wanted: Sequence[str], among: Table, runner: Runner, tries: int, seed: int) -> Bred:
+def breed(wanted: Sequence[str], among: VerdictTable, runner: Runner, tries: int, seed: int) -> Bred:
     """Breeds up to `tries` laboratories for as many of the wanted sentences as can be had; stops when it has all.
 
     Each is a child of two laboratories, one that makes this sentence true and one that makes another: each unknown is
@@ -124,7 +124,7 @@ class Together:
 
 
 @dataclass(frozen=True)
-class Table:
+class VerdictTable:
     """Verdicts of laboratories, rows, on sentences, columns; `known` where it was not given up before."""
 
     ids: tuple[str, ...]
@@ -170,7 +170,7 @@ def _expected_count(true: Mask, parts: Sequence[int]) -> float:
     return float(n * np.prod(shares) / (np.prod(alone) if len(parts) > 2 else 1.0))
 
 
-def table(ids: Sequence[str], tried: Mapping[int, Tried]) -> Table:
+def table(ids: Sequence[str], tried: Mapping[int, Tried]) -> VerdictTable:
     """The table of an archive."""
     some = [tried[number] for number in sorted(tried)]
     true = np.zeros((len(some), len(ids)), dtype=np.bool_)
@@ -178,10 +178,10 @@ def table(ids: Sequence[str], tried: Mapping[int, Tried]) -> Table:
     for i, one in enumerate(some):
         true[i, : len(one.verdicts)] = one.verdicts
         known[i, : len(one.verdicts)] = True
-    return Table(tuple(ids), np.array([one.shares for one in some]), true, known)
+    return VerdictTable(tuple(ids), np.array([one.shares for one in some]), true, known)
 
 
-def join(whole: Table, *parts: Table) -> Table:
+def join(whole: VerdictTable, *parts: VerdictTable) -> VerdictTable:
     """Tables one above the other, by the columns of `whole`; what only it has is not known in the others."""
     true, known = [whole.true], [whole.known]
     for part in parts:
@@ -191,4 +191,4 @@ def join(whole: Table, *parts: Table) -> Table:
             wide[:, at] = some
             stack.append(wide)
     shares = [one.shares for one in (whole, *parts) if len(one.shares)]
-    return Table(whole.ids, np.vstack(shares), np.vstack(true), np.vstack(known))
+    return VerdictTable(whole.ids, np.vstack(shares), np.vstack(true), np.vstack(known))

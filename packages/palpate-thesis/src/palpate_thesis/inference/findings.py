@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.files import MADE, signed, write_json, write_text
+from palpate.files import MADE, with_author, write_json, write_text
 from palpate.report import style
 from palpate.report.page import Table, page
 from palpate_thesis.inference.judge import Judged
 from palpate_thesis.inference.result import (
     Contradiction,
-    Result,
+    InferenceResult,
     as_json,
     halves,
     laboratories,
@@ -30,7 +30,7 @@ from palpate_thesis.laboratory.unknowns import UNKNOWNS, Unknown
 from palpate_thesis.look import Figure
 
 
-def main_tables(result: Result) -> list[Table]:
+def main_tables(result: InferenceResult) -> list[Table]:
     """Tables of the page and of the document."""
     return [
         _counts(result),
@@ -43,12 +43,12 @@ def main_tables(result: Result) -> list[Table]:
     ]
 
 
-def details(result: Result) -> list[Table]:
+def details(result: InferenceResult) -> list[Table]:
     """Tables of the page alone."""
     return [_sentences(result), _ranges()]
 
 
-def _counts(result: Result) -> Table:
+def _counts(result: InferenceResult) -> Table:
     rows = [
         [name, *(f"{one.count(of)} of {len(of)}" for of in halves().values())]
         for name, one in laboratories(result).items()
@@ -57,7 +57,7 @@ def _counts(result: Result) -> Table:
     return Table("Sentences that are true, over ten seeds", head, rows)
 
 
-def _predictive(result: Result) -> Table:
+def _predictive(result: InferenceResult) -> Table:
     rows = [
         [one.name, str(one.laboratories), one.calibration.in_words(), one.validation.in_words()]
         for one in result.predictive
@@ -70,7 +70,7 @@ def _predictive(result: Result) -> Table:
     )
 
 
-def posterior(result: Result) -> Table:
+def posterior(result: InferenceResult) -> Table:
     """Table of the posterior of each unknown."""
     rows = [
         [m.unknown.name.replace("_", " "), _prior(m.unknown), m.in_words(), m.verdict]
@@ -88,7 +88,7 @@ def _prior(unknown: Unknown) -> str:
     return f"{unknown.low:g} to {unknown.high:g} {unknown.unit}, {unknown.prior}".replace(" ,", ",")
 
 
-def _searches(result: Result) -> Table:
+def _searches(result: InferenceResult) -> Table:
     rows = [[name, *_sizes(sample)] for name, sample in samples(result).items()]
     head = (
         *(
@@ -111,7 +111,7 @@ def _sizes(sample: Sample) -> Sequence[str]:
     return (*map(str, numbers), effective, str(len(sample.stages)), *ends)
 
 
-def _largest(result: Result) -> Table:
+def _largest(result: InferenceResult) -> Table:
     rows = [[s.figure, s.id] for s in sentences() if result.largest.true(s)]
     return Table(
         f"The largest set of sentences true at once: {len(rows)} of {len(sentences())}",
@@ -120,13 +120,13 @@ def _largest(result: Result) -> Table:
     )
 
 
-def _never_true(result: Result) -> list[Table]:
+def _never_true(result: InferenceResult) -> list[Table]:
     rows = [[a.id, f"{a.tried}", reasons().get(a.id, "none is known")] for a in result.never]
     head = ("sentence", "laboratories tried", "shortest reason")
     return [Table("Sentences that no laboratory in the ranges made true", head, rows)] if rows else []
 
 
-def _exclusive(result: Result) -> list[Table]:
+def _exclusive(result: InferenceResult) -> list[Table]:
     rows = [_together_row(c) for c in result.contradictions]
     head = (
         *("sentences", "laboratories that judged all", "true separately (of three: each two)"),
@@ -142,7 +142,7 @@ def _together_row(c: Contradiction) -> list[str]:
     return [" + ".join(one.ids), *counts, c.verdict, c.reason or "none is known"]
 
 
-def _sentences(result: Result) -> Table:
+def _sentences(result: InferenceResult) -> Table:
     alone = {a.id: a for a in result.table.alone()}
     rows = []
     for s in sentences():
@@ -165,10 +165,10 @@ def _ranges() -> Table:
 PAGE, DOCUMENT, FIGURE, FOUND = "index.html", "found.md", "posterior.png", "found.json"
 
 
-def present(result: Result, folder: Path, command: str) -> None:
+def present(result: InferenceResult, folder: Path, command: str) -> None:
     """Writes page, document, figure and JSON into the folder."""
     style.save(drawn_figure(result.posterior), folder / FIGURE)
-    write_json(folder / FOUND, signed(as_json(result, command)))
+    write_json(folder / FOUND, with_author(as_json(result, command)))
     notes, found = [_cross_validated(result), _worth(result.posterior)], main_tables(result)
     whole = page(
         title="The thesis' laboratory, inferred",
@@ -200,7 +200,7 @@ def _rows(table: Table) -> str:
     return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
 
 
-def _cross_validated(result: Result) -> str:
+def _cross_validated(result: InferenceResult) -> str:
     there, here = result.cross_validation
     follows = "It could replace the bench." if result.better else "The bench stays the default."
     return (

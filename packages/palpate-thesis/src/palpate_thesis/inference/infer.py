@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.files import MADE, kept_folder, signed, write_json, write_text
+from palpate.files import MADE, kept_folder, with_author, write_json, write_text
 from palpate_thesis.inference import archive, contradictions, judge, search
-from palpate_thesis.inference.contradictions import Table
+from palpate_thesis.inference.contradictions import VerdictTable
 from palpate_thesis.inference.findings import present
 from palpate_thesis.inference.judge import Judged, drawn_shares, judged_shares
-from palpate_thesis.inference.result import Contradiction, Result
+from palpate_thesis.inference.result import Contradiction, InferenceResult
 from palpate_thesis.inference.sampler import Sample, Settings
-from palpate_thesis.inference.search import Runner, Search
+from palpate_thesis.inference.search import PosteriorSearch, Runner
 from palpate_thesis.inference.sentences import sentences, sentences_of_search
 from palpate_thesis.laboratory.laboratory import CHOSEN, Laboratory, laboratory_at, text
 
@@ -58,14 +58,14 @@ class Inference:
     half: bool = False
     told: Progress = lambda _what, _done, _of: None
 
-    def run(self, *, replace: bool = False) -> Result:
+    def run(self, *, replace: bool = False) -> InferenceResult:
         """Goes on from where the folder stands.
 
         Raises:
             InputError: the folder holds something else, and `replace` is off.
         """
         with kept_folder(self.folder, STATE, replace=replace):
-            write_json(self.folder / STATE, signed({"command": self.command, "finished": False}))
+            write_json(self.folder / STATE, with_author({"command": self.command, "finished": False}))
             everything = self._search("all sentences", calibrating=False)
             everything.survey(self.folder / ALL)
             half = self._half()
@@ -77,13 +77,15 @@ class Inference:
             present(result, self.folder, self.command)
         return result
 
-    def _search(self, name: str, *, calibrating: bool) -> Search:
+    def _search(self, name: str, *, calibrating: bool) -> PosteriorSearch:
         def progress(power: float, done: int, of: int) -> None:
             self.told(
                 f"{name}, likelihood to the power of {power:.2g}" if power else f"{name}, prior", done, of
             )
 
-        return Search(sentences_of_search(calibrating=calibrating), self.settings, self.runner, progress)
+        return PosteriorSearch(
+            sentences_of_search(calibrating=calibrating), self.settings, self.runner, progress
+        )
 
     def _half(self) -> Sample:
         everything, half = (
@@ -92,7 +94,7 @@ class Inference:
         lent = search.borrow(self.folder / ALL, everything.head(), everything.sentences, half.sentences)
         return replace(half, borrowed=lent).run(self.folder / HALF)
 
-    def _result(self, half: Sample, whole: Sample | None) -> Result:
+    def _result(self, half: Sample, whole: Sample | None) -> InferenceResult:
         prior, posterior, table = self._tables(half)
         sets = self._breed(table)
         bench = self._judge(CHOSEN)
@@ -108,15 +110,17 @@ class Inference:
             judged_shares("hand-chosen bench", bench, of),
         )
         judged = (bench, *of_half, *of_all)
-        return Result(half, whole, bench, by_half, by_all, judged, shares, sets, table)
+        return InferenceResult(half, whole, bench, by_half, by_all, judged, shares, sets, table)
 
-    def _tables(self, half: Sample) -> tuple[Table, Table, Table]:
+    def _tables(self, half: Sample) -> tuple[VerdictTable, VerdictTable, VerdictTable]:
         """Of the prior, of the posterior by half, and of every laboratory that was tried, each once."""
 
         def progress(_power: float, done: int, of: int) -> None:
             self.told("posterior of the half, by all sentences", done, of)
 
-        predicted = Search(sentences_of_search(calibrating=False), self.settings, self.runner, progress)
+        predicted = PosteriorSearch(
+            sentences_of_search(calibrating=False), self.settings, self.runner, progress
+        )
         predicted.try_points(self.folder / PREDICTED, half.points, PREDICTIVE)
         begun = self.settings.first * self.settings.particles
         ids = tuple(s.id for s in predicted.sentences)
@@ -146,7 +150,7 @@ class Inference:
         path = self.folder / JUDGED
         return Judged(laboratory, of, archive.remember(path, key, dict[str, int], count_seeds))
 
-    def _breed(self, table: Table) -> list[Contradiction]:
+    def _breed(self, table: VerdictTable) -> list[Contradiction]:
         """Each of the surest contradictions, searched for by itself."""
         never = table.never_together()
         some = [one for size in (2, 3) for one in [n for n in never if len(n.ids) == size][:SURELY]]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate_studies.run_one import map_unordered
-from palpate_thesis.inference.contradictions import Table
+from palpate_thesis.inference.contradictions import VerdictTable
 from palpate_thesis.inference.sentences import Sentence, sentences, verdicts
 from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory.laboratory import Laboratory
@@ -43,7 +43,7 @@ class Predictive:
     validation: Share
 
 
-def drawn_shares(name: str, table: Table, of: Sequence[Sentence]) -> Predictive:
+def drawn_shares(name: str, table: VerdictTable, of: Sequence[Sentence]) -> Predictive:
     """Of the laboratories of a table that were tried by all sentences."""
     full = table.known.all(axis=1)
 

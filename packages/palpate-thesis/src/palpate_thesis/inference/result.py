@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate_thesis.inference import judge
-from palpate_thesis.inference.contradictions import CHANCE, Alone, Bred, Table, Together
+from palpate_thesis.inference.contradictions import CHANCE, Alone, Bred, Together, VerdictTable
 from palpate_thesis.inference.judge import Judged, Predictive
 from palpate_thesis.inference.sampler import Sample
 from palpate_thesis.inference.sentences import Sentence, sentences
@@ -133,7 +133,7 @@ class Contradiction:
 
 
 @dataclass(frozen=True)
-class Result:
+class InferenceResult:
     """Results of the inference.
 
     Args:
@@ -155,7 +155,7 @@ class Result:
     judged: Sequence[Judged]
     predictive: Sequence[Predictive]
     sets: Sequence[Contradiction]
-    table: Table
+    table: VerdictTable
 
     @property
     def posterior(self) -> Sample:
@@ -202,7 +202,7 @@ def halves() -> dict[str, tuple[Sentence, ...]]:
     return {"calibration": judge.calibration(), "validation": judge.validation(), "all": sentences()}
 
 
-def laboratories(result: Result) -> dict[str, Judged]:
+def laboratories(result: InferenceResult) -> dict[str, Judged]:
     """Those that are compared."""
     found = {"hand-chosen bench": result.bench, "inferred from the half": result.by_half}
     if result.all is not None:
@@ -210,7 +210,7 @@ def laboratories(result: Result) -> dict[str, Judged]:
     return found
 
 
-def samples(result: Result) -> dict[str, Sample]:
+def samples(result: InferenceResult) -> dict[str, Sample]:
     """Posteriors of both searches by name."""
     found = {"the calibration half": result.half}
     return found if result.all is None else {**found, "all sentences": result.all}
@@ -223,7 +223,7 @@ def reasons() -> dict[str, str]:
     return msgspec.toml.decode(text, type=dict[str, str])
 
 
-def as_json(result: Result, command: str) -> dict[str, Any]:
+def as_json(result: InferenceResult, command: str) -> dict[str, Any]:
     """Numbers of the page, for --json and found.json."""
     return {
         "command": command,

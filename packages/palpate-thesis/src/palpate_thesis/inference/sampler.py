@@ -50,7 +50,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Stage:
+class TemperatureStage:
     """One temperature of the search."""
 
     beta: float  # power of the likelihood, 0 is the prior, 1 the posterior
@@ -74,7 +74,7 @@ class Sample:
 
     points: Array
     likelihood: Array
-    stages: tuple[Stage, ...]
+    stages: tuple[TemperatureStage, ...]
     visited: Array
     ancestors: NDArray[np.int64]
 
@@ -101,7 +101,7 @@ def sample(
     points = prior(settings, len(redrawn))
     begun(0.0, len(points))
     likelihood = evaluate(points, np.full(len(points), -np.inf))
-    stages: list[Stage] = []
+    stages: list[TemperatureStage] = []
     beta, ancestor = 0.0, np.arange(len(points))
     while beta < 1.0:
         wanted = settings.particles if not stages else 0.5 * len(points)
@@ -116,7 +116,9 @@ def sample(
             accepted.append(_sweep(evaluate, points, likelihood, redrawn, beta, rng))
             visited.append(points.copy())
         distinct = len(np.unique(points, axis=0))
-        stages.append(Stage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor))))
+        stages.append(
+            TemperatureStage(beta, effective, float(np.mean(accepted)), distinct, len(np.unique(ancestor)))
+        )
     return Sample(points, likelihood, tuple(stages), np.vstack(visited), np.tile(ancestor, len(visited)))
 
 

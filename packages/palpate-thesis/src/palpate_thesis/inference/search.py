@@ -17,7 +17,7 @@ from palpate._jit import sources_stamp
 from palpate.arrays import Array
 from palpate_studies.run_one import map_unordered
 from palpate_thesis.inference import archive, sampler
-from palpate_thesis.inference.archive import Archive, Head, Tried
+from palpate_thesis.inference.archive import Archive, SearchIdentity, Tried
 from palpate_thesis.inference.sampler import Sample, Settings
 from palpate_thesis.inference.sentences import HOLDS, Sentence
 from palpate_thesis.inference.trial import STEPS, Trial
@@ -81,7 +81,7 @@ class Workers:
 
 
 @dataclass(frozen=True)
-class Search:
+class PosteriorSearch:
     """A search.
 
     Args:
@@ -106,7 +106,7 @@ class Search:
         """
         with archive.open_archive(path, self.head()) as book:
             redrawn = np.array([unknown.redrawn for unknown in UNKNOWNS])
-            asked = _Asked(self, book)
+            asked = _Likelihood(self, book)
             return sampler.sample(asked, redrawn, self.settings, asked.begin)
 
     def survey(self, path: Path) -> None:
@@ -116,24 +116,24 @@ class Search:
     def try_points(self, path: Path, points: Array, first: int) -> None:
         """Tries these laboratories, shape (n, d), each by all sentences, numbered from `first` on."""
         with archive.open_archive(path, self.head()) as book:
-            asked = _Asked(self, book, first)
+            asked = _Likelihood(self, book, first)
             asked.begin(0.0, len(points))
             asked(points, np.full(len(points), -np.inf))
 
-    def head(self) -> Head:
+    def head(self) -> SearchIdentity:
         """Identity of its archive."""
         from palpate import __version__
 
         told = f"{self.settings} steps {STEPS} {[u.name for u in UNKNOWNS]}"
         ids = tuple(s.id for s in self.sentences)
-        return Head(str(__version__), told, stamp(), ids)
+        return SearchIdentity(str(__version__), told, stamp(), ids)
 
 
 @dataclass
-class _Asked:
+class _Likelihood:
     """The likelihood as the sampler asks for it; what the archive knows is not tried again."""
 
-    search: Search
+    search: PosteriorSearch
     book: Archive
     number: int = 0
     power: float = 0.0
@@ -175,7 +175,9 @@ class _Asked:
         return float(verdicts.count(False))
 
 
-def borrow(path: Path, head: Head, of: Sequence[Sentence], wanted: Sequence[Sentence]) -> dict[int, Tried]:
+def borrow(
+    path: Path, head: SearchIdentity, of: Sequence[Sentence], wanted: Sequence[Sentence]
+) -> dict[int, Tried]:
     """Verdicts on the wanted sentences in another search's archive, if not given up; nothing without one."""
     if not path.exists():
         return {}

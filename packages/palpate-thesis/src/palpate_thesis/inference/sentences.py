@@ -13,10 +13,10 @@ from palpate_thesis.claims import ENOUGH
 from palpate_thesis.figures import fig_6_01_04 as first_seconds
 from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.figures import fig_6_03, fig_6_06, fig_6_10, fig_6_15
-from palpate_thesis.inference.trial import LARGEST_RATE, Pressed, Trial
-from palpate_thesis.least_squares.press_runs import Found
+from palpate_thesis.inference.trial import LARGEST_RATE, Trial, WatchedPress
+from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.neural_identifier import claims as network_claims
-from palpate_thesis.neural_identifier.network import Answer
+from palpate_thesis.neural_identifier.network import NetworkAnswer
 
 Holds = Callable[[Trial], bool]
 MOST = 0.5
@@ -103,27 +103,27 @@ def _share(id_: str) -> float:
     return MOST if by_most or id_.endswith((".adapts", ".sticks")) else ENOUGH
 
 
-def _foam(holds: Callable[[Pressed], bool]) -> Holds:
+def _foam(holds: Callable[[WatchedPress], bool]) -> Holds:
     return lambda t: t.foam is not None and holds(t.foam)
 
 
-def _rubber(holds: Callable[[Pressed], bool]) -> Holds:
+def _rubber(holds: Callable[[WatchedPress], bool]) -> Holds:
     return lambda t: t.rubber is not None and holds(t.rubber)
 
 
-def _settles_within(key: str, limit: float) -> Callable[[Pressed], bool]:
+def _settles_within(key: str, limit: float) -> Callable[[WatchedPress], bool]:
     return lambda p: getattr(p.found, f"settled_{key}") <= limit
 
 
-def _level(kilo: float) -> Callable[[Pressed], bool]:
+def _level(kilo: float) -> Callable[[WatchedPress], bool]:
     return lambda p: abs(p.found.K / (1e3 * kilo) - 1.0) < later.LEVEL
 
 
-def _all_of_foam(f: Found) -> bool:
+def _all_of_foam(f: PressEstimates) -> bool:
     return all(shows(f) for shows in fig_6_03.SHOWS.values())
 
 
-def _network(part: network_claims.Part, answer: Callable[[Trial], Answer | None]) -> Holds:
+def _network(part: network_claims.ClaimPart, answer: Callable[[Trial], NetworkAnswer | None]) -> Holds:
     def holds(trial: Trial) -> bool:
         found = answer(trial)
         return found is not None and part.holds(found)
@@ -152,7 +152,7 @@ def _of_errors(holds: Callable[[fig_6_15.Errors], bool]) -> Holds:
 
 
 def _settling(
-    prefix: str, limit: float, surface: Callable[[Callable[[Pressed], bool]], Holds]
+    prefix: str, limit: float, surface: Callable[[Callable[[WatchedPress], bool]], Holds]
 ) -> dict[str, Holds]:
     return {f"{prefix}.{key}": surface(_settles_within(key, limit)) for key in "KBM"}
 

@@ -24,9 +24,9 @@ from palpate_thesis.figures.fig_6_11_12_16 import FOAM, JUDGED, RUBBER, SINE
 from palpate_thesis.force_control.tracking import Tracking, since_contact, tracking
 from palpate_thesis.laboratory.laboratory import Laboratory
 from palpate_thesis.least_squares import press_runs
-from palpate_thesis.least_squares.press_runs import Found
+from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.neural_identifier import network
-from palpate_thesis.neural_identifier.network import Answer, Choice, Press
+from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
 
 STEPS = 5
 """Of the physics in a tick while a laboratory is looked for: a quarter of the figures', at half the cost. As many
@@ -40,15 +40,15 @@ HYBRID = changed(fig_6_10.PARAMETERS, {"run.press": 10.0})
 
 
 @dataclass(frozen=True)
-class Pressed:
+class WatchedPress:
     """A press that least squares watched."""
 
-    found: Found
+    found: PressEstimates
     spread: float  # of the middle eight tenths of single samples' B, over the true B
     clean: bool  # the switch at 5 N, and what followed
     in_the_air: bool  # switched before anything was touched
     half_range: float  # of the force's noise [N]
-    network: Press  # the first four seconds, as the network is given them
+    network: NetworkPress  # the first four seconds, as the network is given them
 
 
 @dataclass(eq=False)
@@ -80,34 +80,34 @@ class Trial:
             raise KeyboardInterrupt
 
     @cached_property
-    def foam(self) -> Pressed | None:
+    def foam(self) -> WatchedPress | None:
         """Figures 6.1 to 6.3, and what 4.2, 4.4 and 6.6 to 6.8 need of a press on foam."""
         return _press_of(self.record(press_runs.PLAIN), "foam")
 
     @cached_property
-    def rubber(self) -> Pressed | None:
+    def rubber(self) -> WatchedPress | None:
         """Figures 6.4 and 6.5."""
         return _press_of(self.record(press_runs.RUBBER), "rubber")
 
     @cached_property
-    def foam_answer(self) -> Answer | None:
+    def foam_answer(self) -> NetworkAnswer | None:
         """Figures 6.7 and 6.8."""
         return None if self.foam is None else self.identifiers_answer(self.foam.network)
 
     @cached_property
-    def rubber_answer(self) -> Answer | None:
+    def rubber_answer(self) -> NetworkAnswer | None:
         """Figure 6.9, on a rubber of its own."""
         record = self.record(network.RUBBER)
         return self.identifiers_answer(network.press_of(record, "rubber")) if _whole(record) else None
 
-    def answer_at(self, rate: float) -> Answer | None:
+    def answer_at(self, rate: float) -> NetworkAnswer | None:
         """Figure 6.6: the network of figure 6.7 at another learning rate."""
         return None if self.foam is None else self.identifiers_answer(self.foam.network, rate)
 
-    def identifiers_answer(self, press: Press, rate: float = Choice().rate) -> Answer:
+    def identifiers_answer(self, press: NetworkPress, rate: float = NetworkChoice().rate) -> NetworkAnswer:
         """The network's K, B and M over a press, at a learning rate."""
         lab = self.laboratory
-        choice = replace(Choice(lab.amplitude, lab.weights), rate=rate)
+        choice = replace(NetworkChoice(lab.amplitude, lab.weights), rate=rate)
         return network.answer(press, choice, int(self.seed if lab.start is None else lab.start))
 
     @cached_property
@@ -173,7 +173,7 @@ def _whole(record: Record) -> bool:
     )
 
 
-def _press_of(record: Record, surface: str) -> Pressed | None:
+def _press_of(record: Record, surface: str) -> WatchedPress | None:
     if not _whole(record):
         return None
     press = press_runs.contact(record)
@@ -182,7 +182,7 @@ def _press_of(record: Record, surface: str) -> Pressed | None:
     rows = since_contact(record) < SWITCHED
     early = Record({n: record[n][rows] for n in record.columns}, record.units, record.meta)
     switch = fig_4_02.switch_of(early)
-    return Pressed(
+    return WatchedPress(
         found,
         float((high - low) / found.true_B),
         switch.clean,

@@ -136,7 +136,7 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
 
 
 @dataclass(frozen=True)
-class Found:
+class PressEstimates:
     """Results of one press."""
 
     ratio: float  # f/x in the later slot [N/m]
@@ -163,7 +163,7 @@ class Found:
         return self.K_raw / self.ratio - 1.0
 
 
-def numbers_of(record: Record) -> Found:
+def numbers_of(record: Record) -> PressEstimates:
     """The numbers of one run."""
     press = contact(record)
     end = SLOT[1] - 0.002
@@ -172,10 +172,10 @@ def numbers_of(record: Record) -> Found:
     settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "MBK"}
     damping = own_damping(record.meta["experiment"]["surface"])
     early = at(press, "K_thesis", FIRST) / ratio(press, (FIRST - 1.0, FIRST)) - 1.0
-    return Found(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)
+    return PressEstimates(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)
 
 
-def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[Found]]:
+def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[PressEstimates]]:
     """Results of the presses of each experiment, over the first few seeds."""
     seeds = list(runs.seeds)[:SWEPT_SEEDS]
     cases = [(e, seed) for e in experiments.values() for seed in seeds]
@@ -188,7 +188,9 @@ def median(values: Sequence[float]) -> float:
     return float(np.nanmedian(np.asarray(values, dtype=float)))
 
 
-def failing(answers: Mapping[str, Sequence[Found]], holds: Callable[[Found], bool]) -> list[str]:
+def failing(
+    answers: Mapping[str, Sequence[PressEstimates]], holds: Callable[[PressEstimates], bool]
+) -> list[str]:
     """The names of the varied conditions under which a claim does not hold for most of the seeds."""
     return [name for name, some in answers.items() if 2 * sum(map(holds, some)) <= len(some)]
 

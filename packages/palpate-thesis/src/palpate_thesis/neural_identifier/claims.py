@@ -10,8 +10,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identifiers.neural_probe import SETTINGS
-from palpate_thesis.claims import ENOUGH, Claim, claim, spread
-from palpate_thesis.neural_identifier.network import GONE, Answer, Choice
+from palpate_thesis.claims import ENOUGH, ThesisClaim, claim, spread
+from palpate_thesis.neural_identifier.network import GONE, NetworkAnswer, NetworkChoice
 
 TIME = (0.3, 0.9)
 """Limits of "about 0.6 s": half of it more or less [s]."""
@@ -36,25 +36,25 @@ class Grounds:
     """
 
     surface: str
-    nominal: Sequence[Answer]
-    swept: Mapping[Choice, Sequence[Answer]]
-    varied: Mapping[str, Sequence[Answer]]
+    nominal: Sequence[NetworkAnswer]
+    swept: Mapping[NetworkChoice, Sequence[NetworkAnswer]]
+    varied: Mapping[str, Sequence[NetworkAnswer]]
     perfect: float
     starts: int
 
 
 @dataclass(frozen=True)
-class Part:
+class ClaimPart:
     """One statement about one coefficient, or about the error: its number in one run, and whether it is true there."""
 
     suffix: str
-    value: Callable[[Answer], float]
+    value: Callable[[NetworkAnswer], float]
     unit: str
-    holds: Callable[[Answer], bool]
+    holds: Callable[[NetworkAnswer], bool]
 
 
-def _time(suffix: str, value: Callable[[Answer], float]) -> Part:
-    return Part(suffix, value, "s", lambda a: TIME[0] <= value(a) <= TIME[1])
+def _time(suffix: str, value: Callable[[NetworkAnswer], float]) -> ClaimPart:
+    return ClaimPart(suffix, value, "s", lambda a: TIME[0] <= value(a) <= TIME[1])
 
 
 TIMES = (
@@ -62,13 +62,13 @@ TIMES = (
     _time("time-B", lambda a: a.settled_B),
     _time("time-M", lambda a: a.settled_M),
 )
-MASS = Part("M", lambda a: a.M, "kg", lambda a: 0.0 < a.M < SMALL)
+MASS = ClaimPart("M", lambda a: a.M, "kg", lambda a: 0.0 < a.M < SMALL)
 ERROR = _time("error", lambda a: a.error_gone)
 
 
-def _parts(band: float, similar: Callable[[Answer], bool]) -> tuple[Part, ...]:
-    stiffness = Part("K", lambda a: a.over, "times f/x", lambda a: abs(a.over - 1.0) <= band)
-    damping = Part("B", lambda a: a.B / a.squares_B, "times that of least squares", similar)
+def _parts(band: float, similar: Callable[[NetworkAnswer], bool]) -> tuple[ClaimPart, ...]:
+    stiffness = ClaimPart("K", lambda a: a.over, "times f/x", lambda a: abs(a.over - 1.0) <= band)
+    damping = ClaimPart("B", lambda a: a.B / a.squares_B, "times that of least squares", similar)
     return (*TIMES, stiffness, damping, MASS)
 
 
@@ -76,12 +76,12 @@ FOAM = _parts(FOAM_BAND, lambda a: 2 / 3 <= a.B / a.squares_B <= 1.5)
 RUBBER = _parts(RUBBER_BAND, lambda a: 0.0 < a.B < a.squares_B)
 
 
-def claims(grounds: Grounds, parts: Sequence[Part]) -> list[Claim]:
+def claims(grounds: Grounds, parts: Sequence[ClaimPart]) -> list[ThesisClaim]:
     """A row for each part."""
     return [_claim(grounds, part, parts) for part in parts]
 
 
-def _claim(grounds: Grounds, part: Part, parts: Sequence[Part]) -> Claim:
+def _claim(grounds: Grounds, part: ClaimPart, parts: Sequence[ClaimPart]) -> ThesisClaim:
     values = [part.value(a) for a in grounds.nominal]
     numbers = {"K": _stiffness, "B": _damping, "M": _mass, "error": _error}.get(part.suffix, _times)
     return claim(
@@ -103,7 +103,7 @@ def _claim(grounds: Grounds, part: Part, parts: Sequence[Part]) -> Claim:
 def _times(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
     gone = float(np.median([a.error_gone for a in grounds.nominal]))
     early, late = sum(t < TIME[0] for t in values), sum(t > TIME[1] for t in values)
-    return {"amplitude": Choice().amplitude, "gone": gone, "early": early, "late": late}
+    return {"amplitude": NetworkChoice().amplitude, "gone": gone, "early": early, "late": late}
 
 
 def _stiffness(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def _mass(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
 
 
 def _error(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
-    times = {c.amplitude: some for c, some in grounds.swept.items() if c == Choice(c.amplitude)}
+    times = {c.amplitude: some for c, some in grounds.swept.items() if c == NetworkChoice(c.amplitude)}
     parts = (f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
     return {"limit": GONE, "amplitudes": ", ".join(parts)}
 
@@ -166,17 +166,17 @@ def describe_spread(values: Sequence[float], unit: str, starts: int) -> str:
     )
 
 
-def enough(answers: Sequence[Answer], part: Part) -> bool:
+def enough(answers: Sequence[NetworkAnswer], part: ClaimPart) -> bool:
     """Whether a claim holds in enough of the runs."""
     return share(answers, part) >= ENOUGH
 
 
-def share(answers: Sequence[Answer], part: Part) -> float:
+def share(answers: Sequence[NetworkAnswer], part: ClaimPart) -> float:
     """Share of the runs in which a claim holds."""
     return sum(map(part.holds, answers)) / len(answers)
 
 
-def where(grounds: Grounds, part: Part) -> str:
+def where(grounds: Grounds, part: ClaimPart) -> str:
     """A sentence: over which part of the sweep a claim holds."""
     good = [choice for choice, some in grounds.swept.items() if enough(some, part)]
     among = f"{len(grounds.swept)} combinations of output amplitude, initial weights and thresholds"
@@ -189,14 +189,14 @@ def where(grounds: Grounds, part: Part) -> str:
     return f"Of {among} it holds for {len(good)} ({'; '.join(regions)})."
 
 
-def _region(good: Sequence[Choice]) -> str:
+def _region(good: Sequence[NetworkChoice]) -> str:
     by_amplitude: dict[float, list[str]] = {}
     for choice in good:
         by_amplitude.setdefault(choice.amplitude, []).append(f"{choice.weights:g}")
     return ", ".join(f"{a:g} N with weights to {'/'.join(w)}" for a, w in by_amplitude.items()) or "none"
 
 
-def under(grounds: Grounds, part: Part) -> str:
+def under(grounds: Grounds, part: ClaimPart) -> str:
     """A sentence: under which varied conditions the networks as chosen agree with the claim."""
     good = [name for name, some in grounds.varied.items() if enough(some, part)]
     bad = [name for name in grounds.varied if name not in good]
@@ -207,7 +207,7 @@ def under(grounds: Grounds, part: Part) -> str:
     return f"As chosen, of the varied conditions it holds with {', '.join(good)}; not with {', '.join(bad)}."
 
 
-def _jointly(grounds: Grounds, parts: Sequence[Part]) -> str:
+def _jointly(grounds: Grounds, parts: Sequence[ClaimPart]) -> str:
     """A sentence: whether any one network satisfies all parts."""
     most = max(sum(enough(some, p) for p in parts) for some in grounds.swept.values())
     if most == len(parts):

@@ -42,7 +42,7 @@ TICK = 1e-3
 
 
 @dataclass(frozen=True)
-class Press:
+class NetworkPress:
     """One contact, as the thesis' identifiers are given it.
 
     Args:
@@ -65,34 +65,34 @@ class Press:
         return float(self.inputs[-round(LATE / TICK) :, 0].mean())
 
 
-def press_of(record: Record, surface: str) -> Press:
+def press_of(record: Record, surface: str) -> NetworkPress:
     """The first contact of a run."""
     first = press_runs.contact(record)
     inputs = np.column_stack([first[c] for c in ("displacement", "vx_raw", "ax_measured")])
     late = round(LATE / TICK)
     ratio = first["force_measured"][-late:].mean() / first["displacement"][-late:].mean()
     squares = np.column_stack([first[f"{key}_thesis"] for key in "MBK"])
-    return Press(surface, inputs, first["force_measured"], float(ratio), squares)
+    return NetworkPress(surface, inputs, first["force_measured"], float(ratio), squares)
 
 
-def cut(press: Press, seconds: float) -> Press:
+def cut(press: NetworkPress, seconds: float) -> NetworkPress:
     """The first seconds of a press; f/x is that of its own end."""
     n, late = round(seconds / TICK), round(LATE / TICK)
     inputs, force = press.inputs[:n], press.force[:n]
     ratio = float(force[-late:].mean() / inputs[-late:, 0].mean())
-    return Press(press.surface, inputs, force, ratio, press.squares[:n])
+    return NetworkPress(press.surface, inputs, force, ratio, press.squares[:n])
 
 
 def presses(
     runs: Runs, experiment: Experiment, surface: str, seeds: Sequence[int] | None = None
-) -> list[Press]:
+) -> list[NetworkPress]:
     """One press a noise seed."""
     cases = [(experiment, seed) for seed in (runs.seeds if seeds is None else seeds)]
     return runs.over(cases, lambda record: press_of(record, surface))
 
 
 @dataclass(frozen=True)
-class Choice:
+class NetworkChoice:
     """Unstated parameters of the thesis' network, and its stated learning rate (1e-4).
 
     As chosen here: an output of up to twice the desired force, weights from -0.5 to 0.5, thresholds that learn (which
@@ -114,9 +114,9 @@ class Choice:
         )
 
 
-def network_of(runs: Runs) -> Choice:
+def network_of(runs: Runs) -> NetworkChoice:
     """The network of the runs' laboratory."""
-    return Choice(runs.laboratory.amplitude, runs.laboratory.weights)
+    return NetworkChoice(runs.laboratory.amplitude, runs.laboratory.weights)
 
 
 def starts(runs: Runs) -> tuple[int, ...]:
@@ -126,11 +126,11 @@ def starts(runs: Runs) -> tuple[int, ...]:
 
 AMPLITUDES = (22.0, 25.0, 30.0, 40.0, 60.0, 100.0, 200.0)
 WEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0)
-SWEEP = [Choice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
+SWEEP = [NetworkChoice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
 
 
 @dataclass(frozen=True)
-class Answer:
+class NetworkAnswer:
     """Answer of one network after one press: averages over the last half second."""
 
     K: float
@@ -152,7 +152,7 @@ class Answer:
         return self.K / self.ratio
 
 
-def answer(press: Press, choice: Choice, start: int) -> Answer:
+def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAnswer:
     """Lets one network learn from one press."""
     probe, answers = learn(press, choice, start)
     K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
@@ -160,7 +160,7 @@ def answer(press: Press, choice: Choice, start: int) -> Answer:
         press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T
     )
     asked = probe.probe()
-    return Answer(
+    return NetworkAnswer(
         K,
         B,
         M,
@@ -182,7 +182,7 @@ def tangent(probe: NeuralProbe, x: float) -> float:
     return (probe.force((x + d, 0.0, 0.0)) - probe.force((x - d, 0.0, 0.0))) / (2.0 * d)
 
 
-def learn(press: Press, choice: Choice, start: int) -> tuple[NeuralProbe, Array]:
+def learn(press: NetworkPress, choice: NetworkChoice, start: int) -> tuple[NeuralProbe, Array]:
     """The network after the press, and K, B, M and the output's error along it, shape (n, 4)."""
     probe = choice.probe(press.surface, start)
     return probe, probe.trajectory(press.inputs, press.force)
@@ -200,16 +200,16 @@ def error_gone(error: Array) -> float:
 
 
 def answers(
-    runs: Runs, some: Sequence[Press], choice: Choice, from_: Sequence[int] | None = None
-) -> list[Answer]:
+    runs: Runs, some: Sequence[NetworkPress], choice: NetworkChoice, from_: Sequence[int] | None = None
+) -> list[NetworkAnswer]:
     """Every start on every press."""
     cases = [(press, choice, start) for press in some for start in (starts(runs) if from_ is None else from_)]
     return runs.map(lambda case: answer(*case), cases)
 
 
 def sweep(
-    runs: Runs, some: Sequence[Press], choices: Sequence[Choice] = tuple(SWEEP)
-) -> dict[Choice, list[Answer]]:
+    runs: Runs, some: Sequence[NetworkPress], choices: Sequence[NetworkChoice] = tuple(SWEEP)
+) -> dict[NetworkChoice, list[NetworkAnswer]]:
     """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
     own = starts(runs)
     cases = [
@@ -232,14 +232,16 @@ def _kind(experiment: Experiment) -> str:
     return "foam" if experiment.surface == FOAM.surface else "rubber"
 
 
-def answers_under_conditions(runs: Runs, experiment: Experiment, surface: str) -> dict[str, list[Answer]]:
+def answers_under_conditions(
+    runs: Runs, experiment: Experiment, surface: str
+) -> dict[str, list[NetworkAnswer]]:
     """Answers of networks as chosen under each condition."""
     some = varied_presses(runs, experiment, surface)
     own = starts(runs)[:VARIED_STARTS]
     return {name: answers(runs, few, network_of(runs), own) for name, few in some.items()}
 
 
-def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[Press]]:
+def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[NetworkPress]]:
     """The presses of each condition, for a few noise seeds."""
     seeds = list(runs.seeds)[:VARIED_NOISE]
     cases = conditions(experiment)
