@@ -7,12 +7,14 @@ Each press: 10 mm of free motion with the fault, then a surface of 300 N/m to th
 damping ratio of 0.01 to 0.3, 20 N desired. The gains know 0.1 N of noise, and nothing of the fault. `too fast`: ticks
 whose commanded speed into the surface is above the approach while the true force is zero. `over`:
 largest true force over F_d. `settled`: the true force is within 5 % of F_d, and of the fault's last value, for good.
-Every press is kept as it ends: the same command resumes.
+Every press is kept as it ends: the same command resumes. `servo-ur5e` and `servo-iiwa14` are those of
+benchmarks/arms/servos.py.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +24,7 @@ import msgspec
 import numpy as np
 from touches import Key, resumed
 
-from palpate.force.arm import load_arm
+from palpate.force.arm import Arm, load_arm
 from palpate.force.gains import gains_for
 from palpate.force.guard import Guarded
 from palpate.force.simulated_press import pressed, surface, world_of
@@ -82,11 +84,19 @@ FAULTS: dict[str, tuple[Callable, float]] = {
 }
 
 
+def servo(name: str) -> Arm:
+    """An arm of benchmarks/arms/servos.py."""
+    sys.path.append(str(Path(__file__).parents[1] / "arms"))
+    from servos import arm_of
+
+    return arm_of(name)
+
+
 class Rig:
     """An arm with its gains and what the sensor shows of a press."""
 
     def __init__(self, name: str, cap: float):
-        arm = load_arm(name)
+        arm = servo(name.removeprefix("servo-")) if name.startswith("servo-") else load_arm(name)
         self.arm = msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=NOISE))
         self.gains = gains_for(self.arm, FORCE, cap=cap)
         self.control = Guarded(self.gains.cautious())

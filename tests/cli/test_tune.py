@@ -13,8 +13,10 @@ from cli.asked import refused
 from force.gained import gains_of
 from force.test_inner_loop import TRUE
 from force.test_inner_loop import log as loop_log
+from force.test_servo import pushed_log
 from palpate.cli import main
 from palpate.force import Certificate, ForceLoop, known_from, load_arm, tune
+from palpate.force.arm import ServoLoop
 from palpate.force.gains import LAW
 from palpate.report.numbers import quantity
 
@@ -396,6 +398,22 @@ def test_bad_logs_of_an_inner_loop(capsys, elsewhere, words, says):
     write_loop(elsewhere / "loop.csv", "steps")
     write_loop(elsewhere / "slow.csv", "slow")
     assert says in refused(capsys, "tune", "--stiffness", "1e3:1e4", "--force", "20", *words)
+
+
+def test_a_log_with_a_push_makes_a_servo_of_any_arm(capsys, elsewhere):
+    inner = ServoLoop(mass=6.6, stiffness=4800.0, damping=480.0, delay=0.008)
+    rows = np.column_stack(pushed_log(inner))
+    np.savetxt(elsewhere / "log.csv", rows, delimiter=",", header="t,u,x,f", comments="")
+    log = ("--loop-from", "log.csv", "--time", "t", "--command", "u", "--position", "x", "--push", "f")
+    words = ("--stiffness", "1e3:1e5", "--arm", "iiwa14", "--force", "15")
+    code, told = ask(capsys, *words, *log, "--out", "gains.toml")
+    assert code == 0
+    assert told["kind"] == "servo"
+    low, high = told["inner_loop"]["stiffness_N_m"]["ci95"]
+    assert low < 4800.0 < high
+    assert told["theta_s"] == told["inner_loop"]["theta_s"]["ci95"][1]
+    assert ForceLoop.load("gains.toml").gains.arm.kind == "servo"
+    assert "--loop-from" in refused(capsys, "tune", *words, "--push", "f")
 
 
 def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):

@@ -15,6 +15,8 @@ from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius
 from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
+from palpate.force.guard import Guarded
+from palpate.force.inner_loop import identify_inner_loop
 from palpate.force.law import leading
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
@@ -89,6 +91,73 @@ def test_a_press_settles_with_little_overshoot(gains, K):
     touch = int(np.argmax(force > 0.0))
     assert force.max() < 1.1 * 15.0
     assert np.abs(force[touch + 250 :] - 15.0).max() < 0.05 * 15.0
+
+
+@pytest.mark.parametrize("error", [0.5, -0.5, 1.2])
+def test_a_bias_while_the_tip_gathers_speed_is_no_surface(gains, error):
+    """A tip that has not been at its approach yet is slow without a surface."""
+    world, n = world_of(gains.arm, noise=0.1), 1500
+    for seed in range(10):
+        control, desired = Guarded(gains.cautious()), np.full(n, 15.0)
+        rows = pressed(world, surface(1e5), control, 10.0, desired, seed, error=np.full(n, error))
+        assert rows[:, 3].max() <= gains.approach * (1.0 + 1e-12)
+
+
+def pushed_log(inner, seed=0, noise=1e-5, push=15.0):
+    """Steps in free motion, then a push, of one mass on its servo, integrated here; 500 Hz."""
+    rng, n, h = np.random.default_rng(seed), 6000, 1e-4
+    command = np.repeat(rng.uniform(-0.005, 0.005, 24), 250)
+    command[4500:] = command[4499]
+    force = push * np.clip(np.minimum(np.arange(n) - 4800, 5800 - np.arange(n)) / 250.0, 0.0, 1.0)
+    x = v = 0.0
+    position, late = np.empty(n), round(inner.delay / h)
+    for k in range(n):
+        position[k] = x
+        for j in range(20):
+            held = command[max(20 * k + j - late, 0) // 20]
+            a = (inner.stiffness * (held - x) - inner.damping * v - force[k]) / inner.mass
+            x, v = x + h * v + 0.5 * h * h * a, v + h * a
+    noisy = force + 0.1 * rng.standard_normal(n)
+    return 0.002 * np.arange(n), command, position + noise * rng.standard_normal(n), noisy
+
+
+def test_a_log_with_a_push_identifies_it_and_its_lag(gains):
+    inner = gains.arm.inner
+    time, command, position, force = pushed_log(inner)
+    found = identify_inner_loop(time, command, position, force=force)
+    arm = found.of(gains.arm, "log.csv")
+    theta = found.theta(arm)
+    truth = {"lag": inner.lag, "stiffness": inner.stiffness, "delay": inner.delay}
+    for name, true in truth.items():
+        assert getattr(found, name).low < true < getattr(found, name).high
+        assert found.stiffness.half < 0.05 * inner.stiffness
+    assert theta.low < gains.theta < theta.high < 1.2 * gains.theta
+    assert arm.inner.mass == pytest.approx(inner.mass, rel=0.1)
+    turned = identify_inner_loop(time, command, position, force=-force)
+    assert turned.stiffness.value == pytest.approx(found.stiffness.value, rel=1e-9)
+
+
+def test_a_push_that_tells_nothing_is_refused(gains):
+    log = pushed_log(gains.arm.inner, push=0.0)
+    with pytest.raises(InputError, match=r"mine.csv: its push does not tell"):
+        identify_inner_loop(*log[:3], where="mine.csv", force=log[3])
+    with pytest.raises(InputError, match="the force does not change"):
+        identify_inner_loop(*log[:3], force=0.0 * log[3])
+
+
+@pytest.mark.parametrize(("theta", "lag"), [(0.5, 1.0), (2.0, 1.0), (1.0, 0.5), (1.0, 2.0)])
+def test_wrong_numbers_keep_the_approach_and_end_in_a_press(gains, theta, lag):
+    """theta, or the lag that the lead is for, off by two."""
+    inner = replace(gains.arm.inner, damping=lag * gains.arm.inner.damping)
+    wrong = gains_for(replace(gains.arm, inner=inner), 15.0, theta=theta * gains.theta)
+    world = world_of(gains.arm, noise=0.1)
+    for K in (1e3, 2e4, 2e5):
+        rows = pressed(world, surface(K), Guarded(wrong.cautious()), 0.003, np.full(2500, 15.0), 0)
+        force, speed = rows[:, 0], rows[:, 3]
+        touch = int(np.argmax(force > 0.0))
+        assert speed[:touch].max() <= wrong.approach * (1.0 + 1e-12)
+        assert force.max() < 1.15 * 15.0
+        assert np.abs(force[touch + 1000 :] - 15.0).max() < 0.05 * 15.0
 
 
 def test_other_arms_have_no_lead(gains):

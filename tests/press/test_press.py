@@ -13,6 +13,8 @@ from palpate import read_log
 from palpate._vector import ZERO3, Mat3
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate.force.arm import Limits, ServoLoop, load_arm
+from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, sensed
 from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, arm_of, prepared, surface_of
@@ -55,6 +57,23 @@ def test_it_presses_with_the_force_asked_for_and_finds_the_surface(arm, mode, st
         assert B["ci95"][0] < 50.0 < B["ci95"][1]
         assert "rejected" not in (B["verdict"], M["verdict"])
     assert np.abs(record["y"] - record["y"][0]).max() < 1e-3
+
+
+@pytest.mark.parametrize("physics", ["own", pytest.param("mujoco", marks=pytest.mark.long)])
+def test_a_servo_that_yields_presses_and_its_encoders_show_the_surface(physics, tmp_path):
+    """The encoders are on the links: nothing is in series, and a surface stiffer than the servo is identified."""
+    ours = load_arm("ur5e")
+    inner = ServoLoop(mass=3.67, stiffness=4950.0, damping=990.0, delay=0.008)
+    arm = msgspec.structs.replace(ours, inner=inner, limits=Limits(speed=0.25, stiffness=2e5))
+    (tmp_path / "gains.toml").write_text(gains_for(arm, 15.0).to_toml())
+    surface = surface_of("K=50000,B=0")
+    changes = {"gains": tmp_path / "gains.toml", "physics": physics, "seconds": 3.0}
+    _, summary = asked(arm="ur5e", force=20.0, surface=surface, **changes)
+    assert summary["end"] == "done"
+    assert summary["force"]["mean_N"] == pytest.approx(20.0, abs=0.1)
+    assert summary["force"]["overshoot_N"] < 0.1 * 20.0
+    low, high = summary["identified"]["parameters"]["K"]["ci95"]
+    assert low < 5e4 < high < 1.5 * 5e4
 
 
 def test_a_slow_touch_of_a_heavy_tip_is_not_taken_for_a_soft_surface():

@@ -10,11 +10,7 @@ from palpate.errors import InputError
 
 
 def checks(
-    name: str | None = None,
-    /,
-    *,
-    own: PluginOptions | None = None,
-    output: JsonOption | None = None,
+    name: str | None = None, /, *, own: PluginOptions | None = None, output: JsonOption | None = None
 ) -> int:
     """Run palpate's conformance suite on your own controller, surface or identifier.
 

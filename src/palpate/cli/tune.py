@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from palpate.force import Known, Tuning
-    from palpate.force.inner_loop import InnerLoop
 
 
 # More than seven arguments: groups of options.
@@ -56,6 +55,10 @@ def tune(
 
     palpate tune found.json --arm ur5e --force 20 --loop-from sweep.csv --time t --command target_x --position actual_x
 
+    The same of a servo that gives way and whose encoders show it, from a log with one push of a hand at rest:
+
+    palpate tune found.json --arm ur5e --force 15 --loop-from log.csv --time t --command u --position x --push force
+
     With --slide --mu-max .9 the gains are for palpate slide and palpate.force.SlidingLoop too.
 
     The gains are for palpate.force.ForceLoop, which adapts to any surface below the cap. Exit code 1: nothing could be
@@ -73,6 +76,7 @@ def tune(
     from palpate.force import tune as tuned
 
     one, inner = arm.named(columns)
+    theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
     told = tuned(
         one,
         press.desired,
@@ -80,11 +84,13 @@ def tune(
         cap=surface.cap,
         peak=press.highest,
         surface_speed=surface.surface_speed,
+        theta=None if theta is None else theta.high,
     )
     if slide is not None and slide.slide:
         told = replace(told, gains=slide.added_to(told.gains))
     written = _write(told, output.out, report)
-    _print(told, inner, written, output)
+    loop = None if inner is None else inner.to_json() | ({"theta_s": theta.to_json()} if theta else {})
+    _print(told, loop, written, output)
     return 0 if told.proved else 1
 
 
@@ -117,11 +123,11 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     return [path for path in (out, page) if path is not None]
 
 
-def _print(told: Tuning, inner: InnerLoop | None, written: list[Path], output: TuningOutputOptions) -> None:
+def _print(
+    told: Tuning, inner: dict[str, object] | None, written: list[Path], output: TuningOutputOptions
+) -> None:
     if output.json:
-        print_answer(
-            told.to_json() | {"inner_loop": None if inner is None else inner.to_json()} | _slide(told)
-        )
+        print_answer(told.to_json() | {"inner_loop": inner} | _slide(told))
         return
     from palpate.report.tuning.table import show, show_all
 

@@ -22,10 +22,8 @@ SHARES = {
 }
 """g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; ticks by which its
 readings may be later than the jitter that is asked for.
-
 Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
-for the UR5e without jitter: hence two claims.
-"""
+for the UR5e without jitter: hence two claims."""
 FADED = 0.01
 """Share below which the gain of a claim counts as one that may fade."""
 GONE = 1e-4

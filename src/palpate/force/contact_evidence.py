@@ -12,18 +12,14 @@ CONTACT = 7.0
 """Evidence of a contact, a cumulative sum, that a touch begins with, and with none of which it ends."""
 EVIDENT = 32.0
 """Evidence of a line through the readings, in variances of a reading, from which there is contact.
-
 Measured by benchmarks/force/false_alarms.py: white noise comes to it in one of some six thousand approaches of ten
-seconds, to 28 five times as often; a ramp comes to it 5 % later.
-"""
+seconds, to 28 five times as often; a ramp comes to it 5 % later."""
 EDGE, LEVEL = 4.0, 3.2
 """Standard deviations above which a reading, and with it the mean over 4 ms, are a contact; from the same."""
 PLAIN = 2.5
 """Standard deviations above which a stiffness, or a damping, is a surface and not noise in free motion.
-
 Measured by benchmarks/force/first_touches.py: with 2 noise passes for a soft surface once in some thousand touches
-(22 % over, --arms ur5e --touches 1000 --seed 2), with 1.5 oftener (37 %).
-"""
+(22 % over, --arms ur5e --touches 1000 --seed 2), with 1.5 oftener (37 %)."""
 FEWEST = 20.0
 """Readings that the noise given counts for: as many as tell a standard deviation to 16 %."""
 SLOWER = 8.0

@@ -43,10 +43,8 @@ CUTS, FEWER = 24, 5
 """After which a piece is given up; fewer where each costs a long search and helps little."""
 PATIENCE = 10
 """Boxes of a torque arm between two long searches of a norm: each costs some twenty short ones.
-
 Measured by benchmarks/force/falsify.py --arms fr3: with none it takes 906 cells instead of 194 and nearly three times
-as long, with one in every box 134 cells and over twice as long.
-"""
+as long, with one in every box 134 cells and over twice as long."""
 
 
 class Search:

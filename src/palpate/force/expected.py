@@ -11,9 +11,7 @@ from palpate.force.stiffness_bound import SHOWED
 LAGS, DECAYS, RISES, LEVELS = 8.0 + 0.5 * SHOWED, 4.0, 5.0, 3.0
 """Lags of the loop, B/K, times in which a surface rises out of the noise, and in which it comes to the level, that a
 first touch takes at most; a ramp comes to `SHOWED` times its rise in half a lag in half as many lags.
-
-Measured by benchmarks/force/first_touches.py, where 99.9 % of the touches that settle in its 4 s keep to their sum.
-"""
+Measured by benchmarks/force/first_touches.py, where 99.9 % of the touches that settle in its 4 s keep to their sum."""
 OVERSHOOT = 0.1
 """Over F_d, that at most one in a thousand first touches passes; from the same."""
 

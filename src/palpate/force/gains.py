@@ -24,28 +24,20 @@ from palpate.force.slide_table import Slide
 
 ALPHA = 0.42
 """Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
-
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
-quarter slower.
-"""
+quarter slower."""
 LAW = "cautious adaptive control 7"
 """Its name in adaptive control (a gain that the estimate's uncertainty lowers), and which form of it.
-
-A certificate of another one is refused.
-"""
+A certificate of another one is refused."""
 LEVEL = 0.0075
 """Of F_d, that a sensor may show in free motion either way, or two standard deviations if that is more.
-
 Measured by benchmarks/force/free_motion.py: twice as much costs 0.05 s on the softest surfaces, hums exceed half as
-much.
-"""
+much."""
 BIAS = 0.1
 """Of F_d, that is taken out of the readings as bias: pressed too hard by that, if it was a surface's."""
 DRIFT = 0.35
 """Drift that is followed, whatever a sensor's maker states [N/s]: what rises more slowly at the approach is no surface.
-
-Above the 0.3 N/s that benchmarks/force/free_motion.py puts to it; the softest surface is this over the approach.
-"""
+Above the 0.3 N/s that benchmarks/force/free_motion.py puts to it; the softest surface is this over the approach."""
 _DIGIT = 1e-5
 """Of F_d: the least noise that is believed, so that a simulated sensor without noise has information that is finite."""
 _TOUCH = 0.5
@@ -62,10 +54,8 @@ _SLOWEST = 0.02
 band of 5 % that counts as settled, so that a higher gain would change nothing that counts."""
 _SURE, _ROOM = 1.5, 0.03
 """Standard deviations, and a relative room, from the estimate to K_u.
-
 Measured by benchmarks/force/first_touches.py, as K_eff(K_u)/K_eff: in one touch of some thousand it is below the half
-that the proof asks for.
-"""
+that the proof asks for."""
 CREEP = 1e-6
 """Slowest approach that is tuned for [m/s]: a micrometre a second, the step of an encoder of many arms."""
 LONGEST = 2000
@@ -76,9 +66,7 @@ _FORGOTTEN = 5.0
 SWING = 0.5
 """Share of the swing of a position arm's tip for which nothing is learned after a touch: in its first half the force
 grows at another pace than the command's, so that a stiff surface would pass for a soft one.
-
-Measured by benchmarks/arms/touches.py.
-"""
+Measured by benchmarks/arms/touches.py."""
 
 
 class Gains(Table):

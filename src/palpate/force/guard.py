@@ -36,10 +36,8 @@ TROUBLES = {
 }
 FARTHEST = 3.0
 """Of the way to F_d on the surface as it is known, that a command may go without the force coming nearer.
-
 Measured by benchmarks/force/in_vain.py: where nothing is wrong it is a third of that way at most; the proof lets the
-stiffness be wrong by a factor of 2, and half of that again is room for friction.
-"""
+stiffness be wrong by a factor of 2, and half of that again is room for friction."""
 LEAST = 8.0
 """Standard deviations of the noise: the least force that may be asked for, and the least that counts as a pull."""
 NEAR = 0.05

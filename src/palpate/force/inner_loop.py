@@ -1,16 +1,20 @@
-"""Identification of an inner loop from a log of commanded and measured position: w, z and delay, with intervals."""
+"""Identification of an inner loop from a log of commanded and measured position: w, z and delay, with intervals.
+
+With a force and a push in the log, of a servo that yields: its stiffness, damping, mass and delay.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, log, pi
+from math import exp, hypot, log, pi
 
 import msgspec
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop
+from palpate.force.lag import worst_stiffness, yielding_lag
 from palpate.force.sampled_loop import held
 
 BLOCKS = 8
@@ -19,8 +23,16 @@ FEWEST = 50 * BLOCKS
 """Samples of a log."""
 TOLERANCE = 0.25
 """Largest half-width of a number that counts as identified, as a share of its value: as for `palpate identify`."""
-_STARTS = ((3.0, 1.0), (10.0, 0.7), (30.0, 0.7))
-"""w/2 pi [Hz] and z from which a fit starts; the delay starts from what is left of the whole lag."""
+_STARTS = ((3.0, 1.0), (10.0, 0.7), (30.0, 0.7), (5.0, 4.0))
+"""w/2 pi [Hz] and z from which a fit starts; the delay starts from what is left of the whole lag. The last is that of a
+servo that yields."""
+_THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
+"""Of log w, log z, delay [s] and log K_s, for the slope of theta."""
+
+
+ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
+"""By which one mass misses an arm of several joints: standard deviations, as shares of the number, of the delay of m/D.
+Measured by benchmarks/arms/servo_logs.py --seed 11, as what the fit's own errors leave."""
 
 
 @dataclass(frozen=True)
@@ -40,26 +52,52 @@ class Parameter:
         """As plain JSON values."""
         return {"value": self.value, "ci95": [self.low, self.high]}
 
+    def beside(self, std: float) -> Parameter:
+        """The number with another error beside its own, of this standard deviation."""
+        wider = hypot(self.half, 1.96 * std) - self.half
+        return Parameter(self.value, max(self.low - wider, 0.0), self.high + wider)
+
+
+@dataclass(frozen=True, eq=False)
+class FitErrors:
+    """Covariance of log w, log z, delay [s] and, of a servo, log K_s; difference of the fits of the log's halves."""
+
+    covariance: Array
+    halves: Array
+
+    def half(self, slope: Array) -> float:
+        """Half of the 95 % interval of a number with this slope in them, shape (n,)."""
+        from scipy.stats import t as student
+
+        std = max(float(slope @ self.covariance @ slope) ** 0.5, 0.5 * abs(float(slope @ self.halves)))
+        return float(student.ppf(0.975, BLOCKS - 1)) * std
+
+    def factor(self, value: float, *slope: float) -> Parameter:
+        """A number whose logarithm has this slope in the first of them."""
+        wide = np.zeros(len(self.halves))
+        wide[: len(slope)] = slope
+        grow = exp(min(self.half(wide), 50.0))
+        return Parameter(value, value / grow, value * grow)
+
 
 @dataclass(frozen=True)
 class InnerLoop:
-    """An inner loop w^2/(s^2 + 2 z w s + w^2), late by a delay.
+    """An inner loop w^2/(s^2 + 2 z w s + w^2), late by a delay; where it yields to a force, that of a servo.
 
-    Args:
-        bandwidth: w/2 pi [Hz].
-        damping: z.
-        delay: [s].
-        gain: of the position measured over the one commanded; 1 where units and axes agree.
-        explained: share that the model explains of how the position lags the command.
-        rate: rows a second [Hz].
+    Bandwidth w/2 pi [Hz], damping z, delay [s], lag 2 z/w [s], which is D/K_s of a servo; gain of the position measured
+    over the one commanded; share explained of how the position lags the command; rows a second [Hz]; errors of the fit;
+    K_s of a servo [N/m], None where nothing was pushed.
     """
 
     bandwidth: Parameter
     damping: Parameter
     delay: Parameter
+    lag: Parameter
     gain: Parameter
     explained: float
     rate: float
+    errors: FitErrors
+    stiffness: Parameter | None
 
     def to_json(self) -> dict[str, object]:
         """As plain JSON values."""
@@ -67,21 +105,27 @@ class InnerLoop:
             "bandwidth_hz": self.bandwidth.to_json(),
             "damping": self.damping.to_json(),
             "delay_s": self.delay.to_json(),
+            "lag_s": self.lag.to_json(),
+            "stiffness_N_m": None if self.stiffness is None else self.stiffness.to_json(),
             "gain": self.gain.to_json(),
             "explained": self.explained,
             "rate_hz": self.rate,
         }
 
     def of(self, arm: Arm, source: str) -> Arm:
-        """The arm with this inner loop instead of its own.
+        """The arm with this inner loop instead of its own; a servo takes the place of any.
 
         Raises:
-            InputError: a torque arm, whose loop is what its file says.
+            InputError: another than a position arm, and nothing was pushed.
         """
+        title = f"{arm.title}, inner loop from {source}"
+        if self.stiffness is not None:
+            return msgspec.structs.replace(arm, inner=self._servo(np.zeros(4)), title=title)
         if not isinstance(arm.inner, PositionLoop):
             raise InputError(
-                f"--loop-from is for an arm that is commanded by position; {arm.title} has its loop from its own "
-                "stiffness and damping: set mass, stiffness and damping in [inner]"
+                f"--loop-from without --push is for an arm that is commanded by position; {arm.title} is of "
+                f"kind {arm.kind}: record a push and name the column of its force with --push, which makes it "
+                "a servo, or set [inner] by hand"
             )
         inner = msgspec.structs.replace(
             arm.inner,
@@ -94,10 +138,40 @@ class InnerLoop:
                 )
             },
         )
-        return msgspec.structs.replace(arm, inner=inner, title=f"{arm.title}, inner loop from {source}")
+        return msgspec.structs.replace(arm, inner=inner, title=title)
+
+    def _servo(self, shift: Array) -> ServoLoop:
+        """The servo, its log w, log z, delay and log K_s shifted by so much, shape (4,)."""
+        assert self.stiffness is not None
+        w, z = 2.0 * pi * self.bandwidth.value * exp(shift[0]), self.damping.value * exp(shift[1])
+        K = self.stiffness.value * exp(shift[3])
+        delay = max(self.delay.value + float(shift[2]), 0.0)
+        return ServoLoop(mass=K / w**2, stiffness=K, damping=2.0 * z / w * K, delay=delay)
+
+    def theta(self, arm: Arm) -> Parameter:
+        """Whole lag of the force loop of an arm that `of` has made a servo of, led by these numbers [s].
+
+        Raises:
+            InputError: an interval wider than 25 % of it.
+        """
+        K = worst_stiffness(arm)
+        value, slope = yielding_lag(arm, self._servo(np.zeros(4)), K), np.empty(4)
+        for i, step in enumerate(_THETA_STEPS):
+            ends = (yielding_lag(arm, self._servo(sign * step * np.eye(4)[i]), K) for sign in (1.0, -1.0))
+            slope[i] = (next(ends) - next(ends)) / (2.0 * step)
+        half = self.errors.half(slope)
+        if half > TOLERANCE * value:
+            raise InputError(
+                f"{arm.title}: the lag of the force loop is {1e3 * value:.3g} +- {1e3 * half:.2g} ms; record steps, or "
+                f"a sweep to {self.bandwidth.value:.2g} Hz and more, for longer"
+            )
+        return Parameter(value, value - half, value + half).beside(ONE_MASS["theta"] * value)
 
 
-def identify_inner_loop(time: Array, command: Array, position: Array, where: str = "the log") -> InnerLoop:
+# More than five arguments: the columns of a log, and its name.
+def identify_inner_loop(
+    time: Array, command: Array, position: Array, where: str = "the log", force: Array | None = None
+) -> InnerLoop:
     """Identify an inner loop by output error: the model's own answer to the commands, fitted to the positions.
 
     The command is held from row to row. Offset, gain and the state at the start are fitted with it, linearly. Standard
@@ -105,32 +179,40 @@ def identify_inner_loop(time: Array, command: Array, position: Array, where: str
     coloured noise too; where the two halves of the log, fitted apart, differ by more than that, by half of that
     difference. The intervals are Student's of the blocks.
 
+    A force moves a servo as the command does, less 1/K_s of it, and its rate takes up what its sensor is late. The
+    blocks of K_s are eight parts of the push.
+
     Args:
         time: of the rows, evenly spaced [s], shape (n,).
         command: position sent [m], shape (n,).
         position: position measured at the same moment [m], shape (n,).
         where: names the log in errors.
+        force: on the tip along the position, of either sign [N], shape (n,): a servo is identified.
 
     Raises:
         InputError: too short, uneven, without motion, or without the excitation to tell the numbers apart.
     """
-    from scipy.stats import t as student
-
-    log_ = _Log.of(time, command, position, where)
+    log_ = _Log.of(time, command, position, force, where)
     p = _fitted(log_)
-    halves = [_fitted(part, p) for part in log_.cut(2)]
-    std = np.maximum(_deviations(log_, p), 0.5 * np.abs(halves[0] - halves[1])).tolist()
-    quantile = float(student.ppf(0.975, BLOCKS - 1))
-    w, z, late = exp(p[0]), exp(p[1]), float(p[2])
-    grow = [exp(min(quantile * s, 50.0)) for s in std[:2]]
-    gain, gain_std = _gain(log_, p)
+    errors, best, gain_std = _errors(log_, p, [_fitted(part, p) for part in log_.cut(2)])
+    w, z, late, gain = exp(p[0]), exp(p[1]), float(p[2]), float(best[0])
+    half = errors.half(np.eye(len(errors.halves))[2])
+    delay, lag = Parameter(late, max(late - half, 0.0), late + half), errors.factor(2.0 * z / w, -1.0, 1.0)
+    stiffness = None
+    if force is not None:
+        stiffness = errors.factor(1.0 / abs(float(best[4])), 0.0, 0.0, 0.0, 1.0)
+        stiffness = stiffness.beside(ONE_MASS["stiffness"] * stiffness.value)
+        delay, lag = delay.beside(ONE_MASS["delay"] * 0.5 / (z * w)), lag.beside(ONE_MASS["lag"] * lag.value)
     found = InnerLoop(
-        Parameter(w / (2.0 * pi), w / (2.0 * pi) / grow[0], w / (2.0 * pi) * grow[0]),
-        Parameter(z, z / grow[1], z * grow[1]),
-        Parameter(late, max(late - quantile * float(std[2]), 0.0), late + quantile * float(std[2])),
-        Parameter(gain, gain - quantile * gain_std, gain + quantile * gain_std),
-        1.0 - float(np.mean(_residual(log_, p) ** 2) / gain**2 / np.mean(log_.behind**2)),
-        1.0 / log_.tick,
+        bandwidth=errors.factor(w / (2.0 * pi), 1.0),
+        damping=errors.factor(z, 0.0, 1.0),
+        delay=delay,
+        lag=lag,
+        gain=Parameter(gain, gain - gain_std, gain + gain_std),
+        explained=1.0 - float(np.mean(_residual(log_, p) ** 2) / gain**2 / np.mean(log_.behind**2)),
+        rate=1.0 / log_.tick,
+        errors=errors,
+        stiffness=stiffness,
     )
     _check(found, where)
     return found
@@ -148,20 +230,20 @@ def _check(found: InnerLoop, where: str) -> None:
             f"{where}: the position moves {found.gain.value:.4g} times as far as the command; name the units of both "
             "(as --command x_mm:mm), or check that both are of one axis"
         )
-    lag = found.damping.value / (pi * found.bandwidth.value) + found.delay.value
-    wide = [
-        name
-        for name, p, size in (
-            ("bandwidth", found.bandwidth, found.bandwidth.value),
-            ("damping", found.damping, found.damping.value),
-            ("delay", found.delay, lag),
-        )
-        if p.half > TOLERANCE * size
-    ]
+    lag = found.lag.value + found.delay.value
+    sizes = {"bandwidth": found.bandwidth.value, "damping": found.damping.value, "delay": lag}
+    if found.stiffness is not None:  # of a servo, what lies between its lag and its delay counts in theta
+        sizes = {"lag": found.lag.value}
+    wide = [name for name, size in sizes.items() if getattr(found, name).half > TOLERANCE * size]
     if wide:
         raise InputError(
             f"{where}: its motion does not tell {', '.join(wide)} to {100.0 * TOLERANCE:.0f} %; record steps, or a "
             f"sweep up to {2.0 * found.bandwidth.value:.2g} Hz and more, in free motion, for longer"
+        )
+    if found.stiffness is not None and found.stiffness.half > TOLERANCE * found.stiffness.value:
+        raise InputError(
+            f"{where}: its push does not tell how the servo yields to {100.0 * TOLERANCE:.0f} %; push harder and for "
+            "longer, or leave --push out for an arm whose encoders do not show it"
         )
 
 
@@ -170,12 +252,15 @@ class _Log:
     tick: float
     command: Array
     position: Array
+    force: Array | None  # on a servo
     before: Array  # commands before the first row
 
     @classmethod
-    def of(cls, time: Array, command: Array, position: Array, where: str) -> _Log:
-        t, u, x = (np.asarray(a, dtype=float) for a in (time, command, position))
-        if not (np.isfinite(t).all() and np.isfinite(u).all() and np.isfinite(x).all()):
+    def of(cls, time: Array, command: Array, position: Array, force: Array | None, where: str) -> _Log:
+        t, u, x, f = (
+            np.asarray(a, dtype=float) for a in (time, command, position, 0.0 if force is None else force)
+        )
+        if not all(np.isfinite(a).all() for a in (t, u, x, f)):
             raise InputError(f"{where}: a row has no number; leave it out (--start, --end), or fill the gap")
         if len(t) < FEWEST:
             raise InputError(f"{where}: {len(t)} rows are too few; record at least {FEWEST}")
@@ -192,7 +277,9 @@ class _Log:
             raise InputError(
                 f"{where}: the position does not move; check the columns, and that the arm was on"
             )
-        return cls(tick, u - u[0], x - u[0], np.zeros(1))
+        if force is not None and np.ptp(f) == 0.0:
+            raise InputError(f"{where}: the force does not change; push the tip once, and check --push")
+        return cls(tick, u - u[0], x - u[0], None if force is None else f - np.median(f), np.zeros(1))
 
     @property
     def behind(self) -> Array:
@@ -209,6 +296,7 @@ class _Log:
                 self,
                 command=self.command[i * n : (i + 1) * n],
                 position=self.position[i * n : (i + 1) * n],
+                force=None if self.force is None else self.force[i * n : (i + 1) * n],
                 before=np.append(self.before, self.command[: i * n]),
             )
             for i in range(parts)
@@ -248,7 +336,10 @@ def _residual(log_: _Log, p: Array) -> Array:
 
 
 def _columns(log_: _Log, p: Array) -> Array:
-    """Answer to the commands, 1, and what two states at the start leave behind, shape (n, 4)."""
+    """Answer to the commands, 1, and what two states at the start leave behind, shape (n, 4).
+
+    Of a servo, also the answer to the force, and the rate of that, shape (n, 6).
+    """
     from scipy.signal import lfilter
 
     w, z, late = exp(p[0]), exp(p[1]), float(p[2])
@@ -270,7 +361,11 @@ def _columns(log_: _Log, p: Array) -> Array:
     kick = np.zeros(n)
     kick[0] = 1.0
     free = lfilter([1.0], denominator, kick)
-    return np.column_stack([answer, np.ones(n), free, np.concatenate([[0.0], free[:-1]])])
+    columns = [answer, np.ones(n), free, np.concatenate([[0.0], free[:-1]])]
+    if log_.force is not None:
+        given = lfilter(_numerator(E, early), denominator, log_.force)
+        columns += [given, np.gradient(given, log_.tick)]
+    return np.column_stack(columns)
 
 
 def _numerator(E: Array, b: Array) -> Array:
@@ -278,36 +373,41 @@ def _numerator(E: Array, b: Array) -> Array:
     return np.array([0.0, b[0], E[0, 1] * b[1] - E[1, 1] * b[0]])
 
 
-def _deviations(log_: _Log, p: Array) -> Array:
-    """Standard deviations of the three, by the scores of blocks, shape (3,)."""
-    J, r = _slopes(log_, p), _residual(log_, p)
-    bread = np.linalg.pinv(J.T @ J)
-    n = len(r) // BLOCKS
-    scores = np.array([J[i * n : (i + 1) * n].T @ r[i * n : (i + 1) * n] for i in range(BLOCKS)])
-    meat = scores.T @ scores * BLOCKS / (BLOCKS - 1.0)
-    return np.asarray(np.sqrt(np.maximum(np.diag(bread @ meat @ bread), 0.0)))
+def _errors(log_: _Log, p: Array, halves: list[Array]) -> tuple[FitErrors, Array, float]:
+    """Errors of the nonlinear numbers and of log K_s, the linear numbers, and half of the interval of the gain."""
+    columns = _columns(log_, p)
+    best = np.asarray(np.linalg.lstsq(columns, log_.position, rcond=None)[0], dtype=np.float64)
+    J = np.column_stack([*_slopes(log_, p, best), columns])
+    # In units of their own size: numbers of metres and of seconds are far apart.
+    size = np.linalg.norm(J, axis=0)
+    scores = J / size * (log_.position - columns @ best)[:, None]
+    influence = scores @ np.linalg.pinv((J / size).T @ (J / size)) / size
+    even = _blocks(influence, np.ones(len(scores)))
+    covariance, difference = even[:3, :3], halves[0] - halves[1]
+    if log_.force is not None:
+        slope = -1.0 / best[4]  # of log K_s in the compliance
+        covariance, difference = np.zeros((4, 4)), np.append(difference, 0.0)
+        covariance[:3, :3] = even[:3, :3]
+        covariance[3, 3] = slope**2 * _blocks(influence, columns[:, 4] ** 2)[7, 7]
+    errors = FitErrors(covariance, difference)
+    gain = FitErrors(even[3:4, 3:4], np.zeros(1)).half(np.ones(1))
+    return errors, best, gain
 
 
-def _slopes(log_: _Log, p: Array) -> Array:
-    """d residual/d p, shape (n, 3)."""
-    steps = np.array([1e-5, 1e-5, 1e-3 * log_.tick])
-    down = np.where(p - steps >= 0.0, p - steps, p) if p[2] < steps[2] else p - steps
-    columns = []
-    for i, step in enumerate(steps):
+def _blocks(influence: Array, energy: Array) -> Array:
+    """Covariance of what the sums of influences over blocks are, each of which has the same share of the energy."""
+    share = np.cumsum(energy) / energy.sum()
+    edges = np.searchsorted(share, np.arange(1, BLOCKS) / BLOCKS)
+    sums = np.array([part.sum(axis=0) for part in np.split(influence, edges)])
+    return np.asarray(sums.T @ sums * BLOCKS / (BLOCKS - 1.0))
+
+
+def _slopes(log_: _Log, p: Array, best: Array) -> list[Array]:
+    """Change of the fitted position with each nonlinear number, shapes (n,)."""
+    found = []
+    for i, step in enumerate((1e-5, 1e-5, 1e-3 * log_.tick)):
         ahead, behind = p.copy(), p.copy()
         ahead[i] += step
-        behind[i] = down[i] if i == 2 else p[i] - step
-        columns.append((_residual(log_, ahead) - _residual(log_, behind)) / (ahead[i] - behind[i]))
-    return np.column_stack(columns)
-
-
-def _gain(log_: _Log, p: Array) -> tuple[float, float]:
-    """Gain of the position over the command, and its standard deviation."""
-    columns = _columns(log_, p)
-    best = np.linalg.lstsq(columns, log_.position, rcond=None)[0]
-    r = log_.position - columns @ best
-    bread = np.linalg.pinv(columns.T @ columns)
-    n = len(r) // BLOCKS
-    scores = np.array([columns[i * n : (i + 1) * n].T @ r[i * n : (i + 1) * n] for i in range(BLOCKS)])
-    spread = bread @ (scores.T @ scores) @ bread
-    return float(best[0]), float(np.sqrt(max(spread[0, 0], 0.0)))
+        behind[i] -= min(step, p[2]) if i == 2 else step
+        found.append((_columns(log_, ahead) - _columns(log_, behind)) @ best / (ahead[i] - behind[i]))
+    return found

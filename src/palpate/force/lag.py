@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from math import pi, sqrt
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.boundary import stable_between
 from palpate.force.sampled_loop import SampledLoop, law_for
 
@@ -52,8 +53,26 @@ def lag_of(arm: Arm) -> float:
     if isinstance(arm.inner, PositionLoop):
         lag = pi / 2.0 / min(ultimate_gain(replace(loop, inner=c), arm.series) for c in arm.inner.corners)
         return lag if arm.inner.mass is None else lag * swinging(arm, lag)
-    stiffnesses = np.geomspace(SOFTEST, arm.limits.stiffness, _POINTS)
-    return pi / 2.0 / min(ultimate_gain(loop, float(k)) for k in stiffnesses)
+    return pi / 2.0 / ultimate_gain(loop, worst_stiffness(arm))
+
+
+def worst_stiffness(arm: Arm) -> float:
+    """The surface on which the ultimate gain of an arm that yields is lowest [N/m]."""
+    loop, stiffnesses = SampledLoop(arm), np.geomspace(SOFTEST, arm.limits.stiffness, _POINTS)
+    return min((float(k) for k in stiffnesses), key=lambda k: ultimate_gain(loop, k))
+
+
+def yielding_lag(arm: Arm, tip: ServoLoop, stiffness: float) -> float:
+    """Lag of the loop on a surface [s] whose law is for the servo in the arm's file, while this one acts.
+
+    The delay is the tip's, and need not be whole ticks: between two of them the lag is a straight line.
+    """
+    ticks = tip.delay * arm.rate
+    whole = int(ticks)
+    inner = msgspec.structs.replace(arm.inner, delay=whole * arm.tick)
+    loop = SampledLoop(msgspec.structs.replace(arm, inner=inner), tip=tip)
+    less, more = (pi / 2.0 / ultimate_gain(loop.later(extra), stiffness) for extra in (0, 1))
+    return less + (ticks - whole) * (more - less)
 
 
 def swinging(arm: Arm, lag: float) -> float:

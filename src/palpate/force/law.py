@@ -110,7 +110,7 @@ class Cautious(NamedTuple):
             Stage(AIR, 0.0, 0.0, 0.0),
             Learned(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
             NO_STARTS,
-            Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0)),
+            Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0)),
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             self.approach,
         )

@@ -13,9 +13,7 @@ from palpate.force.sampled_loop import Law, SampledLoop
 
 LAGS = 5.0
 """From the touch until the reading reaches F_d: a worst case is sought for each number of ticks up to these.
-
-Longer ones are a wait and then the same: in tests/force/test_peak.py twice the lags change nothing.
-"""
+Longer ones are a wait and then the same: in tests/force/test_peak.py twice the lags change nothing."""
 
 
 def peak_bound(gains: Gains, share: float = 1.0, lags: float = LAGS) -> float | None:

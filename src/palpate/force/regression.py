@@ -14,9 +14,7 @@ AXIS_K, AXIS_B, BOTH, AXIS_C = (
 )
 PRIOR = Mat3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 0.01))
 """Information that never fades: stiffness and damping deviate from 0 by about the cap, the offset by about 10 N.
-
-It keeps the equations solvable where the tip moves evenly, so that damping and offset are one.
-"""
+It keeps the equations solvable where the tip moves evenly, so that damping and offset are one."""
 UNKNOWN = 1e3
 
 

@@ -55,12 +55,14 @@ class SampledLoop:
         extra: ticks of delay beyond the arm's own.
         unit: k0 [N/m]; the series stiffness if left out. Near the surface's own, all numbers are of one size.
         inner: w^2 [1/s^2] and 2 z w [1/s] of a position arm's inner loop; the arm's own if left out.
+        tip: the servo that acts, while the law is for the arm's own; that one if left out.
     """
 
     arm: Arm
     extra: int = 0
     unit: float | None = None
     inner: tuple[float, float] | None = None
+    tip: ServoLoop | None = None
 
     def later(self, ticks: int) -> SampledLoop:
         """The same loop with so many more ticks of delay."""
@@ -132,7 +134,8 @@ class SampledLoop:
             square, rate = inner.squared if self.inner is None else self.inner
             A[1, 0], A[1, 1], b[1] = -square / w, -rate, square / w
         elif isinstance(inner, ServoLoop):
-            K, D, m = inner.stiffness, inner.damping, inner.mass
+            servo = inner if self.tip is None else self.tip
+            K, D, m = servo.stiffness, servo.damping, servo.mass
             A[1, 0], A[1, 1], b[1] = -(K + stiffness) / m / w, -(D + damping) / m, K / m / w
         else:
             A[1, 0], A[1, 1] = -stiffness / inner.mass / w, -damping / inner.mass

@@ -11,35 +11,26 @@ from palpate.force.stage import LOCKED
 SHOWED = 3.0
 """Times the largest deviation that free motion has shown, and the largest rise within half of theta, that a surface has
 to exceed: three steps of a cable never do.
-
-Measured by benchmarks/force/free_motion.py: with 2.5 slow hums and coloured noise pass three times as often.
-"""
+Measured by benchmarks/force/free_motion.py: with 2.5 slow hums and coloured noise pass three times as often."""
 EARNED = 3.0
 """Times as fast as before the tip may be where the readings bear the stiffness out: twice as fast costs a tenth of a
 second on the softest surfaces, four times as fast lets a sensor that lies once come to twice the peak.
-
-Measured by benchmarks/force/free_motion.py.
-"""
+Measured by benchmarks/force/free_motion.py."""
 BORNE = 2.0
 """Standard deviations by which a rise that is foretold has to stand out of the noise to count as a test."""
 STOPPED = 0.75
-"""Of the approach: a servo's tip that is slower than this is held back by a surface, stiffer than a third of the servo.
-
-No error of a sensor slows the tip. Measured by benchmarks/arms/servos.py.
-"""
+"""Of the approach: a servo's tip that was faster, and is slower than this, is held back by a surface, stiffer than a
+third of the servo.
+No error of a sensor slows the tip. Measured by benchmarks/arms/servos.py and benchmarks/force/free_motion.py."""
 SURE = 4.0
 """Readings for which K_u stays where it was at a touch: what they refute was an edge, not a ramp.
-
 Measured by benchmarks/force/first_touches.py: with none a stiff surface that was felt one reading ago counts as soft,
-and is pressed 38 % too hard.
-"""
+and is pressed 38 % too hard."""
 DAMPED = 0.52
 """Least share of K + B/theta, beside the arm's own spring, that K_u has to be: above the half that the adapting law's
 proof allows.
-
 With alpha 0.42 the sensitivity is then below 1.56 for every B/K, 1.67 for a torque arm
-(tests/force/test_sensitivity.py).
-"""
+(tests/force/test_sensitivity.py)."""
 STIFFER = 1.3
 """Times K_u that the last theta has to show before a locked K_u rises: well within the half that the proof leaves."""
 SHOWN = EVIDENT**0.5
@@ -54,10 +45,11 @@ class Sure(NamedTuple):
     """The force as surely that of a surface."""
 
     stiffness: float  # with which it became so, in caps; 0 while the force may be the sensor's alone
-    x: float  # position at the last test of it; until it is sure, the position of theta/2 ago, smoothed [m]
+    x: float  # position at the last test of it; until it is sure, a servo's of theta/2 ago, smoothed [m]
     force: float  # mean force there [N]
     limit: float  # of the speed [m/s]
     refuted: float  # 1 in the tick in which it became unsure again
+    way: float  # of a servo's tip in theta/2, at the end of free motion [m]
 
 
 @part
@@ -80,9 +72,15 @@ def bounded(law, bound, stage, known, w, f):
     too, now and then: the rise is taken back unless the readings bear it out, so that it adds up to nothing.
     """
     if stage.phase == AIR:
-        unsure = Sure(0.0, f.y - 0.5 * law.theta * law.approach, 0.0, law.approach, 0.0)
-        return Bound(bound.most, bound.most, bound.most, 0.0, 0.0, unsure)
-    bound = followed_by(law, bound, f)
+        x = trailed(law, bound.sure, f)
+        return Bound(
+            bound.most, bound.most, bound.most, 0.0, 0.0, Sure(0.0, x, 0.0, law.approach, 0.0, f.y - x)
+        )
+    if bound.sure.stiffness == 0.0:
+        unsure = Sure(
+            0.0, trailed(law, bound.sure, f), 0.0, bound.sure.limit, bound.sure.refuted, bound.sure.way
+        )
+        bound = Bound(bound.used, bound.held, bound.most, bound.least, bound.calm, unsure)
     if known.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
         return bound
     p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
@@ -120,41 +118,31 @@ def borne_out(law, sure, known, w, f):
         noise = max(BORNE * 0.7 * sigma, w.peak)
         expected, rise = 0.5 * sure.stiffness * law.cap * (f.y - sure.x), w.mean - sure.force
         if rise < expected - noise:
-            return Sure(0.0, f.y - 0.5 * law.theta * law.approach, 0.0, law.approach, 1.0)
+            return Sure(0.0, f.y, 0.0, law.approach, 1.0, 0.0)
         if expected > noise or sure.limit >= law.speed:
-            return Sure(sure.stiffness, f.y, w.mean, min(EARNED * sure.limit, law.speed), 0.0)
+            return Sure(sure.stiffness, f.y, w.mean, min(EARNED * sure.limit, law.speed), 0.0, 0.0)
         return sure
     level = max(law.level, EDGE * sigma, SHOWED * w.steepest.rise)
-    stopped = law.lead > 0.0 and f.y - sure.x < STOPPED * 0.5 * law.theta * law.approach
+    slow = STOPPED * 0.5 * law.theta * law.approach
+    stopped = law.lead > 0.0 and f.y - sure.x < slow < sure.way
     if (
         stopped
         and w.fresh > FEWEST
         and w.mean - w.rest > max(law.level, EDGE * sigma)
         and known.found.x > 0.0
     ):
-        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0)
+        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
     follows = (known.found.x - EDGE * known.std.x) * law.cap * law.approach > law.drift
     shown = w.mean - w.rest > level and w.slow - w.rest > SHOWED * w.peak
     if w.fresh > FEWEST and shown and follows:
-        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0)
-    return Sure(0.0, sure.x, 0.0, law.approach, 0.0)
+        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
+    return Sure(0.0, sure.x, 0.0, law.approach, 0.0, sure.way)
 
 
 @law
-def followed_by(law, bound, f):
-    """The bound with the smoothed position of theta/2 ago, as long as nothing is sure."""
-    sure = bound.sure
-    if sure.stiffness > 0.0 or law.lead == 0.0:
-        return bound
-    x = sure.x + 2.0 * law.tick / law.theta * (f.y - sure.x)
-    return Bound(
-        bound.used,
-        bound.held,
-        bound.most,
-        bound.least,
-        bound.calm,
-        Sure(0.0, x, 0.0, sure.limit, sure.refuted),
-    )
+def trailed(law, sure, f):
+    """Position of theta/2 ago, smoothed, as long as nothing is sure; where the tip is when that begins [m]."""
+    return f.y if sure.stiffness > 0.0 else sure.x + 2.0 * law.tick / law.theta * (f.y - sure.x)
 
 
 @law

@@ -163,6 +163,7 @@ def _number(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
+# More than seven arguments: each is a given number of the surface, the press or the proof.
 def tune(
     arm: Arm,
     force: float,
@@ -172,6 +173,7 @@ def tune(
     peak: float | None = None,
     surface_speed: float | None = None,
     prove_adapting: bool = True,
+    theta: float | None = None,
 ) -> Tuning:
     """Gains for an arm that presses with a force, and what is proved of them.
 
@@ -183,12 +185,13 @@ def tune(
         peak: highest force that is allowed at the touch [N].
         surface_speed: of a surface that moves by itself [m/s].
         prove_adapting: prove the adapting law too, which takes a torque arm some two seconds.
+        theta: whole lag of the loop [s]; the arm's own if left out.
 
     Raises:
         InputError: numbers that cannot be met, with what can.
     """
     _check(force, known, cap)
-    theta = known_lag(arm)
+    theta = known_lag(arm) if theta is None else theta
     known = None if known is None else known.beyond(arm)
     farther = () if known is None or cap is not None else _beyond_log(arm, known, force)
     stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
@@ -244,10 +247,8 @@ def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> floa
 
 TIMES = 2.0
 """Of the force of a log, up to which its stiffness stands for that of a press.
-
 The stiffness of a force that is a power of the depth grows no faster than the force, and the adapting law's proof bears
-one that is twice as high.
-"""
+one that is twice as high."""
 
 
 def _beyond_log(arm: Arm, known: Known, force: float) -> tuple[tuple[str, str], ...]:

@@ -82,9 +82,11 @@ class Cell(NamedTuple):
         tool: that one.
         step: of the physics [s].
         steps: of the physics in a tick.
-        elastic: 1 where motors lead the links through springs, 0 where torques act on the links.
+        elastic: 1 where springs lead the links to a set-point, 0 where torques act on the links.
+        yields: 1 where those springs are the servos' own, of which the encoders show how they give way; 0 where motors
+            with encoders stand before them.
         spring: of each joint [N m/rad, N/m], shape (n,).
-        damper: beside it [N m s/rad, N s/m], shape (n,).
+        damper: beside it, or of the link's own rate for a servo [N m s/rad, N s/m], shape (n,).
         first: w^2 of the motors, which follow their set-points whatever pushes [1/s^2].
         second: 2 z w [1/s].
     """
@@ -98,6 +100,7 @@ class Cell(NamedTuple):
     step: float
     steps: int
     elastic: float
+    yields: float
     spring: Array
     damper: Array
     first: float
@@ -159,14 +162,17 @@ def sensed(sensor, reading, force, time, noise):
 
 @law
 def driven(cell, body, setpoint):
-    """Fills the torque on the links: it is the set-point itself, or the springs' between motors and links."""
+    """Fills the torque on the links: it is the set-point itself, or the springs' to motors or set-points."""
     for i in range(len(body.q)):
         if cell.elastic == 0.0:
             body.drive[i] = setpoint[i]
         else:
-            pull = cell.first * (setpoint[i] - body.motor[i]) - cell.second * body.motor_rate[i]
-            body.motor_rate[i] += cell.step * pull
-            body.motor[i] += cell.step * body.motor_rate[i]
+            if cell.yields == 1.0:
+                body.motor[i] = setpoint[i]
+            else:
+                pull = cell.first * (setpoint[i] - body.motor[i]) - cell.second * body.motor_rate[i]
+                body.motor_rate[i] += cell.step * pull
+                body.motor[i] += cell.step * body.motor_rate[i]
             stretch, rate = body.motor[i] - body.q[i], body.motor_rate[i] - body.qd[i]
             body.drive[i] = cell.spring[i] * stretch + cell.damper[i] * rate
 

@@ -67,11 +67,7 @@ class _Rows:
 
 
 def press(
-    arm: SimulatedArm,
-    pilot: Pilot,
-    place: Place,
-    plan: Plan,
-    progress: Progress | None = None,
+    arm: SimulatedArm, pilot: Pilot, place: Place, plan: Plan, progress: Progress | None = None
 ) -> Record:
     """Approaches, touches, presses.
 

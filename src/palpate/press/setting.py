@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
-from palpate.force.arm import Arm, PositionLoop, ServoLoop
+from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, held
 from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
@@ -130,36 +129,41 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
 
 def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL) -> Cell:
     """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
-    if isinstance(loop.inner, ServoLoop):
-        raise InputError(
-            f"{loop.title}: a press of a servo is not simulated; give gains of kind position or torque"
-        )
-    elastic = isinstance(loop.inner, PositionLoop)
-    chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if elastic else arm.chain
+    motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
+    chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if motors else arm.chain
     J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
-    links = M - np.diag(arm.chain.rotor) if elastic else M
+    links = M - np.diag(arm.chain.rotor) if motors else M
     spring, damper = np.zeros(arm.joints), np.zeros(arm.joints)
     first = second = 0.0
     along = place.normal @ J[:3]
     fastest = np.sqrt(surface.stiffness * float(along @ np.linalg.solve(links, along)))
+    if not isinstance(loop.inner, TorqueLoop):
+        spring = _joint_springs(arm, links, along, loop.inner.stiffness)
+        fastest = max(fastest, np.sqrt(_fastest(links, spring)))
     if isinstance(loop.inner, PositionLoop):
-        spring, damper = _joint_springs(arm, links, along, loop.inner.stiffness)
-        fastest = max(fastest, np.sqrt(np.linalg.eigvals(np.linalg.solve(links, np.diag(spring))).real.max()))
-        w = 2.0 * pi * loop.inner.bandwidth
-        first, second = w * w, 2.0 * loop.inner.damping * w
+        damper = 2.0 * STRUCTURE * np.sqrt(spring * np.diag(links))
+        first, second = loop.inner.squared
+    elif isinstance(loop.inner, ServoLoop):
+        damper = loop.inner.lag * spring
+        fastest = max(fastest, _fastest(links, damper))
     steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
     return Cell(
         chain=chain, normal=_three(place.normal), place=place.place, surface=surface,
-        sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps, elastic=float(elastic),
-        spring=spring, damper=damper, first=float(first), second=float(second),
+        sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps,
+        elastic=float(motors or servo), yields=float(servo), spring=spring, damper=damper, first=float(first),
+        second=float(second),
     )  # fmt: skip
 
 
-def _joint_springs(arm: SerialArm, links: Array, along: Array, stiffness: float) -> tuple[Array, Array]:
-    """Drive trains as stiff as their motors are strong, the tip along the normal as stiff as the arm is said to be."""
+def _joint_springs(arm: SerialArm, links: Array, along: Array, stiffness: float) -> Array:
+    """Joints as stiff as their motors are strong, the tip along the normal as stiff as the arm is said to be."""
     strength = arm.torque if np.isfinite(arm.torque).all() else np.diag(links)
-    spring = strength * stiffness * float(along @ (along / strength))
-    return spring, 2.0 * STRUCTURE * np.sqrt(spring * np.diag(links))
+    return np.asarray(strength * stiffness * float(along @ (along / strength)))
+
+
+def _fastest(links: Array, joints: Array) -> float:
+    """Largest eigenvalue of the joints' springs or dampers over the masses."""
+    return float(np.linalg.eigvals(np.linalg.solve(links, np.diag(joints))).real.max())
 
 
 def _sensor(loop: Arm, step: float) -> WristSensor:

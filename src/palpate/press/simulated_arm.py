@@ -201,7 +201,8 @@ class SimulatedArm:
         self._before, self._seen = self._seen, self._encoders()
 
     def _encoders(self) -> Array:
-        turned = self._body.motor - self._sag if self.cell.elastic else self._body.q
+        before = self.cell.elastic > self.cell.yields  # the springs
+        turned = self._body.motor - self._sag if before else self._body.q
         if self._resolution == 0.0:
             return turned.copy()
         return np.asarray(self._resolution * np.round(turned / self._resolution))

@@ -57,10 +57,7 @@ def with_tool(arm: SerialArm, payload: Payload) -> SerialArm:
     )  # fmt: skip
     least, spread = spread_of(_change(chain.inertia, last, moment))
     loaded = chain._replace(
-        mass=_change(chain.mass, last, whole),
-        com=_change(chain.com, last, com),
-        least=least,
-        spread=spread,
+        mass=_change(chain.mass, last, whole), com=_change(chain.com, last, com), least=least, spread=spread
     )
     return replace(arm, title=f"{arm.title} with a tool of {mass:.3g} kg", chain=loaded, scene=None)
 

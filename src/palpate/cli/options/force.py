@@ -31,10 +31,14 @@ class ArmOptions:
         ur5e, fr3, panda, iiwa14, thesis, or a TOML file.
     loop_from
         A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay.
+    push
+        Column of the measured force in that log, as force_N:N, for an arm whose encoders show how it yields: the tip is
+        pushed once while the command rests, and the log identifies a servo.
     """
 
     arm: Annotated[LoopArm, QUIET]
     loop_from: Path | None = None
+    push: str | None = None
 
     def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
         """The arm, and notes on the identification of its inner loop."""
@@ -42,8 +46,10 @@ class ArmOptions:
 
         one = load_arm(self.arm)
         if self.loop_from is None:
+            if self.push is not None:
+                raise InputError("--push names a column of the log of --loop-from; give that log")
             return one, None
-        found = inner_loop(self.loop_from, columns)
+        found = inner_loop(self.loop_from, columns, self.push)
         return found.of(one, self.loop_from.name), found
 
 
@@ -251,8 +257,8 @@ class TuningOutputOptions(OutputOptions):
     verbose: Annotated[bool, FLAG] = False
 
 
-def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
-    """The inner loop identified from a log of commanded and measured position.
+def inner_loop(log: Path, columns: ColumnOptions, push: str | None = None) -> InnerLoop:
+    """The inner loop identified from a log of commanded and measured position; a servo, with a column of a push.
 
     Raises:
         InputError: the log or its columns are wrong, or it does not excite the loop.
@@ -271,9 +277,13 @@ def inner_loop(log: Path, columns: ColumnOptions) -> InnerLoop:
     for role in ("command", "position"):
         if ":" not in names[role]:
             names[role] += ":m"
+    names["force"] = push if push is None or ":" in push else f"{push}:N"
     given = {role: name for role, name in names.items() if name is not None}
     record = read_log(log, rate=columns.rate, **given)
-    return identify_inner_loop(record["time"], record["command"], record["position"], where=str(log))
+    force = None if push is None else record["force"]
+    return identify_inner_loop(
+        record["time"], record["command"], record["position"], where=str(log), force=force
+    )
 
 
 @Parameter(name="*", group=Group("Young's modulus", sort_key=5))
