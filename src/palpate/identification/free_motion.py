@@ -17,6 +17,7 @@ from palpate.identification.least_squares import Noise, noise_of, quantile
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
 from palpate.signals.samples import runs
+from palpate.signals.types import NORMAL
 
 Rows = Mask
 
@@ -342,7 +343,7 @@ def payload_of(
     noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
     level = noise.variance * len(force) / noise.effective
     mean = _of_parts(force, motion, stays, level)
-    return Payload(mean.value, mean.half / 1.96) if abs(mean.value) > mean.half else None
+    return Payload(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
 def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:
