@@ -35,6 +35,7 @@ from palpate.report.identification.words import (
 )
 from palpate.report.numbers import NONE, as_html, plain, printed, quantity, with_half
 from palpate.report.terminal import print_hanging
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -59,7 +60,6 @@ _REMEDIES = {
     "octaves": "excite a wider band",
     "blocks": "press longer, at one depth",
     "repetition": "press more often",
-    "strokes": "press more slowly",
     "unexplained": "keep near one depth",
     "curvature": "press about one force",
     "position noise": "a finer position",
@@ -72,7 +72,6 @@ _CAUSES = {
     "other forces": "drift or friction",
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
-    "strokes": "loading and unloading",
     "octaves": "frequencies differ",
     "touch": "the touch",
     "unseen way": "the first reading",
@@ -244,7 +243,7 @@ def _interval(p: Parameter, bound: bool) -> str:
 
 
 def _lag_half(found: Identification) -> float:
-    return 0.0 if found.lag is None else found.lag.bound or 1.96 * found.lag.std
+    return 0.0 if found.lag is None else found.lag.bound or NORMAL * found.lag.std
 
 
 def _contact(found: Identification) -> str:
