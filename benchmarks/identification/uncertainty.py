@@ -1,15 +1,15 @@
 """Monte Carlo of the uncertainty budget (JCGM 101): the spread of estimates against what the budget states.
 
-    python benchmarks/identification/uncertainty.py --draws 200
-    python benchmarks/identification/uncertainty.py --draws 200 --logs kelvin-voigt-2
+    python benchmarks/identification/uncertainty.py --draws 60
+    python benchmarks/identification/uncertainty.py --draws 60 --logs kelvin-voigt-2
 
 Of each certified log (palpate-references) whose model is linear the force is drawn again: the certified model's force,
 with normal noise of the certified residual standard deviation; then also with a lag that errs by a normal deviate of
 1 ms, while the identification is given its mean and that standard deviation. A ratio is a standard uncertainty, root
 mean square over the draws, over the standard deviation of its estimates: 1 is exact, more is cautious. A cell has
-three: of least squares on the model alone (`ci95_if_model_holds`); of the budget by the sources that noise reaches, `noise`
-and `other forces`, and `lag` where it is drawn; and of the budget's combined standard uncertainty, in which is also
-what nobody drew. The standard error of a ratio is 1/sqrt(2 draws).
+three: of least squares on the model alone (`ci95_if_model_holds`); of the budget by the sources that noise reaches,
+`noise` and `other forces`, and `lag` where it is drawn; and of the budget's combined standard uncertainty, in which is
+also what nobody drew. The standard error of a ratio is 1/sqrt(2 draws).
 """
 
 from __future__ import annotations
@@ -129,17 +129,22 @@ def row(problem: Problem, draws: int) -> tuple[str, list[Ratios]]:
         found = ratios(list(drawn(problem, draws, lag_std)), sources)
         cells += [str(found[name]) if name in found else "-" for name in "KBM"]
         every += found.values()
-    return f"| `{problem.name}` | {' | '.join(cells)} |", every
+    return line(problem.name, cells), every
+
+
+def line(name: str, cells: list[str]) -> str:
+    """A line of the table."""
+    return f"{name:24}{''.join(f'{cell:>20}' for cell in cells)}"
 
 
 def main() -> int:
     """Print the table and how many ratios agree."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--draws", type=int, default=200, help="of each log and part")
+    parser.add_argument("--draws", type=int, default=60, help="of each log and part")
     parser.add_argument("--logs", default=".", help="regular expression of their names")
     asked = parser.parse_args()
     own = [p for p in problems() if set(p.law.nonlinear) <= {"lag"} and re.search(asked.logs, p.name)]
-    print("| log | K, noise | B | M | K, noise and lag | B | M |\n|---|---|---|---|---|---|---|")
+    print(line("log", ["K, noise", "B", "M", "K, noise and lag", "B", "M"]))
     every: list[Ratios] = []
     for problem in own:
         text, found = row(problem, asked.draws)

@@ -20,9 +20,9 @@ WORDS = 3
 _LEAST = 1e-6
 """Share of the variance below which a source is not listed."""
 METHOD = (
-    "Follows the GUM (JCGM 100). u(y) is the standard uncertainty of the result by one source, ν its degrees of freedom."
-    " A source without an input has its effect estimated in the result's own unit: its sensitivity is 1. At the working"
-    " point each source is expanded by its own ν, so that k is Student's t of ν_eff or more."
+    "Follows the GUM (JCGM 100). u(y) is the standard uncertainty of the result by one source, ν its degrees of"
+    " freedom. A source without an input has its effect estimated in the result's own unit: its sensitivity is 1. At"
+    " the working point each source is expanded by its own ν, so that k is Student's t of ν_eff or more."
 )
 
 
