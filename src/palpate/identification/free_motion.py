@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.sensor_path import position_noise
 from palpate.identification.filters.state_variable import Chain, block_means, white_noise
-from palpate.identification.least_squares import Noise, noise_of, quantile
+from palpate.identification.least_squares import Noise, noise_of
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
+from palpate.identification.uncertainty import student
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
 
@@ -277,7 +278,7 @@ def _slope(
     own = float(x @ f) / size
     noise = noise_of(f - own * x, rows, len(stays) + 1)
     std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
-    return own, quantile(noise.effective, 2) * std
+    return own, student(noise.effective - 2) * std
 
 
 _ACCELERATED = 10.0

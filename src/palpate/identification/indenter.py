@@ -240,16 +240,11 @@ def _judge(
     ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)
     terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
-    found = Parameter.of(
-        value,
-        half,
-        "Pa",
-        Verdict.NOT_IDENTIFIABLE,
-        f"the press does not follow a {indenter}: 95 % 0 to {value + half:.3g} Pa, most of it {main}",
-        {cause: Contribution.within(part) for cause, part in parts.items()},
-    )
+    bounds = {cause: Contribution.within(part) for cause, part in parts.items()}
+    found = Parameter.of(value, half, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
     if half >= value:
-        return replace(found, value=None, std=None)
+        reason = f"the press does not follow a {indenter}: 95 % 0 to {value + half:.3g} Pa, most of it {main}"
+        return found.without_number(reason, ci95=found.ci95)
     share = f"{100 * half / value:.2g} %"
     if half <= tolerance * value:
         return replace(found, verdict=Verdict.IDENTIFIED, reason=f"known to {share} (95 %): {terms}")

@@ -289,14 +289,11 @@ def _judge(mean: Mean, alike: float, count: int, kind: tuple[str, str], toleranc
         "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), mean.freedom),
         "common to all logs": Contribution.within(alike),
     }
+    found = Parameter.of(mean.value, half, kind[0], Verdict.IDENTIFIED, "", parts)
     if share >= 1:
         reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
-        return replace(
-            Parameter.of(mean.value, half, kind[0], Verdict.NOT_IDENTIFIABLE, reason, parts),
-            value=None,
-            std=None,
-        )
+        return found.without_number(reason, ci95=interval)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"
     reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"
-    return Parameter.of(mean.value, half, kind[0], verdict, reason, parts)
+    return replace(found, verdict=verdict, reason=reason)

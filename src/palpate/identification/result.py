@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from math import isclose, pi, sqrt
 from typing import Any
@@ -97,6 +97,22 @@ class Parameter(Readable):
             budget=dict(budget),
             contributions=contributions,
         )
+
+    def without_number(
+        self,
+        reason: str,
+        verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
+        ci95: tuple[float, float] | None = None,
+    ) -> Parameter:
+        """The same without a value, and at most with bounds: its budget says why.
+
+        Args:
+            reason: why there is none.
+            verdict: on it.
+            ci95: bounds that the log still shows.
+        """
+        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
+        return replace(bare, verdict=verdict, reason=reason)
 
     @property
     def uncertainty(self) -> Uncertainty | None:

@@ -88,33 +88,24 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     value, unit = found[name], unit_of(name, found.fit, terms)
     half, parts = found.half_of(name), found.contributions(name)
     whole = Parameter.of(value, half, unit, Verdict.NOT_IDENTIFIABLE, "", parts, joint=True)
-    interval = (value - half, value + half)
-    own = None
+    low, high = interval = (value - half, value + half)
     if name in holds.names:
         reach = float(np.hypot(holds.t * holds.std(name), parts["calibration"].half))
-        own = (holds[name] - reach, holds[name] + reach)
-
-    def said(
-        verdict: Verdict, reason: str, number: bool = True, bounds: tuple[float, float] | None = None
-    ) -> Parameter:
-        if not number:
-            return replace(whole, value=None, std=None, ci95=bounds, verdict=verdict, reason=reason)
-        return replace(whole, verdict=verdict, reason=reason, ci95_if_model_holds=own)
-
-    positive = name in found.fit.model.positive
-    if positive and interval[1] < 0:
+        whole = replace(whole, ci95_if_model_holds=(holds[name] - reach, holds[name] + reach))
+    if name in found.fit.model.positive and high < 0:
         reason = f"the fit gives {_digits(value)} {_show(unit)}, {_BELOW}"
-        return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
+        return whole.without_number(" ".join(reason.split()), Verdict.REJECTED)
     if half > _NOTHING * max(abs(value), 1e-300):
-        return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
-    bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_show(unit)}".rstrip()
-    clear = interval[0] > 0 or interval[1] < 0
+        return whole.without_number(f"the log does not show it: {NOISE.remedy}")
+    clear = low > 0 or high < 0
     if half <= terms.tolerance * abs(value) and clear:
-        return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
+        reason = f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}"
+        return replace(whole, verdict=Verdict.IDENTIFIED, reason=reason)
+    bounds = f"95 %: {_digits(low)} to {_digits(high)} {_show(unit)}".rstrip()
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
     main = cause_of(next(iter(whole.budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
-    return said(Verdict.NOT_IDENTIFIABLE, reason, clear, interval)
+    return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
 
 
 def _at(found: Answer, name: str, terms: Terms) -> str:
@@ -226,14 +217,9 @@ _UNTOUCHED = (
 )
 
 
-def _without_number(p: Parameter, reason: str) -> Parameter:
-    """Rejected: a number that a model gives which does not hold stands nowhere."""
-    return Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
-
-
 def _reject(p: Parameter, reason: str) -> Parameter:
-    """The same, if it was identified."""
-    return _without_number(p, reason) if p.verdict is Verdict.IDENTIFIED else p
+    """Rejected, if it was identified: a number that a model gives which does not hold stands nowhere."""
+    return p.without_number(reason, Verdict.REJECTED) if p.verdict is Verdict.IDENTIFIED else p
 
 
 def _refuse(p: Parameter, reason: str) -> Parameter:

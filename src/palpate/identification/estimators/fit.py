@@ -13,9 +13,10 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.estimators.descent import Descent, Point, names_of
-from palpate.identification.least_squares import Noise, covariance, noise_of, quantile
+from palpate.identification.least_squares import Noise, covariance, noise_of
 from palpate.identification.models import Model, Motion
 from palpate.identification.options import Lag, prior_of
+from palpate.identification.uncertainty import student
 
 _LEAST = 0.1
 """Share of the information in any direction that must be left for the noise's to be taken out."""
@@ -197,7 +198,7 @@ class Fit:
     @property
     def t(self) -> float:
         """Student's factor of a standard deviation for a 95 % interval."""
-        return quantile(self.noise.effective, len(self.names))
+        return student(self.noise.effective - len(self.names))
 
     def with_cause(self, cause: str, effect: Array) -> Fit:
         """The same with one more cause of error, as of an `Answer`; a covariance keeps no names of causes.

@@ -320,9 +320,7 @@ def _again(slope: Slope) -> tuple[float, float] | None:
     n = len(slope.each)
     if n < 3:
         return None
-    from scipy.special import stdtrit
-
-    half = float(stdtrit(n - 2, 0.975)) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
+    half = student(n - 2) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
     return slope.stiffness - half, slope.stiffness + half
 
 
