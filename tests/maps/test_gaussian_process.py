@@ -41,7 +41,7 @@ def test_conditioning_is_that_of_a_normal_distribution_whose_mean_is_unknown():
     mean = k.T @ np.linalg.solve(K, VALUES)
     covariance = prior_covariance(PARAMETERS, at, at) + wide - k.T @ np.linalg.solve(K, k)
     process = Conditioned(PLACES, VALUES, NOISE, PARAMETERS)
-    found, variance = process.predict(cdist(PLACES, at))
+    found, variance = process.reduction.predict(cdist(PLACES, at))
     assert found == pytest.approx(mean, rel=1e-5)
     assert variance == pytest.approx(np.diag(covariance), rel=1e-3)
     assert process.covariance(at) == pytest.approx(covariance, abs=1e-3 * covariance.max())
@@ -52,7 +52,7 @@ def test_a_value_left_out_is_foretold_as_by_the_process_of_the_others():
     for i in (0, 11, 24):
         rest = np.arange(25) != i
         others = Conditioned(PLACES[rest], VALUES[rest], NOISE[rest], PARAMETERS)
-        mean, variance = others.predict(cdist(PLACES[rest], PLACES[i : i + 1]))
+        mean, variance = others.reduction.predict(cdist(PLACES[rest], PLACES[i : i + 1]))
         std = np.sqrt(variance[0] + NOISE[i] ** 2 + PARAMETERS.repeat**2)
         assert process.leave_one_out()[i] == pytest.approx((VALUES[i] - mean[0]) / std, rel=1e-6)
 
@@ -61,7 +61,7 @@ def test_parts_of_a_prediction_are_those_of_the_whole():
     process = fit(PLACES, VALUES, NOISE)
     at = RNG.uniform(0.0, 0.1, (1300, 2))
     mean, variance = process.predict(at)
-    exact = [node.predict(cdist(PLACES, at)) for node in process.nodes]
+    exact = [node.reduction.predict(cdist(PLACES, at)) for node in process.nodes]
     means, variances = np.array([m for m, _ in exact]), np.array([v for _, v in exact])
     assert mean == pytest.approx(process.weights @ means, rel=1e-9)
     spread = process.weights @ (variances + (means - mean) ** 2)

@@ -77,7 +77,7 @@ def test_a_map_grows_to_the_whole_one(table):
     inside = result.coarse.inside
     width = [np.mean(seen.std[inside]) for _, seen in result.film]
     assert np.all(np.diff(width) <= 0.0)
-    whole, _ = result.map.process.likeliest.predict(cdist(result.map.places, result.coarse.places))
+    whole, _ = result.map.process.likeliest.reduction.predict(cdist(result.map.places, result.coarse.places))
     assert result.film[-1][1].mean == pytest.approx(whole)
 
 
@@ -139,6 +139,8 @@ def test_further_columns_are_mapped_beside_the_stiffness(table, tmp_path, capsys
     assert "depth_high" in polars.read_csv(tmp_path / "map.csv").columns
     assert "Depth. Half-width of its 95 % interval" in (tmp_path / "map.html").read_text(encoding="utf-8")
     wide.write_text("\n".join([f"{rows[0]},loss", *(f"{row},0.3" for row in rows[1:])]), encoding="utf-8")
+    assert main(["map", "--table", str(wide), "--fields", "loss", "--next", "0"]) == 0
+    assert "no map of loss: it is the same at every press" in capsys.readouterr().out
     assert main(["map", "--table", str(wide), "--fields", "loss", "--json"]) == 0
     assert (
         "loss" not in json.loads(capsys.readouterr().out)["map"][0]
@@ -223,6 +225,10 @@ def test_logs_without_a_place_are_refused_in_one_line(tmp_path, capsys):
         ("x,y,K,half\n0,0,1000,10\n", ("--goal", "edge"), "--stiffer-than"),
         ("x,y,K,half\n0,0,1000,10\n", ("--place", "x,y"), "--columns"),
         ("x,y,K,half\n0,0,1000,10\n", ("--next", "-1"), "--next"),
+        ("x,y,K,half\n0,0,1000,10\n", ("--rate", "500"), "are of logs"),
+        ("x,y,K,half\n0,0,1000,10\n", ("--wrench-frame", "base"), "are of logs"),
+        ("x,y,K,half\n0,0,1000,10\n", ("--each-contact",), "are of logs"),
+        ("x,y,K,half\n0,0,1000,10\n", ("--start", "1,2,3:mm", "--way", "5:mm"), "has places of 2"),
     ],
 )
 def test_a_bad_table_or_option_is_one_line(tmp_path, capsys, text, words, said):

@@ -194,6 +194,11 @@ def map(  # noqa: A001 - the command's name
     request = (asked or MapOptions()).request()
     if (places.table is None) == (not logs):
         raise InputError("palpate map needs logs or a folder of them, or --table with places and stiffnesses")
+    if places.table is not None and (places.each_contact or any((source, frame, arm, fitted))):
+        raise InputError(
+            "--each-contact and the options of logs, frames, arms and models are of logs; a table's places and "
+            "stiffnesses stand as they are: leave these options out"
+        )
     from palpate.maps.result import map_of
 
     one = OneLog(

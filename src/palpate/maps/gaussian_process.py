@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangular
 from scipy.optimize import minimize
-from scipy.spatial.distance import cdist
+from scipy.spatial.distance import cdist, pdist
 
 from palpate.arrays import Array
 
@@ -25,9 +26,11 @@ SMOOTH, ROUGH = 5.0**0.5, 3.0**0.5
 """Factors of the distance in the Matern correlations (eq. 4.17)."""
 BLOCK = 300
 """Presses of one likelihood: of more, random blocks are independent (composite likelihood), so that time is linear."""
-CHUNK = 10_000
-"""Covariances of one part of a prediction: few enough for a processor's cache, and for BLAS to start no threads of its
-own, which on a busy machine wait for each other a hundred times longer than they compute."""
+CHUNK = 8_000
+"""Covariances of one part of a prediction: few enough for a processor's cache."""
+PRODUCT = 800_000
+"""Multiplications of one matrix product: so few that BLAS starts no threads of its own, which on a busy machine
+wait for each other a hundred times longer than they compute."""
 LEAST_WEIGHT = 0.02
 """Of a set of parameters that counts; `benchmarks/maps/coverage.py` prints the same coverage without this bound."""
 
@@ -96,38 +99,26 @@ class Conditioned:
         return cholesky(K, lower=True, check_finite=False)
 
     @cached_property
-    def ones(self) -> Array:
-        """The regressor of the mean, whitened (n,)."""
-        return solve_triangular(self.factor, np.ones(len(self.values)), lower=True, check_finite=False)
-
-    @cached_property
-    def level(self) -> float:
-        """Mean over the surface by generalised least squares."""
-        return float(
-            self.ones @ solve_triangular(self.factor, self.values, lower=True) / (self.ones @ self.ones)
-        )
-
-    @cached_property
-    def weights(self) -> Array:
-        """Weight of each value's covariance in the prediction (n,)."""
-        return cho_solve((self.factor, True), self.values - self.level, check_finite=False)
-
-    @cached_property
-    def whitening(self) -> Array:
-        """Inverse of the factor (n, n)."""
-        return solve_triangular(self.factor, np.eye(len(self.values)), lower=True, check_finite=False)
-
-    def predict(self, distance: Array) -> tuple[Array, Array]:
-        """Mean (m,) and variance (m,) of the field at distances (n, m) [m] from the values' places (eq. 2.42)."""
-        mean, reduced, left = self._reduce(distance)
-        variance = self.parameters.variance - np.einsum("ij,ij->j", reduced, reduced) + left**2
-        return mean, np.maximum(variance, 0.0)
+    def reduction(self) -> Reduction:
+        """Linear rows over the values that give the field elsewhere."""
+        W = solve_triangular(self.factor, np.eye(len(self.values)), lower=True, check_finite=False)
+        ones = W.sum(axis=1)
+        unknown = 1.0 / float(np.linalg.norm(ones))
+        level = unknown**2 * float(ones @ (W @ self.values))
+        rows = np.vstack([W, W.T @ (W @ (self.values - level)), unknown * (ones @ W)])
+        return Reduction(self.parameters, rows, level, unknown, self.parameters.variance)
 
     def covariance(self, places: Array) -> Array:
         """Covariance of the field at places (m, d), given the values (m, m)."""
-        _, reduced, left = self._reduce(cdist(self.places, places))
-        prior = self.parameters.covariance(cdist(places, places))
-        return prior - reduced.T @ reduced + np.outer(left, left)
+        parameters, found = self.parameters, self.reduction
+        out = _product(found.rows, parameters.covariance(cdist(self.places, places)))
+        reduced, left = out[:-2], found.unknown - out[-1]
+        total = np.outer(left, left) - _product(reduced.T, reduced)
+        upper = np.triu_indices(len(places), 1)
+        total[upper] += parameters.covariance(pdist(places))
+        total.T[upper] = total[upper]
+        total[np.diag_indices_from(total)] += parameters.variance
+        return total
 
     def leave_one_out(self) -> Array:
         """Deviation of each value from what the others foretell, by its standard deviation (n,) (section 5.4.2)."""
@@ -136,12 +127,40 @@ class Conditioned:
         inverse -= np.outer(w, w) / w.sum()
         return (inverse @ self.values) / np.sqrt(np.diag(inverse))
 
-    def _reduce(self, distance: Array) -> tuple[Array, Array, Array]:
-        """Mean, what the values take off the covariance, and what the mean's uncertainty adds."""
-        k = self.parameters.covariance(distance)
-        reduced = self.whitening @ k
-        left = (1.0 - self.ones @ reduced) / np.sqrt(self.ones @ self.ones)
-        return self.level + self.weights @ k, reduced, left
+
+@dataclass(frozen=True)
+class Reduction:
+    """The field elsewhere by linear rows over the values: for one set of parameters, or for k sets at once.
+
+    Args:
+        parameters: of the processes, each a number or (k, 1, 1).
+        rows: over the covariances with the values (..., n + 2, n): the inverse of the factor, the weights of the mean,
+            and those of the unknown level.
+        level: mean over the surface by generalised least squares, a number or (k, 1).
+        unknown: its standard deviation, alike.
+        prior: variance of the field before any value, alike.
+    """
+
+    parameters: Hyperparameters
+    rows: Array
+    level: Any
+    unknown: Any
+    prior: Any
+
+    def predict(self, distance: Array) -> tuple[Array, Array]:
+        """Mean and variance (..., m) of the field at distances (n, m) [m] from the values' places (eq. 2.42)."""
+        k, half = self.parameters.covariance(distance), len(distance) // 2
+        first = self.rows[..., :half, :half] @ k[..., :half, :]  # the inverse of the factor is triangular
+        rest = self.rows[..., half:, :] @ k
+        reduction = (np.einsum("...ij,...ij->...j", part, part) for part in (first, rest[..., :-2, :]))
+        variance = self.prior - sum(reduction) + (self.unknown - rest[..., -1, :]) ** 2
+        return self.level + rest[..., -2, :], np.maximum(variance, 0.0)
+
+
+def _product(left: Array, right: Array) -> Array:
+    """The product of two matrices by parts of the left one's rows, each so small that BLAS starts no threads."""
+    parts = np.array_split(left, max(left.size * right.shape[1] // PRODUCT, 1))
+    return np.concatenate([part @ right for part in parts])
 
 
 @dataclass(frozen=True)
@@ -213,18 +232,25 @@ class GaussianProcess:
         """Standard deviation from press to press at one place, beyond what each press states."""
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
 
+    @cached_property
+    def _reduction(self) -> Reduction:
+        """Those of all nodes, one above the other."""
+        parts = [node.reduction for node in self.nodes]
+        each = np.array([astuple(part.parameters) for part in parts]).T[:, :, None, None]
+        scalars = np.array([(part.level, part.unknown, part.prior) for part in parts]).T[:, :, None]
+        return Reduction(Hyperparameters(*each), np.array([part.rows for part in parts]), *scalars)
+
     def predict(self, places: Array) -> tuple[Array, Array]:
         """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture."""
 
         def moments(part: Array) -> Array:
-            distance = cdist(self.likeliest.places, part)
-            means, variances = np.moveaxis(np.array([node.predict(distance) for node in self.nodes]), 1, 0)
+            means, variances = self._reduction.predict(cdist(self.likeliest.places, part))
             mean = self.weights @ means
             return np.array([mean, self.weights @ (variances + (means - mean) ** 2)])
 
-        for node in self.nodes:
-            node.whitening, node.weights  # noqa: B018 - of all parts
-        size = max(CHUNK // len(self.likeliest.values), 16)
+        self._reduction  # noqa: B018 - of all parts
+        n = len(self.likeliest.values)
+        size = max(min(CHUNK // n, PRODUCT // n**2), 16)
         parts = [places[first : first + size] for first in range(0, len(places), size)]
         with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
             mean, variance = np.concatenate([np.empty((2, 0)), *pool.map(moments, parts)], axis=1)

@@ -78,7 +78,7 @@ def choose(
     """
     left, last = covariance.copy(), -1
     while True:
-        gain = weights @ (left * left) / (np.diag(left) + noise)
+        gain = np.einsum("i,ij,ij->j", weights, left, left) / (np.diag(left) + noise)
         if cost is not None:
             gain = gain / (1.0 + cost[last])
         last = int(np.argmax(gain))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -101,16 +100,27 @@ class MapResult:
     @cached_property
     def fields(self) -> dict[str, Prediction]:
         """Further fields at the grid, by name: those that vary, over presses that span a surface."""
-        found = {}
-        for name, values in self.presses.fields.items():
-            known = np.isfinite(values)
-            if known.sum() < LEAST or np.ptp(values[known]) <= 1e-9 * np.abs(values[known]).max():
-                continue
-            field = FieldMap(name=name)
-            field.update(self.presses.places[known], values[known])
-            with suppress(InputError):
-                found[name] = field.predict(self.grid.places)
-        return found
+        found = {name: self._field(name) for name in self.presses.fields}
+        return {name: field for name, field in found.items() if not isinstance(field, str)}
+
+    @property
+    def unmapped(self) -> dict[str, str]:
+        """Further quantities of the presses without a map, by name, each with the reason."""
+        return {name: str(self._field(name)) for name in self.presses.fields if name not in self.fields}
+
+    def _field(self, name: str) -> Prediction | str:
+        values = self.presses.fields[name]
+        known = np.isfinite(values)
+        if known.sum() < LEAST:
+            return f"{known.sum()} presses show it, a map needs {LEAST}"
+        if np.ptp(values[known]) <= 1e-9 * np.abs(values[known]).max():
+            return "it is the same at every press"
+        field = FieldMap(name=name)
+        field.update(self.presses.places[known], values[known])
+        try:
+            return field.predict(self.grid.places)
+        except InputError as error:
+            return str(error)
 
     @cached_property
     def film(self) -> list[tuple[int, Prediction]]:
@@ -121,7 +131,7 @@ class MapResult:
         frames = []
         for k in map(int, counts):
             first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
-            mean, variance = first.predict(distance[:k])
+            mean, variance = first.reduction.predict(distance[:k])
             frames.append((k, Prediction(mean, np.sqrt(variance), np.sqrt(variance), self.request.common)))
         return frames
 

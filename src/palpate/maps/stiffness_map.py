@@ -205,6 +205,10 @@ class FieldMap:
         if not 1 <= count <= MOST_PRESSES:
             raise InputError(f"the next presses must be 1 to {MOST_PRESSES}, got {count}")
         among = self._candidates() if candidates is None else np.asarray(candidates, dtype=float)
+        if start is not None and np.shape(start) != among.shape[1:]:
+            raise InputError(
+                f"the robot stands at {np.size(start)} coordinates, the map has places of {among.shape[1]}"
+            )
         mean, variance = self.process.predict(among)
         level = np.log(stiffer_than) if stiffer_than is not None and self.logarithmic else stiffer_than
         weights = importance(goal, mean, variance, level)

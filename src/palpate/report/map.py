@@ -70,6 +70,7 @@ def warnings(result: MapResult) -> list[str]:
     if result.disagreeing:
         named = ", ".join(result.presses.names[i] for i in result.disagreeing[:5])
         lines.append(f"their neighbours contradict {named}: press there again")
+    lines += [f"no map of {name}: {why}" for name, why in result.unmapped.items()]
     return lines
 
 
@@ -232,11 +233,15 @@ def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
 def draw_map(result: MapResult) -> Figure:
     """The stiffness over the surface, the presses, the contour of the threshold and its band."""
     from matplotlib.colors import LogNorm
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
     seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
     with style.inked(9.0):
         figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
-        bar.ax.xaxis.set_minor_formatter("{x:g}")
+        low, high = bar.ax.get_xlim()
+        steps = MaxNLocator(5, steps=(1, 2, 5, 10)) if high < 8.0 * low else LogLocator(subs=(1.0, 2.0, 5.0))
+        bar.ax.xaxis.set_major_locator(steps)
+        bar.ax.xaxis.set_minor_formatter(NullFormatter())
         if threshold is not None:
             probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
             axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
@@ -319,18 +324,22 @@ def draw_cut(result: MapResult) -> Figure:
     with style.inked():
         figure, (axis,) = style.figure(height=2.6)
         x = 1e3 * length * steps
-        axis.fill_between(x, *seen.ci95.T, color=style.K, alpha=0.2, linewidth=0, label="95 %")
         axis.plot(x, seen.stiffness, color=style.K, linewidth=1.6, label="stiffness")
-        for ends, name in zip(seen.next95.T, ("next press, 95 %", None), strict=True):
-            axis.plot(x, ends, color=style.K, linewidth=0.9, linestyle=":", label=name)
+        for both, line, label in ((seen.ci95, "--", "95 %"), (seen.next95, ":", "next press, 95 %")):
+            for ends, name in zip(both.T, (label, None), strict=True):
+                axis.plot(x, ends, color=style.K, linewidth=0.9, linestyle=line, label=name)
         if near.any():
-            label = f"presses within {plain(50 * length, 2)} mm"
-            axis.plot(
-                1e3 * along[near], result.map.stiffness[near], "o", color=style.INK, markersize=4, label=label
-            )
+            label, order = f"presses within {plain(50 * length, 2)} mm", np.argsort(along[near])
+            at, values = 1e3 * along[near][order], result.map.stiffness[near][order]
+            axis.plot(at, values, "o", color=style.INK, markersize=4, label=label)
         if result.request.stiffer_than is not None:
             axis.axhline(result.request.stiffer_than, **style.KNOWN, label="threshold")
-        axis.set(xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]))
+        axis.set(
+            xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]), yscale="log"
+        )
+        low = axis.get_ylim()[0]
+        power = 10.0 ** np.floor(np.log10(low))
+        axis.set_ylim(bottom=power * np.floor(low / power))  # on a page steps are counted from here
         style.logarithmic(axis, "y")
         style.legend(axis)
     return figure
