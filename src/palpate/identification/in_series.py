@@ -167,7 +167,7 @@ def slope_without_series(value: float, half: float, series: float, series_std: f
 def slope_budget(
     contributions: Contributions, value: float, series: float, series_std: float
 ) -> dict[str, Contribution]:
-    """What each cause adds to the uncertainty of such a slope.
+    """Contribution of each cause to the uncertainty of such a slope.
 
     Args:
         contributions: to that of the log's own slope.

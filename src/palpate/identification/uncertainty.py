@@ -50,7 +50,7 @@ def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
 
 
 class Contribution(NamedTuple):
-    """What one cause adds to the uncertainty of a result.
+    """Contribution of one cause to the uncertainty of a result.
 
     Args:
         std: standard uncertainty, in the unit of the result.

@@ -139,6 +139,6 @@ class Answer:
         return replace(self, theta=theta, cov=jacobian @ self.cov @ jacobian.T, budget=budget)
 
     def contributions(self, name: str) -> Contributions:
-        """What each cause adds to the uncertainty of one parameter."""
+        """Contribution of each cause to the uncertainty of one parameter."""
         place = self.names.index(name)
         return {cause: part.at(place) for cause, part in self.budget.items()}

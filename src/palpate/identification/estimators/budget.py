@@ -45,7 +45,7 @@ class Spread:
         return Spread(self.variance[places], np.broadcast_to(self.freedom, self.variance.shape)[places])
 
     def at(self, place: int) -> Contribution:
-        """What it adds to the uncertainty of one parameter."""
+        """Contribution to the uncertainty of one parameter."""
         freedom = np.broadcast_to(self.freedom, self.variance.shape)
         return Contribution(float(np.sqrt(self.variance[place])), float(freedom[place]))
 
