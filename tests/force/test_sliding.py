@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,10 @@ from palpate.force.sliding.ground import ground_of
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from
 from palpate.force.sliding.slide_world import directions, figures_of, simulate
-from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, begin, correct, predict
+from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Observation, begin, correct, predict
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "force"))
+from sliding_rivals import RIVALS
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -58,7 +63,7 @@ def test_a_force_is_held_along_surfaces_with_friction(arm: str, shape: str) -> N
     assert found.normal < np.radians(0.5)
     assert min(found.cone, found.friction) > 0.9
     fixed = figures_of(
-        simulate(gains, ground, ways, into=[0.1, 0.05, -1.0], rival="fixed normal"), gains, ground
+        simulate(gains, ground, ways, into=[0.1, 0.05, -1.0], control=RIVALS["fixed normal"]), gains, ground
     )
     assert not fixed.obeys
 
@@ -220,10 +225,10 @@ def test_a_contact_that_sticks_tells_nothing_of_friction() -> None:
     s, work = np.zeros(COVARIANCE + STATES * STATES + 1), np.zeros(STATES)
     begin(s, 15.0, 0.1, 10.0, 5e3, 0.1, 0.35, 0.3, 0.1)
     before = s[COVARIANCE + 7 * (STATES + 1)]
-    correct(s, 1, 1.0, 8, 1.0, 9, 0.0, 0.0, 4e-5, 1e9, work)
+    correct(s, Observation(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     for _ in range(10):  # 0.1 mm, a fortieth of the way on which it sticks
         predict(s, 1e-5, 0.0, 0.0, 0.85, 1e3, 0.0)
-        correct(s, 1, 1.0, 8, 1.0, 9, 0.0, 0.0, 4e-5, 1e9, work)
+        correct(s, Observation(1, 1.0, 8, 1.0, 9, 0.0), 0.0, 4e-5, 1e9, work)
     assert s[COVARIANCE + 7 * (STATES + 1)] > 0.9 * before
 
 

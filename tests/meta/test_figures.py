@@ -19,7 +19,6 @@ UNMARKED = {
     "docs/excite.md": 2,
     "docs/force.md": 7,
     "docs/identify.md": 2,
-    "docs/moving.md": 3,
     "docs/online.md": 3,
     "docs/speed.md": 3,
 }

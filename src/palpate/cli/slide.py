@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,15 +14,17 @@ from palpate.cli._program import command
 from palpate.cli._terminal import console, place
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.force import with_slide
-from palpate.cli.options.names import QUIET, LoopArm
+from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.values import vector
-from palpate.errors import InputError
+from palpate.errors import InputError, unknown
 from palpate.files import RECORD, fresh_folder, signed, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
+    from palpate.arrays import Array
     from palpate.force import Gains
     from palpate.force.sliding.ground import Ground
+    from palpate.press.sliding import JointedArm
 
 _SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
 
@@ -40,7 +43,8 @@ class SlideOptions:
     speed
         Along the surface, as 30:mm/s.
     shape
-        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm.
+        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
+        mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms).
     surface
         K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck).
     path
@@ -61,6 +65,8 @@ class SlideOptions:
         Spacing of three light touches that measure the normal before the slide; 0:mm for none.
     gains
         Gains from palpate tune --slide; made for the arm if left out.
+    physics
+        own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms).
     seed
         Of the noise.
     """
@@ -79,14 +85,13 @@ class SlideOptions:
     step: Annotated[str, SIGNED] = "0:mm"
     touches: Annotated[str, SIGNED] = "10:mm"
     gains: Path | None = None
+    physics: Annotated[Physics, QUIET] = "own"
     seed: Annotated[int, WHOLE, Parameter(group=Group("Noise", sort_key=2))] = 0
 
-    def ground(self) -> tuple[Ground, float]:
-        """The surface, and its radius [m]."""
+    def ground(self, ways: Array, speed: float, rate: float) -> Ground:
+        """The surface under a path."""
         from palpate.force.sliding.ground import ground_of
 
-        name, _, size = self.shape.partition(":")
-        radius = in_si("--shape", size, "length") if size else 0.2
         numbers: dict[str, float] = {}
         for part in self.surface.split(","):
             key, _, text = (word.strip() for word in part.partition("="))
@@ -96,13 +101,54 @@ class SlideOptions:
                 raise InputError(
                     f"--surface needs K=..,B=..,mu=.. as numbers, as K=20000,mu=0.3; got {self.surface!r}"
                 ) from None
-        height = {"height": radius, "period": 0.02} if name == "step" else {}
-        return ground_of(
-            name, 0.2 if name == "step" else radius, numbers.pop("stiffness", 0.0), **numbers, **height
-        ), radius
+        name, _, size = self.shape.partition(":")
+        stiffness, heights = numbers.pop("stiffness", 0.0), None
+        if name == "mesh":
+            from palpate.force.sliding.mesh import heights_of
 
-    def tuned(self, radius: float) -> Gains:
-        """Gains for the slide."""
+            file, _, unit = size.rpartition(":")
+            if not file:
+                raise InputError(
+                    f"--shape mesh needs a file and its unit, as mesh:part.stl:mm; got {self.shape!r}"
+                )
+            way = speed / rate * ways.cumsum(axis=0)
+            heights = heights_of(Path(file), in_si("--shape", f"1:{unit}", "length"), float(abs(way).max()))
+        height = {"height": self.radius, "period": 0.02} if name == "step" else {}
+        radius = 0.2 if name == "step" else self.radius
+        return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the shape, or its height [m]; of a plane or a mesh the smallest radius that is expected."""
+        name, _, size = self.shape.partition(":")
+        if name in {"plane", "mesh"} or not size:
+            return 0.1 if name == "mesh" else 0.2
+        radius = in_si("--shape", size, "length")
+        if not 1e-3 <= abs(radius) <= 1e4 and name != "step":
+            raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
+        return radius
+
+    @cached_property
+    def joints(self) -> JointedArm:
+        """The arm with its joints, for MuJoCo's physics."""
+        from palpate.press.engines import ENGINES
+        from palpate.press.sliding import jointed_arm
+
+        if self.physics not in ENGINES:
+            raise unknown("physics", self.physics, ENGINES)
+        return jointed_arm(self.arm)
+
+    def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
+        """Rows of the slide."""
+        into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
+        if self.physics == "own":
+            from palpate.force.sliding.slide_world import simulate
+
+            return simulate(gains, ground, ways, into=into, seed=self.seed)
+        return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
+
+    def tuned(self) -> Gains:
+        """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
         from msgspec.structs import replace as msgspec_replace
 
         from palpate.force import load_arm, load_gains
@@ -114,8 +160,10 @@ class SlideOptions:
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
-        gains = gains_for(load_arm(self.arm), wanted)
-        return with_slide(gains, self.mu_max, self.speed, f"{radius:g}", self.tilt, self.step, self.touches)
+        gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
+        return with_slide(
+            gains, self.mu_max, self.speed, f"{abs(self.radius):g}", self.tilt, self.step, self.touches
+        )
 
 
 def slide(
@@ -142,12 +190,11 @@ def slide(
         Print one JSON object and nothing else.
     """
     from palpate.force.sliding.slide_domain import numbers_of
-    from palpate.force.sliding.slide_world import GAP, directions, simulate
+    from palpate.force.sliding.slide_world import GAP, directions
     from palpate.report.slide import sentence, summarise, write_report
 
     asked = asked or SlideOptions()
-    ground, radius = asked.ground()
-    gains = asked.tuned(abs(radius))
+    gains = asked.tuned()
     slide_numbers = numbers_of(gains)
     if not 1.0 <= asked.seconds <= 600.0:
         raise InputError(f"--seconds must be from 1 to 600, got {asked.seconds:g}")
@@ -155,12 +202,14 @@ def slide(
     if not length >= GAP:
         raise InputError(f"--length must be at least {1e3 * GAP:g} mm, got {1e3 * length:g} mm")
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, length)
+    ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
-    into = vector("normal", asked.normal, "number")
     with fresh_folder(folder, replace=replace) as fresh:
-        rows = simulate(gains, ground, ways, into=into or (0.0, 0.0, -1.0), seed=asked.seed)
-        head = {"command": printable(command()), "seed": asked.seed, "shape": asked.shape, "path": asked.path}
-        summary: dict[str, Any] = signed({**head, **summarise(rows, gains, ground)})
+        rows = asked.run(gains, ground, ways)
+        head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
+        summary: dict[str, Any] = signed(
+            {"command": printable(command()), **head, **summarise(rows, gains, ground)}
+        )
         write_report(rows, gains, summary, fresh, RECORD)
         write_json(fresh / "summary.json", summary)
     if json:

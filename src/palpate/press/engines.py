@@ -89,11 +89,23 @@ class ByMuJoCo:
                 self._engine.mj_step1(self._model, data)
                 tip = self._fill(body)
                 time = (k * cell.steps + j + 1) * cell.step
-                touch = self._step(cell, body, touch, tip, setpoint, time, noise)
-                data.qfrc_applied[dofs] = body.drive - body.normal * max(touch.force, 0.0)
+                touch = self._contact(cell, body, touch, tip, setpoint, time, noise)
+                data.qfrc_applied[dofs] = body.drive - self._load(body, touch)
                 self._engine.mj_step2(self._model, data)
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
         return touch
+
+    # More than seven arguments: those of the compiled step.
+    def _contact(
+        self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
+    ) -> Touch:
+        """Drives, contact and sensor after a step."""
+        after: Touch = self._step(cell, body, touch, tip, setpoint, time, noise)
+        return after
+
+    def _load(self, body: Body, touch: Touch) -> Array:
+        """Torques of the contact force [N m, N], shape (n,)."""
+        return np.asarray(body.normal * max(touch.force, 0.0))
 
     def _fill(self, body: Body) -> Tip:
         """Puts M, h, J of this moment into the body's room; the tip."""

@@ -62,7 +62,7 @@ class SimulatedArm:
         loop: its inner loop and its sensor.
         place: where it starts.
         cell: of the same.
-        physics: own or mujoco.
+        physics: own or mujoco, or an engine of its own.
         seed: of the noise.
         resolution: of a joint's position [rad, m]; 0 for encoders that see everything.
     """
@@ -73,7 +73,7 @@ class SimulatedArm:
         loop: Arm,
         place: Place,
         cell: Cell,
-        physics: str = "own",
+        physics: str | Engine = "own",
         seed: int = 0,
         resolution: float = ENCODER,
     ):
@@ -86,7 +86,8 @@ class SimulatedArm:
         self._body = body_at(place.q, place.q + sag)
         first = Reading(ZERO3, 0.0, 0.0, 0.0)
         self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
-        self._engine: Engine = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
+        by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
+        self._engine: Engine = by_name if isinstance(physics, str) else physics
         self._k, self.zero = 0, 0.0
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
         self._saturated = np.zeros(arm.joints)

@@ -16,6 +16,7 @@ from palpate.contact_frame import Payload
 from palpate.contact_frame.tool_payload import side_of
 from palpate.errors import InputError
 from palpate.force.guard import BEYOND, DRIFTS, LATE, SWINGS, TROUBLES
+from palpate.force.sliding.slide_state import AWAY, JERKS, LOST, REFUTED, SLIDING_TROUBLES, STEPPED
 from palpate.press.cell import NO_TOOL, HeldTool
 from palpate.robots.serial.chain import spread_of
 from palpate.robots.serial.serial_arm import SerialArm
@@ -149,8 +150,9 @@ class Wire(Protocol):
         ...
 
 
-BORNE = {TROUBLES[code] for code in (LATE, DRIFTS, BEYOND, SWINGS)}
-"""Troubles with which a press goes on, however long they last."""
+_SLIDES = REFUTED, STEPPED, JERKS, LOST, AWAY
+BORNE = {SLIDING_TROUBLES[code] for code in (LATE, DRIFTS, BEYOND, SWINGS, *_SLIDES)}
+"""Troubles with which a press or a slide goes on, however long they last."""
 
 
 class Troubles:

@@ -3,18 +3,24 @@
 The surface's own axes are x and y along it at its first point and z out of it.
 """
 
+from math import inf
 from typing import NamedTuple
+
+import numpy as np
 
 from palpate._jit import law, part
 from palpate._vector import Vec3, cos, sin, sqrt
+from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.force.sliding.slide_state import unit
 
-PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP = (float(i) for i in range(8))
+PLANE, SPHERE, BOWL, CYLINDER, SADDLE, WAVES, EGGS, STEP, MESH = (float(i) for i in range(9))
 SHAPES = {
     "plane": PLANE, "sphere": SPHERE, "bowl": BOWL, "cylinder": CYLINDER, "saddle": SADDLE, "waves": WAVES,
-    "eggs": EGGS, "step": STEP,
+    "eggs": EGGS, "step": STEP, "mesh": MESH,
 }  # fmt: skip
+SPACING = 2.5e-4
+"""Of the grid of a mesh [m]."""
 ELASTIC = 0.85
 """Tangential over normal stiffness of the simulated contact if none is given."""
 
@@ -34,6 +40,8 @@ class Ground(NamedTuple):
         sticking: mu of a contact at rest, at least `friction`.
         creep: speed over which one becomes the other [m/s].
         ratio: tangential over normal stiffness.
+        heights: of a mesh over a grid about the first point [m], shape (n, n).
+        spacing: of the grid [m].
     """
 
     shape: float
@@ -46,6 +54,8 @@ class Ground(NamedTuple):
     sticking: float
     creep: float
     ratio: float
+    heights: Array
+    spacing: float
 
 
 @law
@@ -73,6 +83,8 @@ def outside(ground, p):
 def height_at(ground, x, y):
     """Height of a surface that is one over the plane [m], and its slopes."""
     R, k = ground.radius, 6.283185307179586 / ground.period
+    if ground.shape == MESH:
+        return of_grid(ground.heights, ground.spacing, x, y)
     if ground.shape == SADDLE:
         return 0.5 * (x * x - y * y) / R, x / R, -y / R
     if ground.shape == EGGS:
@@ -88,7 +100,36 @@ def height_at(ground, x, y):
     return ground.height * u * u * (3.0 - 2.0 * u), ground.height * 6.0 * u * (1.0 - u) / 2e-3, 0.0
 
 
-def ground_of(shape: str, radius: float, stiffness: float, **others: float) -> Ground:
+@law
+def of_grid(heights, spacing, x, y):
+    """Height between the points of a grid and its slopes, by Catmull-Rom's cubics: the slopes are continuous."""
+    half = len(heights) // 2
+    most = len(heights) - 3.0
+    u, v = min(max(x / spacing + half, 1.0), most), min(max(y / spacing + half, 1.0), most)
+    i, j = int(u), int(v)
+    h = hx = hy = 0.0
+    for a in range(4):
+        for b in range(4):
+            (p, dp), (q, dq), z = cubic(a, u - i), cubic(b, v - j), heights[i + a - 1, j + b - 1]
+            h, hx, hy = h + p * q * z, hx + dp * q * z, hy + p * dq * z
+    return h, hx / spacing, hy / spacing
+
+
+@law
+def cubic(place, t):
+    """Weight of one of four points about a place between the middle two, and its derivative."""
+    if place == 0:
+        return -0.5 * t * (1.0 - t) ** 2, -0.5 * (1.0 - t) * (1.0 - 3.0 * t)
+    if place == 1:
+        return 1.0 - 2.5 * t * t + 1.5 * t**3, -5.0 * t + 4.5 * t * t
+    if place == 2:
+        return 0.5 * t + 2.0 * t * t - 1.5 * t**3, 0.5 + 4.0 * t - 4.5 * t * t
+    return 0.5 * t * t * (t - 1.0), 0.5 * t * (3.0 * t - 2.0)
+
+
+def ground_of(
+    shape: str, radius: float, stiffness: float, *, heights: Array | None = None, **others: float
+) -> Ground:
     """A surface; `others` as `Ground` has them.
 
     Raises:
@@ -99,13 +140,19 @@ def ground_of(shape: str, radius: float, stiffness: float, **others: float) -> G
     friction = others.get("friction", 0.0)
     numbers = {
         "radius": radius, "period": 2.0 * radius, "height": 0.0, "stiffness": stiffness, "damping": 0.0,
-        "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC, **others,
+        "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC,
+        "spacing": SPACING, **others,
     }  # fmt: skip
-    low = [f"{name} of {value:g}" for name, value in numbers.items() if value < 0.0 and name != "height"]
+    low = [
+        f"{name} of {value:g}"
+        for name, value in numbers.items()
+        if not 0.0 <= value < inf and name != "height"
+    ]
     if low or not radius > 0.0 or not stiffness > 0.0:
         raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
     if numbers["sticking"] < numbers["friction"]:
         raise InputError(
             f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"
         )
-    return Ground(SHAPES[shape], **{name: float(value) for name, value in numbers.items()})
+    grid = np.zeros((4, 4)) if heights is None else heights
+    return Ground(SHAPES[shape], heights=grid, **{name: float(value) for name, value in numbers.items()})

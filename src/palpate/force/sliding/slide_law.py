@@ -82,15 +82,16 @@ from palpate.force.sliding.tangent_filter import (
     G2,
     MU,
     STIFF,
+    Observation,
     begin,
     correct,
     predict,
     slope_variance,
     stiffness_of,
-    turned,
+    turn,
     variance,
 )  # fmt: skip
-from palpate.force.sliding.touches import next_touch, touched
+from palpate.force.sliding.touches import enter_touch, next_touch
 from palpate.force.stage import LOCKED
 
 CONE = 0.07
@@ -193,7 +194,7 @@ def press_tick(law, s, late, desired, force, position, missed):
         stiffness = max(c.cap * press.known.found.x, c.floor)
         if s[TOUCHES] < ALL:
             over, sd = press.watch.mean - press.watch.rest - desired, c.cap * press.known.std.x
-            touched(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
+            enter_touch(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
             return ZERO3
         tilt = 2.0 * s[SLOPE] * s[SLOPE] * (1.0 + c.compliance * stiffness)
         relative = min(sqrt((c.cap * press.known.std.x / stiffness) ** 2 + tilt * tilt), 0.5)
@@ -243,20 +244,20 @@ def learn(law, s, work, late, desired, force):
     friction = variance(s, F1, F1) + variance(s, F2, F2)
     curved = N * N * slope * (friction + slope)
     w1, w2 = -N * s[F1] / s[STIFF], -N * s[F2] / s[STIFF]
-    jump = correct(s, FORCE, 1.0, G1, w1, G2, w2, f - N, noise + curved, GATE, work)
+    jump = correct(s, Observation(FORCE, 1.0, G1, w1, G2, w2), f - N, noise + curved, GATE, work)
     if abs(jump) > GATE:
         halt(s, n, STEPPED)
         return
     angle, w = noise / (f * f) * max(1.0, s[ROUGH]), 1.0 / s[STIFF]
-    one = correct(s, G1, w, F1, 1.0, F2, 0.0, f1 / f - w * s[G1] - s[F1], angle, 1e9, work)
-    two = correct(s, G2, w, F2, 1.0, F1, 0.0, f2 / f - w * s[G2] - s[F2], angle, 1e9, work)
+    one = correct(s, Observation(G1, w, F1, 1.0, F2, 0.0), f1 / f - w * s[G1] - s[F1], angle, 1e9, work)
+    two = correct(s, Observation(G2, w, F2, 1.0, F1, 0.0), f2 / f - w * s[G2] - s[F2], angle, 1e9, work)
     both = 0.5 * (one * one + two * two) * max(1.0, s[ROUGH])
     s[ROUGH] += 0.02 * (min(both, 100.0) - s[ROUGH])
     if s[ROUGH] > JERKY and s[TROUBLE] == FINE:
         s[TROUBLE] = JERKS
     s[MU], s[FORCE] = min(max(s[MU], 0.0), law.mu_max), max(s[FORCE], 0.0)
     s[STIFF] = max(s[STIFF], 0.05)
-    t1, t2 = turned(s)
+    t1, t2 = turn(s)
     n = unit(n + t1 * e1 + t2 * e2, n)
     put_vector(s, NORMAL, n)
     put_vector(s, EDGE, unit(e1 - (e1 @ n) * n, beside(n)))

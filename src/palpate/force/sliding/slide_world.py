@@ -4,8 +4,9 @@ Nothing of the filter is in here: friction is a bristle that sticks until mu N (
 (Stribeck), shapes are distance functions.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,24 +15,21 @@ from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3, exp, sqrt
 from palpate.arrays import Array
 from palpate.errors import unknown
-from palpate.force.flat import flattened
 from palpate.force.gains import Gains
-from palpate.force.law import gain
 from palpate.force.simulated_press import world_of
 from palpate.force.sliding.ground import Ground, outside
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import (
-    BOUND,
     NORMAL,
     PHASE,
     SIZE,
     SLIDE,
     TROUBLE,
+    Sliding,
     put_vector,
-    unit,
     vector_at,
 )
-from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, Z_95, numbers_in, sliding
+from palpate.force.sliding.sliding_loop import CHI2_95, DOWN, Z_95, sliding
 from palpate.force.sliding.tangent_filter import (
     BASE,
     MU,
@@ -42,10 +40,6 @@ from palpate.force.sliding.tangent_filter import (
     variance,
 )
 
-OWN, FIXED, VELOCITY, FZI, ADMITTANCE = (float(i) for i in range(5))
-LAWS = {
-    "sliding": OWN, "fixed normal": FIXED, "normal from velocity": VELOCITY, "fzi-like": FZI, "admittance": ADMITTANCE,
-}  # fmt: skip
 COLUMNS = (
     "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness",
     "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
@@ -98,74 +92,92 @@ def contact(world, ground, tip, x, v, h):
     return Carried(x, v, x - bent, depth, 1.0, N * n + k * bent, N, mu)
 
 
-# Long, and with more than seven arguments: a kernel that takes numbers, room and what it fills.
+@part
+class Course(NamedTuple):
+    """Course of a run, and room for it.
+
+    Args:
+        start: of the tip [m].
+        directions: for each tick of the slide, shape (m, 3).
+        desired: F_d [N].
+        noise: standard normal numbers, shape (n, 3).
+        line: room for what is on its way, shape (delay + 1, 3).
+        work: room of the law, shape (STATES,).
+    """
+
+    start: Vec3
+    directions: Array
+    desired: float
+    noise: Array
+    line: Array
+    work: Array
+
+
+@part
+class OwnLaw(NamedTuple):
+    """The sliding law as what moves the tip."""
+
+    law: Sliding
+
+    def step(self, s, work, desired, force, position, direction):
+        """Velocity of a tick [m/s]; the state changes in place, its normal and phase are those of the run."""
+        return slide_step(self.law, s, work, desired, force, position, direction, 0.0)
+
+
 @law
-def slide_run(world, ground, numbers, s, rival, start, directions, desired, noise, line, out):
+def slide_run(world, ground, control, s, course, out):
     """A run from free motion until the directions are used up; row k of `out` is `COLUMNS`; returns the rows.
 
     Args:
         world: arm and sensor, each axis alike.
         ground: the surface.
-        numbers: of the sliding law, flat.
-        s: its state, as it starts, shape (SIZE,).
-        rival: one of `LAWS`, which takes over when the force is held for the first time.
-        start: of the tip [m], shape (3,).
-        directions: for each tick of the slide, shape (m, 3).
-        desired: F_d [N].
-        noise: standard normal numbers, shape (n, 3).
-        line: room for what is on its way, shape (delay + 1, 3).
+        control: a part as `OwnLaw`.
+        s: its state, as it starts, shape (SIZE,) or longer.
+        course: of the run.
         out: shape (n, 20).
     """
-    law = numbers_in(numbers)
-    work, h, ticks = directions[0:1, 0].repeat(STATES), world.tick / world.steps, 0
-    tip = Carried(vector_at(start, 0), ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
-    x = y = z = ZERO3
-    reading, command, samples = world.noise * vector_at(noise[0], 0), tip.x, 0.0
-    n_rival, v_rival, filtered = ZERO3, ZERO3, ZERO3
+    h, ticks, samples = world.tick / world.steps, 0, 0.0
+    line, x, y, z = course.line, ZERO3, ZERO3, ZERO3
+    tip = Carried(course.start, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
+    reading, command = world.noise * vector_at(course.noise[0], 0), tip.x
     for i in range(world.delay + 1):
         put_vector(line[i], 0, (1.0 - world.torque) * command)
     for k in range(len(out)):
-        if ticks >= len(directions):
+        if ticks >= len(course.directions):
             return k
-        seen = by_encoder(world, tip.x)
-        wanted = vector_at(directions[ticks], 0)
-        if rival == OWN or ticks == 0:
-            velocity = slide_step(law, s, work, desired, reading, seen, wanted, 0.0)
-            n_rival, filtered = vector_at(s, NORMAL), seen
-        if rival != OWN and ticks > 0:
-            n_rival, velocity = rival_step(
-                law, s, rival, n_rival, v_rival, filtered, seen, reading, wanted, desired
-            )
-            filtered = filtered + (0.05 * world.tick / 2e-3) * (seen - filtered)
-            v_rival = velocity
+        seen, wanted = by_encoder(world, tip.x), vector_at(course.directions[ticks], 0)
+        velocity = control.step(s, course.work, course.desired, reading, seen, wanted)
         ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
         command = command + world.tick * velocity
         pulled = world.torque * (world.stiffness * (command - seen) - world.second * tip.v)
         put_vector(line[world.delay], 0, (1.0 - world.torque) * command + pulled)
         held = vector_at(line[0], 0)
         for i in range(world.delay):
-            for j in range(3):
-                line[i, j] = line[i + 1, j]
+            put_vector(line[i], 0, vector_at(line[i + 1], 0))
         mean = 0.0
         for j in range(world.steps):
-            pull = held - tip.force
-            rate = (
-                world.first * (held - tip.x) - world.second * tip.v
-                if world.torque == 0.0
-                else pull / world.first
-            )
-            v = tip.v + h * rate
-            tip = contact(world, ground, tip, tip.x + h * v, v, h)
+            tip = moved_tip(world, ground, tip, held, h)
             f = tip.force
             x, y, z = world.E @ x + f.x * world.e, world.E @ y + f.y * world.e, world.E @ z + f.z * world.e
             mean += tip.normal
             if (k * world.steps + j + 1) * h >= world.phase + samples / world.sampling:
                 samples += 1.0
                 reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
-                reading = reading + world.noise * vector_at(noise[k], 0)
-        note(ground, s, tip, n_rival, velocity, reading, mean / world.steps, out[k])
+                reading = reading + world.noise * vector_at(course.noise[k], 0)
+        note(ground, s, tip, velocity, reading, mean / world.steps, out[k])
         out[k, 13] = (1.0 if s[PHASE] == SLIDE else 2.0) * min(ticks, 1)
     return len(out)
+
+
+@law
+def moved_tip(world, ground, tip, held, h):
+    """The tip after a step of the physics under what the delay lets through: places [m], or a pull [N]."""
+    if world.torque == 0.0:
+        rate = world.first * (held - tip.x) - world.second * tip.v
+    else:
+        rate = (held - tip.force) / world.first
+    v = tip.v + h * rate
+    return contact(world, ground, tip, tip.x + h * v, v, h)
 
 
 @law
@@ -175,11 +187,10 @@ def by_encoder(world, x):
     return Vec3(step * round(x.x / step), step * round(x.y / step), step * round(x.z / step))
 
 
-# More than seven arguments: all that a row has.
 @law
-def note(ground, s, tip, n, velocity, reading, mean, row):
+def note(ground, s, tip, velocity, reading, mean, row):
     """Fills a row of `COLUMNS`."""
-    _, up = outside(ground, tip.x)
+    (_, up), n = outside(ground, tip.x), vector_at(s, NORMAL)
     row[0] = mean
     put_vector(row, 1, tip.x)
     put_vector(row, 4, n)
@@ -194,27 +205,6 @@ def note(ground, s, tip, n, velocity, reading, mean, row):
     row[19] = tip.friction
 
 
-@law
-def rival_step(law, s, rival, n, v, filtered, seen, force, direction, desired):
-    """A tick of another law from the held force on, with the K_u that the press found: normal and velocity [m/s]."""
-    c = law.press
-    if rival == VELOCITY:
-        moved = seen - filtered
-        size = sqrt(moved @ moved)
-        if size > 5e-4:
-            along = moved / size
-            n = unit(n - 0.05 * (n @ along) * along, n)
-    flat = direction - (direction @ n) * n
-    across = law.speed * flat / max(sqrt(flat @ flat), 0.1)
-    g = gain(c, s[BOUND])
-    if rival == FZI:  # the whole vector of force error moves the tip, and motion is superposed
-        return n, g * (desired * n - force) + across + g * (force - (force @ n) * n) * 0.5
-    if rival == ADMITTANCE:  # M dv/dt + B v = F_d - f.n with B = 1/g and M/B of three lags
-        press = v @ n
-        return n, (press + c.tick / (3.0 * c.theta) * (g * (desired - force @ n) - press)) * n + across
-    return n, g * (desired - force @ n) * n + across
-
-
 compiled_slide = kernel(slide_run)
 
 PATHS = ("line", "back", "circle", "raster")
@@ -222,6 +212,8 @@ GAP = 3e-3
 """Between tip and surface at the start [m]."""
 LONGEST = 30.0
 """Time in which the surface is to be found and the force held [s]."""
+SPARE = 6
+"""Numbers behind the law's state, for laws that it is compared with."""
 SETTLED = 0.5
 """Time after which a slide is judged [s]."""
 
@@ -264,7 +256,7 @@ def simulate(
     *,
     into: ArrayLike = DOWN,
     seed: int = 0,
-    rival: str = "sliding",
+    control: Callable[[Sliding], Any] = OwnLaw,
 ) -> Array:
     """A slide from free motion on: rows of `COLUMNS`, shape (n, 20).
 
@@ -274,23 +266,17 @@ def simulate(
         ways: directions of the slide, tick by tick, shape (m, 3).
         into: direction in which the law looks for the surface, shape (3,).
         seed: of the noise.
-        rival: one of `LAWS`.
+        control: makes what moves the tip out of the law's numbers.
     """
-    if rival not in LAWS:
-        raise unknown("law", rival, LAWS)
     law, arm = sliding(gains, into), gains.arm
-    state = np.zeros(SIZE)
+    state = np.zeros(SIZE + SPARE)
     law.start(state)
     world = world_of(arm, noise=arm.sensor.noise)
-    n = len(ways) + round(LONGEST * arm.rate)
-    out = np.zeros((n, len(COLUMNS)))
-    noise = np.random.default_rng(seed).standard_normal((n, 3))
-    start = -GAP * np.array(law.into) * (-1.0 if law.into.z > 0.0 else 1.0)  # outside, however wrong it is
-    line = np.zeros((world.delay + 1, 3))
-    rows = compiled_slide(
-        world, ground, flattened(law), state, LAWS[rival], start, ways, gains.force, noise, line, out
-    )
-    return out[:rows]
+    out = np.zeros((len(ways) + round(LONGEST * arm.rate), len(COLUMNS)))
+    start = (GAP if law.into.z > 0.0 else -GAP) * law.into  # outside, however wrong it is
+    noise = np.random.default_rng(seed).standard_normal((len(out), 3))
+    course = Course(start, ways, float(gains.force), noise, np.zeros((world.delay + 1, 3)), np.zeros(STATES))
+    return out[: compiled_slide(world, ground, control(law), state, course, out)]
 
 
 @dataclass(frozen=True)

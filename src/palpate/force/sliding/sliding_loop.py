@@ -236,6 +236,16 @@ class SlidingLoop(Readable):
         return Uncertain(float(now.stiffness), float(now.stiffness_std))
 
     @property
+    def state(self) -> Array:
+        """The law's state as flat numbers, shape (SIZE,), changed in place; as the C export has it."""
+        return self._state
+
+    @property
+    def bound(self) -> float:
+        """K_u of the press, by which the gain goes [N/m]; 0 before it."""
+        return float(self._state[places.BOUND])
+
+    @property
     def trouble(self) -> str:
         """Fault of the last tick, in words; empty if there was none."""
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]

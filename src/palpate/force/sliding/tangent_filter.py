@@ -16,7 +16,9 @@ f is three scalar rows: f.n = N - N phi.g, and f_t/f.n = g + phi. The frame turn
 again.
 """
 
-from palpate._jit import law
+from typing import NamedTuple
+
+from palpate._jit import law, part
 from palpate._jit.elementary import exp
 from palpate._vector import sqrt
 
@@ -119,10 +121,21 @@ def predict(s, d1, d2, dz, ratio, turning, noise):
     spread(s, MU, CHANGES[1] ** 2 * way)
 
 
-# More than seven arguments: a row of three entries needs no array.
+@part
+class Observation(NamedTuple):
+    """A reading that is w1 x1 + w2 x2 + w3 x3 of three states."""
+
+    one: int
+    w1: float
+    two: int
+    w2: float
+    three: int
+    w3: float
+
+
 @law
-def correct(s, one, weight1, two, weight2, three, weight3, innovation, noise, gate, work):
-    """A reading that is w1 x1 + w2 x2 + w3 x3 and a noise of this variance; `work` has room for STATES numbers.
+def correct(s, row, innovation, noise, gate, work):
+    """The state after a reading whose noise has this variance; `work` has room for STATES numbers.
 
     K is considered, not corrected: its uncertainty counts, but a slide with a held force says next to nothing of it,
     and motion that noise causes would pull it. Returns the innovation in its standard deviations; beyond `gate` of
@@ -130,8 +143,8 @@ def correct(s, one, weight1, two, weight2, three, weight3, innovation, noise, ga
     """
     for i in range(STATES):
         at = COVARIANCE + STATES * i
-        work[i] = weight1 * s[at + one] + weight2 * s[at + two] + weight3 * s[at + three]
-    total = weight1 * work[one] + weight2 * work[two] + weight3 * work[three] + noise
+        work[i] = row.w1 * s[at + row.one] + row.w2 * s[at + row.two] + row.w3 * s[at + row.three]
+    total = row.w1 * work[row.one] + row.w2 * work[row.two] + row.w3 * work[row.three] + noise
     if not total > 0.0:
         return 0.0
     deviations = innovation / sqrt(total)
@@ -171,7 +184,7 @@ def begin(s, force, slope, curvature, stiffness, relative, mu, mu_std, noise):
 
 
 @law
-def turned(s):
+def turn(s):
     """The frame's turn to the estimated normal (2) [rad]; in the turned frame the slope is zero."""
     t1, t2 = s[G1] / s[STIFF], s[G2] / s[STIFF]
     shear(s, G1, STIFF, -t1)

@@ -30,7 +30,7 @@ CLEARANCE = 1e-3
 
 
 @law
-def touched(law, s, point, unsure):
+def enter_touch(law, s, point, unsure):
     """Enters a touch at a point that is known to `unsure` [m]; three give the normal and its uncertainty."""
     put_vector(s, POINTS + 3 * int(s[TOUCHES]), point)
     s[TOUCHES] += 1.0
