@@ -156,6 +156,14 @@ def test_the_sentence_the_table_and_the_figure(log, capsys):
     assert printed.index("To narrow it: ") < printed.index("95 % verdict") < printed.index("One contact, ")
 
 
+def test_the_uncertainty_budget_follows_the_answer(log, capsys):
+    assert main(["identify", str(log), *OWN, "--no-figure", "--budget"]) == 0
+    text = capsys.readouterr().out
+    assert text.index("all evidence") < text.index("u_c = ") < text.index("Follows the GUM")
+    assert main(["identify", str(log), str(log), *OWN, "--no-figure", "--budget"]) == 2
+    assert "--budget prints the budget of one log" in capsys.readouterr().err
+
+
 def test_all_evidence_is_a_flag_away(log, capsys):
     assert main(["identify", str(log), *OWN, "--no-figure", "--verbose"]) == 0
     printed = " ".join(capsys.readouterr().out.split())

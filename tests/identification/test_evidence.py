@@ -289,7 +289,7 @@ def test_the_rests_of_a_press_in_steps_tell_its_speed_from_its_depth(damping):
     assert slope.stiffness + slope.half >= 2000.0 * (1 - 1e-9)
     assert slope.stiffness - slope.half <= (2000.0 - damping / 0.1) * (1 + 1e-9)
     assert slope.half == pytest.approx(damping / 0.1 / 2, rel=0.02, abs=1e-6)
-    assert slope.half**2 == pytest.approx(sum(part**2 for part in slope.budget.values()))
+    assert slope.half**2 == pytest.approx(sum(part.half**2 for part in slope.contributions.values()))
 
 
 def test_the_slope_is_of_the_last_rise():

@@ -188,7 +188,7 @@ def test_the_tolerance_decides():
 
 def test_calibration_is_in_the_interval():
     p = identify(pressed(), lag=0.0, calibration=0.05).parameters["K"]
-    assert p.budget["calibration"] == pytest.approx(1.96 * 0.05 * p.value, rel=1e-6)
+    assert p.contributions["calibration"].std == pytest.approx(0.05 * p.value, rel=1e-6)
     assert p.ci95[1] - p.value >= p.budget["calibration"]
 
 

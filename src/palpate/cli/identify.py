@@ -93,12 +93,15 @@ class OutputOptions(PictureOptions):
         of each log; of several, n, mean, next press and deviation, too.
     verbose
         Print all evidence: each reason, each warning, both intervals, the slopes of the press.
+    budget
+        Print the uncertainty budget of each number, too: sources, sensitivities, degrees of freedom, coverage factor.
     """
 
     figure: Path | None = None
     dpi: int | None = None
     table: Path | None = None
     verbose: Annotated[bool, FLAG] = False
+    budget: Annotated[bool, FLAG] = False
 
     def paper_table(self) -> Path | None:
         """Path of the table, checked before any work is done."""
@@ -173,6 +176,8 @@ def identify(
     logs = sheets_as_logs(logs, source.names, source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         return _one(log_of(logs[0]), asked, output)
+    if output.budget:
+        raise InputError("--budget prints the budget of one log; --json has those of many")
     from palpate.cli.one_log import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
@@ -207,14 +212,16 @@ def _print(found: Identification, origin: Source, written: list[Path], output: O
 
         print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
         return
-    from palpate.report.identification import answer, table
+    from palpate.report.identification import answer, table, uncertainty
 
     screen = console()
     places = [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in written]
     if not output.verbose:
         more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
         answer.show(found, origin.title, screen, origin.notes, "   ".join([*places, f"all evidence: {more}"]))
-        return
-    table.show(found, origin.title, screen)
-    for line in (*origin.notes, *places):
-        screen.print(line, soft_wrap=True)
+    else:
+        table.show(found, origin.title, screen)
+        for line in (*origin.notes, *places):
+            screen.print(line, soft_wrap=True)
+    if output.budget:
+        uncertainty.show(found, screen)

@@ -13,13 +13,15 @@ class Cause(NamedTuple):
     Args:
         described: a noun phrase, as in `its uncertainty is mostly due to ...`.
         remedy: an imperative.
+        kind: how it is evaluated: A by statistics of the log, B by other means (JCGM 100, 3.3.4).
     """
 
     described: str
     remedy: str
+    kind: str = "B"
 
 
-NOISE = Cause("noise", "press deeper, longer or more often; try palpate excite")
+NOISE = Cause("noise", "press deeper, longer or more often; try palpate excite", "A")
 
 _CAUSES = {
     "noise": NOISE,
@@ -29,10 +31,11 @@ _CAUSES = {
         "let the log begin and end in the air, and press more often",
     ),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
-    "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)"),
-    "blocks": Cause("differences between parts of the log", "press longer, or more often, about one depth"),
-    "repetition": Cause("differences between parts of the log", "press more often"),
-    "strokes": Cause("the difference between loading and unloading", "press more slowly, or more often"),
+    "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
+    "blocks": Cause(
+        "differences between parts of the log", "press longer, or more often, about one depth", "A"
+    ),
+    "repetition": Cause("differences between parts of the log", "press more often", "A"),
     "dynamic stiffness": Cause(
         "the difference between the model and the dynamic stiffness",
         "keep the motion near one frequency and depth",
@@ -60,19 +63,19 @@ _CAUSES = {
         "the compliance in series with the surface", "measure the position nearer to the surface"
     ),
     "tip's mass": Cause("the arm's mass at its tip", "measure the position nearer to the surface"),
-    "tangent": Cause("the slope of the press", "press more often"),
+    "tangent": Cause("the slope of the press", "press more often", "A"),
     "the indenter's law": Cause("the deviation from the indenter's law", "press less deep"),
     "surface position": Cause(
         "the position of the surface", "let the log begin in the air, and approach slowly"
     ),
     "small strain": Cause("a strain that is not small", "press less deep"),
     "Poisson's ratio": Cause("Poisson's ratio", "give --poisson"),
-    "between logs": Cause("differences between the logs", "press more often, at more places"),
+    "between logs": Cause("differences between the logs", "press more often, at more places", "A"),
     "common to all logs": Cause(
         "errors common to all logs (lag, calibration, compliance in series)",
         "calibrate these; more logs do not help",
     ),
-    "each log": Cause("each log's own interval", "make each log longer"),
+    "each log": Cause("each log's own interval", "make each log longer", "A"),
 }
 _UNKNOWN = {"octave": "blocks", "press": "curvature"}
 """The cause of a working point's interval that has no budget, by its source."""

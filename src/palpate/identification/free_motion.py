@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.sensor_path import position_noise
 from palpate.identification.filters.state_variable import Chain, block_means, white_noise
-from palpate.identification.least_squares import Noise, noise_of, quantile
+from palpate.identification.least_squares import Noise, noise_of
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
+from palpate.identification.uncertainty import student
 from palpate.signals.samples import runs
+from palpate.signals.types import NORMAL
 
 Rows = Mask
 
@@ -276,7 +278,7 @@ def _slope(
     own = float(x @ f) / size
     noise = noise_of(f - own * x, rows, len(stays) + 1)
     std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
-    return own, quantile(noise.effective, 2) * std
+    return own, student(noise.effective - 2) * std
 
 
 _ACCELERATED = 10.0
@@ -342,7 +344,7 @@ def payload_of(
     noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
     level = noise.variance * len(force) / noise.effective
     mean = _of_parts(force, motion, stays, level)
-    return Payload(mean.value, mean.half / 1.96) if abs(mean.value) > mean.half else None
+    return Payload(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
 def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:

@@ -8,6 +8,7 @@ found from what they say together: nothing is subtracted from a position that th
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,6 +17,11 @@ from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
+from palpate.identification.uncertainty import Contribution, Contributions
+from palpate.signals.types import NORMAL
+
+Linear = TypeVar("Linear", Answer, Fit)
+"""Parameters with their covariance."""
 
 
 def check(apparent: float, series: float) -> None:
@@ -31,7 +37,7 @@ def check(apparent: float, series: float) -> None:
         )
 
 
-def without_series(found: Answer, series: float, series_std: float) -> Answer:
+def without_series(found: Linear, series: float, series_std: float) -> Linear:
     """Parameters of the surface from those of both, to the second order of the frequency.
 
     With Z = K + B s + M s^2 seen as K_a + B_a s + M_a s^2: K = K_a k/(k - K_a), B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k,
@@ -44,19 +50,7 @@ def without_series(found: Answer, series: float, series_std: float) -> Answer:
     return found.through(jacobian, new).with_cause("series stiffness", moved)
 
 
-def fit_without_series(found: Fit, series: float, series_std: float) -> Fit:
-    """The same of what holds if the model does, the deviation of the series stiffness in its covariance."""
-    place = _places(found.names)
-    check(found.theta[place["K"]], series)
-    new, jacobian = _linearise(found.theta, place, series)
-    moved = _seen_through(found.theta, place, series + series_std) - new
-    cov, fixed = (
-        jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
-    )
-    return replace(found, theta=new, cov=cov, fixed_cov=fixed)
-
-
-def without_swing(found: Answer, share: float, share_std: float) -> Answer:
+def without_swing(found: Linear, share: float, share_std: float) -> Linear:
     """Parameters of the surface where a tip of mass m swings on the arm's k: its Z/(1 + m s^2/k) was identified.
 
     To the second order of the frequency M is M_a + K m/k, K and B are as they were.
@@ -69,16 +63,6 @@ def without_swing(found: Answer, share: float, share_std: float) -> Answer:
     jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
     moved = missed @ found.theta - found.theta
     return found.through(jacobian, jacobian @ found.theta).with_cause("tip's mass", moved)
-
-
-def fit_without_swing(found: Fit, share: float, share_std: float) -> Fit:
-    """The same of what holds if the model does."""
-    jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
-    moved = missed @ found.theta - found.theta
-    cov, fixed = (
-        jacobian @ own @ jacobian.T + np.outer(moved, moved) for own in (found.cov, found.fixed_cov)
-    )
-    return replace(found, theta=jacobian @ found.theta, cov=cov, fixed_cov=fixed)
 
 
 def _swinging(names: tuple[str, ...], share: float) -> Array:
@@ -132,18 +116,15 @@ def spectrum_without_series(
         seen = complex(octave.storage, octave.loss)
         own = seen * series / (series - seen)
         gain = abs(series / (series - seen)) ** 2
-        more = 1.96 * series_std * abs(own / series) ** 2
+        by_series = Contribution(series_std * abs(own / series) ** 2)
         found.append(
             replace(
                 octave,
                 storage=own.real,
                 loss=own.imag,
-                storage_half=float(np.hypot(gain * octave.storage_half, more)),
-                loss_half=float(np.hypot(gain * octave.loss_half, more)),
-                budget={
-                    **{cause: gain * half for cause, half in octave.budget.items()},
-                    "series stiffness": more,
-                },
+                storage_half=float(np.hypot(gain * octave.storage_half, by_series.half)),
+                loss_half=float(np.hypot(gain * octave.loss_half, by_series.half)),
+                contributions=_times(octave.contributions, gain) | {"series stiffness": by_series},
             )
         )
     return tuple(found)
@@ -156,21 +137,23 @@ def spectrum_without_swing(
     found = []
     for octave in spectrum:
         squared = (2.0 * np.pi * octave.frequency) ** 2
-        gain, more = 1.0 - squared * share, 1.96 * squared * share_std
+        gain, more = 1.0 - squared * share, squared * share_std
+        storage, loss = (Contribution(more * abs(part)) for part in (octave.storage, octave.loss))
         found.append(
             replace(
                 octave,
                 storage=gain * octave.storage,
                 loss=gain * octave.loss,
-                storage_half=float(np.hypot(gain * octave.storage_half, more * octave.storage)),
-                loss_half=float(np.hypot(gain * octave.loss_half, more * octave.loss)),
-                budget={
-                    **{cause: abs(gain) * half for cause, half in octave.budget.items()},
-                    "tip's mass": more * abs(octave.storage),
-                },
+                storage_half=float(np.hypot(gain * octave.storage_half, storage.half)),
+                loss_half=float(np.hypot(gain * octave.loss_half, loss.half)),
+                contributions=_times(octave.contributions, gain) | {"tip's mass": storage},
             )
         )
     return tuple(found)
+
+
+def _times(contributions: Contributions, gain: float) -> dict[str, Contribution]:
+    return {cause: own.times(gain) for cause, own in contributions.items()}
 
 
 def slope_without_series(value: float, half: float, series: float, series_std: float) -> tuple[float, float]:
@@ -178,7 +161,23 @@ def slope_without_series(value: float, half: float, series: float, series_std: f
     check(value, series)
     gain = series / (series - value)
     own = value * gain
-    return own, float(np.hypot(gain**2 * half, 1.96 * series_std * (own / series) ** 2))
+    return own, float(np.hypot(gain**2 * half, NORMAL * series_std * (own / series) ** 2))
+
+
+def slope_budget(
+    contributions: Contributions, value: float, series: float, series_std: float
+) -> dict[str, Contribution]:
+    """Contribution of each cause to the uncertainty of such a slope.
+
+    Args:
+        contributions: to that of the log's own slope.
+        value: of that [N/m].
+        series: stiffness in series [N/m].
+        series_std: standard deviation of that [N/m].
+    """
+    gain = series / (series - value)
+    by_series = Contribution(series_std * (gain * value / series) ** 2)
+    return _times(contributions, gain**2) | {"series stiffness": by_series}
 
 
 def press_without_series(press: Press, series: float, series_std: float) -> Press:

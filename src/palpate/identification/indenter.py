@@ -24,6 +24,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
+from palpate.identification.uncertainty import Contribution
+from palpate.signals.types import NORMAL
 from palpate.units import unit
 
 ASSUMED = "a half space (deep and wide compared with the contact), small strain, no adhesion"
@@ -195,7 +197,7 @@ def _free_of_poisson(reduced: float, poisson: tuple[float, float] | None) -> tup
     if poisson is None:
         return sum(_UNTOLD) / 2, (_UNTOLD[1] - _UNTOLD[0]) / sum(_UNTOLD) * reduced
     share = 1 - poisson[0] ** 2
-    return share, 1.96 * abs(2 * poisson[0]) * poisson[1] / share * reduced
+    return share, NORMAL * abs(2 * poisson[0]) * poisson[1] / share * reduced
 
 
 def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, reduced: float) -> Array:
@@ -234,25 +236,19 @@ def _judge(
     tolerance: float,
 ) -> Parameter:
     half = float(np.hypot.reduce(list(parts.values())))
-    budget = {cause: part for cause, part in parts.items() if part > 1e-3 * half}
-    budget = dict(sorted(budget.items(), key=lambda item: -item[1]))
-    main = next(iter(budget), "noise")
+    main = max(parts, key=lambda cause: parts[cause])
     ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)
     terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
-    low, high = value - half, value + half
-    if low <= 0:
-        reason = f"the press does not follow a {indenter}: 95 % 0 to {high:.3g} Pa, most of it {main}"
-        return replace(_none(reason), ci95=(low, high), budget=budget)
+    bounds = {cause: Contribution.within(part) for cause, part in parts.items()}
+    found = Parameter.of(value, half, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
+    if half >= value:
+        reason = f"the press does not follow a {indenter}: 95 % 0 to {value + half:.3g} Pa, most of it {main}"
+        return found.without_number(reason, ci95=found.ci95)
     share = f"{100 * half / value:.2g} %"
     if half <= tolerance * value:
-        verdict, reason = Verdict.IDENTIFIED, f"known to {share} (95 %): {terms}"
-    else:
-        verdict, reason = (
-            Verdict.NOT_IDENTIFIABLE,
-            f"known to {share} only (95 %), most of it {main}: {terms}",
-        )
-    return Parameter(value, half / 1.96, (low, high), "Pa", verdict, reason, None, budget)
+        return replace(found, verdict=Verdict.IDENTIFIED, reason=f"known to {share} (95 %): {terms}")
+    return replace(found, reason=f"known to {share} only (95 %), most of it {main}: {terms}")
 
 
 def _none(reason: str) -> Parameter:

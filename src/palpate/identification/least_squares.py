@@ -146,13 +146,6 @@ def solved(normal: Array, right: Array) -> tuple[Array, Array]:
     return theta, wide
 
 
-def quantile(effective: float, parameters: int, level: float = 0.975) -> float:
-    """Student's t for what is left of the effective samples after the parameters."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(effective - parameters, 1.0), level))
-
-
 def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
     """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes.
 

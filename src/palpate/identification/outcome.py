@@ -25,8 +25,10 @@ from palpate.identification.result import (
 )
 from palpate.identification.sampling import Channels
 from palpate.identification.selection import Choice
+from palpate.identification.uncertainty import Input, correlations
 from palpate.identification.verdicts import Terms
 from palpate.signals import Estimate
+from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
@@ -79,6 +81,8 @@ def outcome(
         press=press,
         options=_plain_options(options),
         depth=found.fit.model.depth,
+        inputs=_inputs(problem, options),
+        correlation=_correlation(choice, parameters, point),
     )
 
 
@@ -118,22 +122,51 @@ def _plain_options(options: Options) -> dict[str, object]:
     return told | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
 
 
+def _inputs(problem: Problem, options: Options) -> dict[str, Input]:
+    """The input quantities whose uncertainty is given, or assumed, before the log is read."""
+    payload, (share, share_std) = problem.contacts.payload, options.swing
+    found = {
+        "lag": Input(problem.lag.value + problem.filtered, problem.lag.std, "s"),
+        "calibration": Input(1.0, options.calibration, "1"),
+        "series stiffness": Input(options.series_stiffness or 0.0, options.series_std, "N/m"),
+        "tip's mass": Input(share, share_std, "s^2"),
+        "tool's inertia": Input(payload.mass, payload.std, "kg") if payload else Input(0.0, 0.0, "kg"),
+    }
+    return {cause: own for cause, own in found.items() if own.std > 0}
+
+
+def _correlation(
+    choice: Choice, parameters: dict[str, Parameter], point: WorkingPoint | None
+) -> dict[str, float]:
+    """Of the fit's K, B and M that have a number; a tangent in place of K is no part of the fit."""
+    found = choice.answer
+    names = [
+        name
+        for name in ("K", "B", "M")
+        if name in found.names
+        and parameters[name].value is not None
+        and not (point is not None and parameters[name] is point.stiffness)
+    ]
+    places = [found.names.index(name) for name in names]
+    return correlations(names, found.cov[np.ix_(places, places)])
+
+
 def _lag(choice: Choice) -> LagFound | None:
     prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered
     if prior.known:
         told = prior.value + filtered != 0 or prior.std > 0
-        return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "told") if told else None
-    half = found.half_of(LAG) if LAG in found.names else 1.96 * prior.std
-    if half <= _NARROWER * 1.96 * prior.std and not lag_open(choice.problem):
-        return LagFound(found[LAG] + filtered, half / 1.96, half, "measured")
-    return LagFound(prior.value + filtered, prior.std, 1.96 * prior.std, "prior")
+        return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "told") if told else None
+    half = found.half_of(LAG) if LAG in found.names else NORMAL * prior.std
+    if half <= _NARROWER * NORMAL * prior.std and not lag_open(choice.problem):
+        return LagFound(found[LAG] + filtered, half / NORMAL, half, "measured")
+    return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "prior")
 
 
 def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> list[Warn]:
     """The lag that the work of the presses tells, where it is farther than the prior's bound and nobody told one."""
     late = press.late if press else None
     known = problem.lag.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
-    if late is None or known or late[0] <= 1.96 * problem.lag.std:
+    if late is None or known or late[0] <= NORMAL * problem.lag.std:
         return []
     text = (
         f"unloading returns more work than loading took, which no passive surface does: the force is read"

@@ -95,10 +95,10 @@ def identify(
     evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
     if series_stiffness is not None:
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
-        holds = in_series.fit_without_series(holds, series_stiffness, series_std)
+        holds = in_series.without_series(holds, series_stiffness, series_std)
     if series_mass is not None:
         choice = replace(choice, answer=in_series.without_swing(choice.answer, *options.swing))
-        holds = in_series.fit_without_swing(holds, *options.swing)
+        holds = in_series.without_swing(holds, *options.swing)
     if contacts.payload is not None:
         choice = replace(choice, answer=in_series.with_payload(choice.answer, contacts.payload.std))
     parameters, told = verdicts(choice, holds, evidence[2], terms)

@@ -9,7 +9,7 @@ Med. Res. Methodol. 15, 2015); the next press by Higgins, Thompson and Spiegelha
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,9 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.uncertainty import Contribution, student
 from palpate.results import Result
+from palpate.signals.types import NORMAL
 
 Interval = tuple[float, float]
 
@@ -102,13 +104,6 @@ def _between(y: Array, own: Array) -> float:
             break
         between += excess / float(weight**2 @ left**2)
     return between
-
-
-def student(freedom: float) -> float:
-    """Two-sided 95 % quantile of Student's t."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), 0.975))
 
 
 @dataclass(frozen=True)
@@ -273,7 +268,7 @@ def _pool(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> Pool
         none = Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, few)
         return PooledParameter(none, None, None, tuple(used))
     values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
-    mean, alike = random_effects(values, (halves / 1.96) ** 2), float(shared.mean())
+    mean, alike = random_effects(values, (halves / NORMAL) ** 2), float(shared.mean())
     prediction = None
     if mean.next_half is not None:
         again = float(np.hypot(mean.next_half, alike))
@@ -290,15 +285,15 @@ def _judge(mean: Mean, alike: float, count: int, kind: tuple[str, str], toleranc
     interval = (mean.value - half, mean.value + half)
     of = f"{mean.count} of {count} logs{f', as of {kind[1]}' if kind[1] else ''}"
     parts = {
-        "between logs": mean.half * float(np.sqrt(mean.share)),
-        "each log": mean.half * float(np.sqrt(1 - mean.share)),
-        "common to all logs": alike,
+        "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), mean.freedom),
+        "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), mean.freedom),
+        "common to all logs": Contribution.within(alike),
     }
-    budget = {cause: part for cause, part in sorted(parts.items(), key=lambda item: -item[1]) if part > 0}
+    found = Parameter.of(mean.value, half, kind[0], Verdict.IDENTIFIED, "", parts)
     if share >= 1:
         reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
-        return Parameter(None, None, interval, kind[0], Verdict.NOT_IDENTIFIABLE, reason, None, budget)
+        return found.without_number(reason, ci95=interval)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"
     reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"
-    return Parameter(mean.value, half / 1.96, interval, kind[0], verdict, reason, None, budget)
+    return replace(found, verdict=verdict, reason=reason)

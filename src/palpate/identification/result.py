@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from math import isclose, pi, sqrt
 from typing import Any
@@ -11,8 +11,10 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.causes import Warn
+from palpate.identification.uncertainty import Contributions, Input, Uncertainty
 from palpate.results import Compared, Readable, Result
 from palpate.signals import Estimate
+from palpate.signals.types import NORMAL
 
 
 class Verdict(StrEnum):
@@ -21,6 +23,10 @@ class Verdict(StrEnum):
     IDENTIFIED = "identified"
     NOT_IDENTIFIABLE = "not identifiable"
     REJECTED = "rejected"
+
+
+_SMALL = 1e-3
+"""Share of a half-width below which a cause is not listed in the budget."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,8 @@ class Parameter(Readable):
             rest on it.
         reason: why.
         ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
-        budget: half-width of `ci95` by cause, largest first.
+        budget: half-width of `ci95` by cause, largest first; without what is under a thousandth of the whole.
+        contributions: to the combined standard uncertainty, by cause.
     """
 
     value: float | None
@@ -46,6 +53,73 @@ class Parameter(Readable):
     reason: str
     ci95_if_model_holds: tuple[float, float] | None = None
     budget: dict[str, float] = field(default_factory=dict)
+    contributions: Contributions = field(default_factory=dict)
+
+    # More than seven arguments: the fields of a parameter, in their order.
+    @classmethod
+    def of(
+        cls,
+        value: float,
+        half: float,
+        unit: str,
+        verdict: Verdict,
+        reason: str,
+        contributions: Contributions,
+        *,
+        joint: bool = False,
+    ) -> Parameter:
+        """A parameter with its budget.
+
+        Args:
+            value: of it.
+            half: half-width of its 95 % interval.
+            unit: in SI.
+            verdict: on it.
+            reason: of that.
+            contributions: to its uncertainty, by cause.
+            joint: the coverage factor is of all causes together; else each has its own.
+        """
+        parts = {cause: part.half for cause, part in contributions.items()}
+        if joint:
+            coverage = half / (Uncertainty(contributions, half).combined or 1.0)
+            parts = {cause: coverage * part.std for cause, part in contributions.items()}
+        budget = sorted(
+            (item for item in parts.items() if item[1] > _SMALL * half), key=lambda item: -item[1]
+        )
+        ends = value - half, value + half
+        return cls(
+            value,
+            half / NORMAL,
+            ends,
+            unit,
+            verdict,
+            reason,
+            budget=dict(budget),
+            contributions=contributions,
+        )
+
+    def without_number(
+        self,
+        reason: str,
+        verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
+        ci95: tuple[float, float] | None = None,
+    ) -> Parameter:
+        """The same without a value, and at most with bounds: its budget says why.
+
+        Args:
+            reason: why there is none.
+            verdict: on it.
+            ci95: bounds that the log still shows.
+        """
+        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
+        return replace(bare, verdict=verdict, reason=reason)
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """Combined and expanded uncertainty; None without a number, or where no cause is known."""
+        if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
+            return None
+        return Uncertainty(self.contributions, (self.ci95[1] - self.ci95[0]) / 2)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -71,7 +145,7 @@ class DynamicStiffness(Readable):
         storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
         blocks: how many there are.
         share: of the position's variance in contact.
-        budget: half-width of the storage by cause [N/m]; their squares add up.
+        contributions: to the uncertainty of the storage, by cause [N/m].
     """
 
     frequency: float
@@ -81,7 +155,7 @@ class DynamicStiffness(Readable):
     loss_half: float
     blocks: int
     share: float
-    budget: dict[str, float] = field(default_factory=dict)
+    contributions: Contributions = field(default_factory=dict)
 
     def to_json(self) -> dict[str, float]:
         """Plain values that JSON can hold."""
@@ -276,6 +350,8 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
         press: force over depth; None if the log does not show one.
         options: what was told, as plain values.
         depth: penetration that K, B and K1 belong to, of a model in which they grow with it [m]; else None.
+        inputs: input quantities of the uncertainties, by cause.
+        correlation: of the estimates of K, B and M, each pair by its names.
     """
 
     model: str
@@ -295,6 +371,8 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
     press: Press | None = field(default=None, repr=False)
     options: dict[str, Any] = field(default_factory=dict, repr=False)
     depth: float | None = None
+    inputs: dict[str, Input] = field(default_factory=dict, repr=False)
+    correlation: dict[str, float] = field(default_factory=dict, repr=False)
 
     def __getattr__(self, name: str) -> Parameter:
         """A parameter by its name: `found.K`."""
@@ -345,6 +423,22 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
             "warnings": [{"code": warn.code.word, "text": warn.text} for warn in self.warnings],
             "models": [self._comparison_json(c) for c in self.comparison],
             "options": self.options,
+            "uncertainty": self.uncertainty_json(),
+        }
+
+    def uncertainty_json(self) -> dict[str, Any]:
+        """Uncertainty budgets of the working point and of each parameter with a number, as plain values."""
+        point = [self.working_point.stiffness] if self.working_point else []
+        own = {"working_point": next(iter(point), None), **self.parameters}
+        budgets = {
+            name: p.uncertainty.to_json(self.inputs) | {"value": p.value, "unit": p.unit}
+            for name, p in own.items()
+            if p is not None and p.uncertainty is not None
+        }
+        return {
+            "working_point": budgets.pop("working_point", None),
+            "parameters": budgets,
+            "correlation": self.correlation,
         }
 
 

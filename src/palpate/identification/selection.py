@@ -221,7 +221,7 @@ def _choose(problem: Problem, options: Options) -> Choice:
         if (
             name is None
             and options.series_stiffness is None
-            and plain.unexplained > _noise_rms(plain) + _between_readings(problem)
+            and plain.unexplained > float(np.sqrt(max(plain.noise, 0.0))) + _between_readings(problem)
         ):
             # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
             one_sided = problem.with_touches is not None and not lag_open(problem)
@@ -273,10 +273,6 @@ def _between_readings(problem: Problem) -> float:
         return 0.0
     fastest = min(problem.band, chain.cutoff)
     return float((2 * np.pi * fastest * chain.dt) ** 2 / 8 * np.std(problem.force))
-
-
-def _noise_rms(found: Answer) -> float:
-    return float(np.sqrt(max(found.noise, 0.0)))
 
 
 def _comparison_of(found: Answer, note: str) -> Comparison:

@@ -18,9 +18,10 @@ from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Lag
-from palpate.identification.pooling import random_effects, student
+from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import Stroke
+from palpate.identification.uncertainty import Contribution, Contributions
 
 WINDOW = (0.35, 0.97)
 """Shares of a stroke's force about the tangent that is named: below, a surface is still being met."""
@@ -34,7 +35,6 @@ _FOLLOWED = 0.5
 """Share of a stroke's force that a smooth curve of the position follows, of a contact."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
-NORMAL = 1.96
 _DEGREES = (2, 4, 6, 8)
 """Of the curves that are averaged: an odd degree moves the slope in the middle as the even one above it does."""
 
@@ -69,7 +69,7 @@ class Slopes:
     Args:
         force, depth: where it is [N], [m].
         stiffness, half: mean of the strokes and its 95 % half-width [N/m].
-        budget: half-width by cause [N/m]; their squares add up.
+        contributions: to its uncertainty, by cause [N/m].
         each: slope of each stroke [N/m].
         again: 95 % half-width for one more stroke; None for fewer than three [N/m].
         rise: mean duration of a stroke [s].
@@ -80,7 +80,7 @@ class Slopes:
     depth: float
     stiffness: float
     half: float
-    budget: dict[str, float]
+    contributions: Contributions
     each: tuple[float, ...]
     again: float | None
     rise: float
@@ -189,18 +189,17 @@ def slopes_at(
     share = differ**2 / max(
         noise**2 + differ**2, 1e-300
     )  # Satterthwaite: the noise is known, the differences by n - 1
-    t = student((n - 1) / share**2) if share else NORMAL
+    freedom = (n - 1) / share**2 if share else np.inf
     bend = float(weight @ bends)
     value = float(weight @ values) * (1 + lag.value * bend)
-    budget = {
-        "repetition": t * differ,
-        "noise": t * noise,
-        "lag": NORMAL * lag.std * abs(value * bend),
-        "other forces": float(
-            weight @ np.abs(drifts)
-        ),  # a drift is known where the probe is free, not in between
+    drift = float(weight @ np.abs(drifts))  # known where the probe is free, not in between
+    parts = {
+        "repetition": Contribution(differ, freedom),
+        "noise": Contribution(noise, freedom),
+        "lag": Contribution(lag.std * abs(value * bend)),
+        "other forces": Contribution.within(drift),
     }
-    half = float(np.sqrt(sum(own**2 for own in budget.values())))
+    half = float(np.sqrt(sum(own.half**2 for own in parts.values())))
     rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
     each = tuple(values.tolist())
     return Slopes(
@@ -208,7 +207,7 @@ def slopes_at(
         float(weight @ depths),
         value,
         half,
-        budget,
+        parts,
         each,
         mean.next_half,
         rise,

@@ -14,6 +14,8 @@ from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag
 from palpate.identification.result import Parameter, Verdict, WorkingPoint
 from palpate.identification.selection import Choice
+from palpate.identification.uncertainty import Contribution
+from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
 _FAR = 2.0
@@ -64,6 +66,8 @@ def verdicts(
         terms: how.
     """
     found = against_working_point(choice.answer, point)
+    scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
+    found = found.with_cause("calibration", scales * found.theta)
     choice = replace(choice, answer=found)
     lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
@@ -82,38 +86,26 @@ def verdicts(
 def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter:
     found = choice.answer
     value, unit = found[name], unit_of(name, found.fit, terms)
-    scale = 0.0 if name in _SHAPE else 1.96 * terms.calibration * abs(value)
-    half = float(np.hypot(found.half_of(name), scale))
-    budget = {cause: part for cause, part in found.parts(name).items() if part > 1e-3 * half}
-    if scale:
-        budget = dict(sorted({**budget, "calibration": scale}.items(), key=lambda item: -item[1]))
-    interval = (value - half, value + half)
-    own = None
+    half, parts = found.half_of(name), found.contributions(name)
+    whole = Parameter.of(value, half, unit, Verdict.NOT_IDENTIFIABLE, "", parts, joint=True)
+    low, high = interval = (value - half, value + half)
     if name in holds.names:
-        reach = float(np.hypot(holds.t * holds.std(name), scale))
-        own = (holds[name] - reach, holds[name] + reach)
-
-    def said(
-        verdict: Verdict, reason: str, number: bool = True, bounds: tuple[float, float] | None = None
-    ) -> Parameter:
-        if not number:
-            return Parameter(None, None, bounds, unit, verdict, reason, None, budget)
-        return Parameter(value, half / 1.96, interval, unit, verdict, reason, own, budget)
-
-    positive = name in found.fit.model.positive
-    if positive and interval[1] < 0:
+        reach = float(np.hypot(holds.t * holds.std(name), parts["calibration"].half))
+        whole = replace(whole, ci95_if_model_holds=(holds[name] - reach, holds[name] + reach))
+    if name in found.fit.model.positive and high < 0:
         reason = f"the fit gives {_digits(value)} {_show(unit)}, {_BELOW}"
-        return said(Verdict.REJECTED, " ".join(reason.split()), number=False)
+        return whole.without_number(" ".join(reason.split()), Verdict.REJECTED)
     if half > _NOTHING * max(abs(value), 1e-300):
-        return said(Verdict.NOT_IDENTIFIABLE, f"the log does not show it: {NOISE.remedy}", number=False)
-    bounds = f"95 %: {_digits(interval[0])} to {_digits(interval[1])} {_show(unit)}".rstrip()
-    clear = interval[0] > 0 or interval[1] < 0
+        return whole.without_number(f"the log does not show it: {NOISE.remedy}")
+    clear = low > 0 or high < 0
     if half <= terms.tolerance * abs(value) and clear:
-        return said(Verdict.IDENTIFIED, f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}")
+        reason = f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}"
+        return replace(whole, verdict=Verdict.IDENTIFIED, reason=reason)
+    bounds = f"95 %: {_digits(low)} to {_digits(high)} {_show(unit)}".rstrip()
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
-    main = cause_of(next(iter(budget), "noise"))
+    main = cause_of(next(iter(whole.budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
-    return said(Verdict.NOT_IDENTIFIABLE, reason, clear, interval)
+    return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
 
 
 def _at(found: Answer, name: str, terms: Terms) -> str:
@@ -148,10 +140,11 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     if shown is None or predicted is None:
         return found
     own, slope = predicted
-    shown_half = (point.stiffness.ci95[1] - point.stiffness.ci95[0]) / 2
+    scale = point.stiffness.contributions.get("calibration", Contribution(0.0)).half  # of the model's, too
+    shown_half = np.sqrt(max(((point.stiffness.ci95[1] - point.stiffness.ci95[0]) / 2) ** 2 - scale**2, 0.0))
     along = found.cov @ slope
     power = float(slope @ along)
-    gap = max(abs(own - shown) - float(np.hypot(1.96 * np.sqrt(max(power, 0.0)), shown_half)), 0.0)
+    gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), shown_half)), 0.0)
     moved = along * gap / power if power > 0 else np.zeros(len(slope))
     return found.with_cause("dynamic stiffness", moved)
 
@@ -224,14 +217,9 @@ _UNTOUCHED = (
 )
 
 
-def _without_number(p: Parameter, reason: str) -> Parameter:
-    """Rejected: a number that a model gives which does not hold stands nowhere."""
-    return Parameter(None, None, None, p.unit, Verdict.REJECTED, reason, None, p.budget)
-
-
 def _reject(p: Parameter, reason: str) -> Parameter:
-    """The same, if it was identified."""
-    return _without_number(p, reason) if p.verdict is Verdict.IDENTIFIED else p
+    """Rejected, if it was identified: a number that a model gives which does not hold stands nowhere."""
+    return p.without_number(reason, Verdict.REJECTED) if p.verdict is Verdict.IDENTIFIED else p
 
 
 def _refuse(p: Parameter, reason: str) -> Parameter:
@@ -260,7 +248,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
             )
             warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
         elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
-            reach = 1.96 * lag.std * abs(found["K"]) if "K" in found.names else 0.0
+            reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
             text = (
                 f"a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
                 f" {_digits(reach, 2)} {_show(damping.unit)}; give --lag"

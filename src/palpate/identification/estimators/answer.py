@@ -11,6 +11,7 @@ from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.models import Model, Motion
 from palpate.identification.problem import Problem
+from palpate.identification.uncertainty import Contributions
 
 
 @dataclass(frozen=True)
@@ -137,12 +138,7 @@ class Answer:
         }
         return replace(self, theta=theta, cov=jacobian @ self.cov @ jacobian.T, budget=budget)
 
-    def parts(self, name: str) -> dict[str, float]:
-        """Half-width of one parameter by cause, largest first; their squares add up to that of the whole."""
-        i = self.names.index(name)
-        total = sum(float(part.variance[i]) for part in self.budget.values()) or 1.0
-        whole = float(self.half[i])
-        found = {
-            cause: whole * float(np.sqrt(part.variance[i] / total)) for cause, part in self.budget.items()
-        }
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+    def contributions(self, name: str) -> Contributions:
+        """Contribution of each cause to the uncertainty of one parameter."""
+        place = self.names.index(name)
+        return {cause: part.at(place) for cause, part in self.budget.items()}

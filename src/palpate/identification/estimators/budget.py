@@ -21,16 +21,14 @@ from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment, Solution, System, worth
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
+from palpate.identification.uncertainty import Contribution, effective_freedom
 from palpate.signals.samples import detrend, quadrature
+from palpate.signals.types import NORMAL
 
 HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
 unknown phase, in phase and in quadrature, half of the power is along either. `make trust` measures the coverage that
 follows."""
-NORMAL = 1.96
-"""Deviations of a 95 % interval."""
-
-
 _ALONE = 1e-8
 """Share of a direction that is told by other than one stretch, or by other than noise: below it, by nothing else."""
 
@@ -45,6 +43,11 @@ class Spread:
     def of(self, places: list[int]) -> Spread:
         """Of some of the parameters."""
         return Spread(self.variance[places], np.broadcast_to(self.freedom, self.variance.shape)[places])
+
+    def at(self, place: int) -> Contribution:
+        """Contribution to the uncertainty of one parameter."""
+        freedom = np.broadcast_to(self.freedom, self.variance.shape)
+        return Contribution(float(np.sqrt(self.variance[place])), float(freedom[place]))
 
 
 Budget = dict[str, Spread]
@@ -248,10 +251,7 @@ def half_widths(budget: Budget) -> Array:
 
     variance = np.array([part.variance for part in budget.values()])
     freedom = np.array([np.broadcast_to(part.freedom, part.variance.shape) for part in budget.values()])
-    total = variance.sum(axis=0)
-    share = variance / np.where(total > 0, total, 1.0)
-    loss = (share**2 / freedom).sum(axis=0)
-    found: Array = stdtrit(1 / np.clip(loss, 1e-9, 1.0), 0.975) * np.sqrt(total)
+    found: Array = stdtrit(effective_freedom(variance, freedom), 0.975) * np.sqrt(variance.sum(axis=0))
     return found
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.estimators.descent import Descent, Point, names_of
-from palpate.identification.least_squares import Noise, covariance, noise_of, quantile
+from palpate.identification.least_squares import Noise, covariance, noise_of
 from palpate.identification.models import Model, Motion
 from palpate.identification.options import Lag, prior_of
+from palpate.identification.uncertainty import student
 
 _LEAST = 0.1
 """Share of the information in any direction that must be left for the noise's to be taken out."""
@@ -197,7 +198,27 @@ class Fit:
     @property
     def t(self) -> float:
         """Student's factor of a standard deviation for a 95 % interval."""
-        return quantile(self.noise.effective, len(self.names))
+        return student(self.noise.effective - len(self.names))
+
+    def with_cause(self, cause: str, effect: Array) -> Fit:
+        """The same with one more cause of error, as of an `Answer`; a covariance keeps no names of causes.
+
+        Args:
+            cause: its name.
+            effect: standard deviation of each parameter by it, shape (p,).
+        """
+        more = np.outer(effect, effect)
+        return replace(self, cov=self.cov + more, fixed_cov=self.fixed_cov + more)
+
+    def through(self, jacobian: Array, theta: Array) -> Fit:
+        """Functions of the parameters instead, as of an `Answer`.
+
+        Args:
+            jacobian: their derivatives by the parameters, shape (p, p).
+            theta: their values, shape (p,).
+        """
+        cov, fixed = (jacobian @ own @ jacobian.T for own in (self.cov, self.fixed_cov))
+        return replace(self, theta=theta, cov=cov, fixed_cov=fixed)
 
     def score(self, effective: float) -> float:
         """Schwarz's criterion for a common number of effective samples: smaller is better."""

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification import in_series
-from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -32,6 +31,7 @@ from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.tangents import SteadyPress
 from palpate.signals.samples import runs
+from palpate.signals.types import NORMAL
 
 
 def relaxation(

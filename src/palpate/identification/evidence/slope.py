@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.identification.estimators.budget import NORMAL
 from palpate.identification.estimators.octaves import Segment
 from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
+from palpate.identification.uncertainty import Contribution, Contributions
 from palpate.signals.samples import runs
+from palpate.signals.types import NORMAL
 
 _MET = 0.15
 """Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""
@@ -159,7 +160,7 @@ class Slope:
         stiffness, half: [N/m].
         rise: mean duration of a loading [s].
         each: slope of each loading [N/m].
-        budget: half-width by cause [N/m]; their squares add up.
+        contributions: to its uncertainty, by cause [N/m].
         force, depth: where it is, the means of the upper part [N], [m].
     """
 
@@ -167,7 +168,7 @@ class Slope:
     half: float
     rise: float
     each: tuple[float, ...]
-    budget: dict[str, float]
+    contributions: Contributions
     force: float
     depth: float
 
@@ -194,8 +195,9 @@ def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None
     other = slope_of(later) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
-    by_lag = NORMAL * abs(other.stiffness - found.stiffness)
-    return replace(found, half=float(np.hypot(found.half, by_lag)), budget=found.budget | {"lag": by_lag})
+    by_lag = Contribution(abs(other.stiffness - found.stiffness))
+    half = float(np.hypot(found.half, by_lag.half))
+    return replace(found, half=half, contributions={**found.contributions, "lag": by_lag})
 
 
 def slope_of(loadings: list[Loading]) -> Slope | None:
@@ -226,10 +228,10 @@ def slope_of(loadings: list[Loading]) -> Slope | None:
     curvature, reach, by_filter = (float(np.mean(own)) for own in (changes, speeds, filters))
     others = float(np.sqrt(mean.half**2 + curvature**2 + by_filter**2))
     causes = {
-        "repetition" if len(slopes) > 1 else "noise": mean.half,
-        "curvature": curvature,
-        "filter": by_filter,
-        "speed": float(np.sqrt((others + reach) ** 2 - others**2)),
+        "repetition" if len(slopes) > 1 else "noise": Contribution(mean.std, mean.freedom),
+        "curvature": Contribution.within(curvature),
+        "filter": Contribution.within(by_filter),
+        "speed": Contribution.within(float(np.sqrt((others + reach) ** 2 - others**2))),
     }
     where = (float(own) for own in np.mean(levels, axis=0))
     return Slope(mean.value, others + reach, float(np.mean(rises)), tuple(slopes), causes, *where)

@@ -19,12 +19,13 @@ from palpate.arrays import Array
 from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import Slope, slope_in, unseen
-from palpate.identification.in_series import slope_without_series
+from palpate.identification.in_series import slope_budget, slope_without_series
 from palpate.identification.options import Options
-from palpate.identification.pooling import student
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
 from palpate.identification.tangents import Slopes
+from palpate.identification.uncertainty import Contribution, Contributions, student
+from palpate.signals.types import NORMAL
 
 Complex = NDArray[np.complex128]
 
@@ -163,20 +164,22 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     power = float((np.abs(blocks.position) ** 2).sum())
     line = _fit(blocks)
     omega, parts = line.omega, line.parts
-    by_lag = 1.96 * omega * lag_std
+    by_lag = NORMAL * omega * lag_std
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
     causes = {
         "blocks": student(line.freedom) * np.sqrt(line.variance),
         "lag": np.array([abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]),
-        "position noise": noise * np.abs(parts) + 1.96 * blocks.pull * np.hypot(*parts),
+        "position noise": noise * np.abs(parts) + NORMAL * blocks.pull * np.hypot(*parts),
         "within the octave": np.abs(line.change),
     }
     halves = np.sqrt(sum(half**2 for half in causes.values()))
+    bounds = {cause: Contribution.within(float(half[0])) for cause, half in causes.items()}
+    scatter = Contribution(float(np.sqrt(line.variance[0])), line.freedom)
     window = float((np.hanning(length + 2) ** 2).sum())
     share = power / len(blocks.position) * 2 / (length * window) / variance
     return DynamicStiffness(
         omega / (2 * np.pi), float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
-        len(blocks.position), float(min(share, 1.0)), {cause: float(half[0]) for cause, half in causes.items()},
+        len(blocks.position), float(min(share, 1.0)), bounds | {"blocks": scatter},
     )  # fmt: skip
 
 
@@ -230,8 +233,8 @@ def working_point(
         series = options.series_stiffness, options.series_std
         value, half = slope_without_series(slope.stiffness, slope.half, *series)
         each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
-        gain = half / slope.half if slope.half else 1.0
-        slope = replace(slope, stiffness=value, half=half, each=each, budget=_scale(slope.budget, gain))
+        parts = slope_budget(slope.contributions, slope.stiffness, *series)
+        slope = replace(slope, stiffness=value, half=half, each=each, contributions=parts)
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     depths = problem.motion.moved(0, lag)[inside]
     octave = _octave_point(spectrum, tolerance)
@@ -244,19 +247,20 @@ def working_point(
     )
     if use_press and slope is not None:
         value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
-        budget, force, depth = slope.budget, slope.force, slope.depth
+        parts, force, depth = dict(slope.contributions), slope.force, slope.depth
     else:
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
         force, depth = float(problem.force[inside].mean()), float(depths.mean())
         unseen_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
-        budget, half = {**octave.budget, "unexplained": unseen_force}, float(np.hypot(half, unseen_force))
+        parts = {**octave.contributions, "unexplained": Contribution.within(unseen_force)}
+        half = float(np.hypot(half, unseen_force))
     if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
-        budget = {**budget, "unseen way": abs(value) * unseen(problem)}
-        half = float(np.hypot(half, budget["unseen way"]))
+        parts["unseen way"] = Contribution.within(abs(value) * unseen(problem))
+        half = float(np.hypot(half, parts["unseen way"].half))
     rest = 0.0 if problem.counted else problem.contacts.resting
     contacts = problem.contacts
-    stiffness = replace(_judge(value, half, tolerance, unit), budget=_largest(budget, half))
+    stiffness = _judge(value, half, parts, options, unit)
     against = ""
     if not contacts.signed or (contacts.bonded and value < 0 and not options.bonded):
         against = "the signs of force and position are not known (give --force-sign)"
@@ -281,29 +285,19 @@ def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> 
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
     """
-    value, half, again = own.stiffness, own.half, own.again
+    value, half, again, parts = own.stiffness, own.half, own.again, own.contributions
     if options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         gain = slope_without_series(value, 0.0, *series)[0] / value
+        parts = slope_budget(parts, value, *series)
         value, half = slope_without_series(value, half, *series)
         again = None if again is None else gain**2 * again
-    budget = _scale(own.budget, half / own.half if own.half else 1.0)
-    stiffness = replace(_judge(value, half, options.tolerance, unit), budget=_largest(budget, half))
+    stiffness = _judge(value, half, parts, options, unit)
     interval = None if again is None else (value - again, value + again)
     depth = own.depth - problem.origin
     return WorkingPoint(
         stiffness, own.force, depth, 0.25 / own.rise, "press", interval, not problem.contacts.bonded
     )
-
-
-def _scale(budget: dict[str, float], gain: float) -> dict[str, float]:
-    return {cause: gain * part for cause, part in budget.items()}
-
-
-def _largest(budget: dict[str, float], half: float) -> dict[str, float]:
-    """Causes that count, largest first."""
-    kept = {cause: part for cause, part in budget.items() if part > 1e-3 * half}
-    return dict(sorted(kept.items(), key=lambda item: -item[1]))
 
 
 def _octave_point(spectrum: Sequence[DynamicStiffness], tolerance: float) -> DynamicStiffness | None:
@@ -326,17 +320,22 @@ def _again(slope: Slope) -> tuple[float, float] | None:
     n = len(slope.each)
     if n < 3:
         return None
-    from scipy.special import stdtrit
-
-    half = float(stdtrit(n - 2, 0.975)) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
+    half = student(n - 2) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
     return slope.stiffness - half, slope.stiffness + half
 
 
-def _judge(value: float, half: float, tolerance: float, unit: str) -> Parameter:
-    share = half / abs(value) if value else np.inf
-    interval = (value - half, value + half)
-    if share <= tolerance:
-        reason = f"known to {100 * share:.2g} % (95 %), whatever the model"
-        return Parameter(value, half / 1.96, interval, unit, Verdict.IDENTIFIED, reason)
-    reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g} {unit}; wider than {tolerance:.0%}"
-    return Parameter(value, half / 1.96, interval, unit, Verdict.NOT_IDENTIFIABLE, reason)
+def _judge(value: float, half: float, parts: Contributions, options: Options, unit: str) -> Parameter:
+    """A verdict on a stiffness; the calibration of the scales is one more cause of its interval."""
+    by_scale = Contribution(options.calibration * abs(value))
+    half, parts = float(np.hypot(half, by_scale.half)), {**parts, "calibration": by_scale}
+    known = half <= options.tolerance * abs(value) and value != 0
+    reason = f"known to {100 * half / abs(value):.2g} % (95 %), whatever the model" if known else ""
+    return Parameter.of(
+        value,
+        half,
+        unit,
+        Verdict.IDENTIFIED if known else Verdict.NOT_IDENTIFIABLE,
+        reason
+        or f"95 %: {value - half:.3g} to {value + half:.3g} {unit}; wider than {options.tolerance:.0%}",
+        parts,
+    )

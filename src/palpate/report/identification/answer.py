@@ -27,14 +27,14 @@ from palpate.report.identification.words import (
     formatted,
     interval,
     limited_by,
-    lost,
     place_of,
+    press_facts,
     sentence,
     unit_warnings,
-    units_of,
 )
 from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
 from palpate.report.terminal import print_hanging
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -59,7 +59,6 @@ _REMEDIES = {
     "octaves": "excite a wider band",
     "blocks": "press longer, at one depth",
     "repetition": "press more often",
-    "strokes": "press more slowly",
     "unexplained": "keep near one depth",
     "curvature": "press about one force",
     "position noise": "a finer position",
@@ -72,7 +71,6 @@ _CAUSES = {
     "other forces": "drift or friction",
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
-    "strokes": "loading and unloading",
     "octaves": "frequencies differ",
     "touch": "the touch",
     "unseen way": "the first reading",
@@ -139,7 +137,7 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
         yield Text("")
         yield Text(printable(_contact(found)))
         if point.source == "press" and found.press is not None and len(found.press.tangent) > 1:
-            yield Text(printable(_tangents(found)))
+            yield Text(printable(" ".join(press_facts(found))))
         if found.lag is not None and found.lag.kind == "prior" and found.n:
             yield Text(_assumed_lag(found))
     yield from _foot(found, notes)
@@ -244,7 +242,7 @@ def _interval(p: Parameter, bound: bool) -> str:
 
 
 def _lag_half(found: Identification) -> float:
-    return 0.0 if found.lag is None else found.lag.bound or 1.96 * found.lag.std
+    return 0.0 if found.lag is None else found.lag.bound or NORMAL * found.lag.std
 
 
 def _contact(found: Identification) -> str:
@@ -261,23 +259,6 @@ def _contact(found: Identification) -> str:
     share = f"{explained:.3g} %" if explained < 99.95 else "more than 99.9 %"
     parts = _PARTS.get(found.model, found.model)
     return f"{start} {parts} explain {share} of the force ({found.model})."
-
-
-def _tangents(found: Identification) -> str:
-    """The slope at other forces, the lost work and the relaxation."""
-    assert found.press is not None
-    assert found.working_point is not None
-    force, unit = units_of(found)[0], found.working_point.stiffness.unit
-    slopes = [
-        f"{quantity(t.stiffness, unit, t.half)} at {quantity(t.force, force)}" for t in found.press.tangent
-    ]
-    loss, relaxed = found.press.hysteresis_loss, found.press.relaxation
-    text = f"Slope by force: {', '.join(slopes)}."
-    if loss is not None and loss >= 0:
-        text += f" {lost(loss)}."
-    if relaxed is not None:
-        text += f" {100 * relaxed.share:.2g} % of the force relaxes in {relaxed.duration:.3g} s."
-    return text
 
 
 def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:

@@ -15,6 +15,7 @@ from palpate.report.identification import evidence_panels as trust
 from palpate.report.identification.evidence_panels import shown_by
 from palpate.report.identification.figure import Panel, both_parts, one
 from palpate.report.identification.spectra import over_noise, whiteness_of
+from palpate.report.identification.uncertainty import HEAD, METHOD, WORDS, correlation, tables
 from palpate.report.identification.words import (
     CALLED,
     NO_NUMBER,
@@ -172,6 +173,10 @@ def page(found: Identification, source: Source) -> str:
             {"code": w.code.word, "text": printable(w.text), "advice": advice(w.code)} for w in found.warnings
         ],
         figures=_figures(found),
+        budgets=list(tables(found)),
+        budget_head=HEAD,
+        budget_words=WORDS,
+        budget_notes=[note for note in (correlation(found), METHOD) if note],
         models=_models(found),
         octaves=_octaves(found),
         unit=_of(found.working_point.stiffness.unit if found.working_point else "1"),

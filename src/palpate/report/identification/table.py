@@ -15,13 +15,12 @@ from palpate.report.identification.words import (
     formatted,
     interval,
     lag_of,
-    lost,
     number,
+    press_facts,
     sentence,
     unit,
-    units_of,
 )
-from palpate.report.numbers import NONE, between, plain, quantity
+from palpate.report.numbers import NONE, between, plain
 from palpate.text import printable
 
 _MANY = 6
@@ -39,7 +38,8 @@ def show(found: Identification, name: str, console: Console) -> None:
     console.print(Text(printable(sentence(found)), style="bold"))
     console.print(Text(printable(f"{name}: {_contacts(found)}")))
     _point(found, console)
-    _press(found, console)
+    for fact in press_facts(found):
+        console.print(Text(fact))
     if found.n:
         console.print(Text(_fit(found)))
     console.print(_table(found))
@@ -74,25 +74,6 @@ def _point(found: Identification, console: Console) -> None:
         note(console, "working point:", own.reason, STYLES[own.verdict])
     if point.prediction95:
         console.print(Text(f"the next press: {interval(point.prediction95, own.unit)} (95 %)"))
-
-
-def _press(found: Identification, console: Console) -> None:
-    """Lines on what the press shows, where it shows it."""
-    press = found.press
-    if press is None:
-        return
-    force, stiffness = units_of(found)[0], found.working_point.stiffness.unit if found.working_point else "1"
-    slopes = [
-        f"{quantity(t.stiffness, stiffness, t.half)} at {quantity(t.force, force)}" for t in press.tangent
-    ]
-    if slopes:
-        console.print(Text(f"slope of the loading: {', '.join(slopes)}"))
-    if press.hysteresis_loss is not None:
-        console.print(Text(lost(press.hysteresis_loss)))
-    if press.relaxation is not None:
-        own = press.relaxation
-        text = f"relaxation: {100 * own.share:.2g} % of the force in {own.duration:.3g} s"
-        console.print(Text(f"{text}, half of it in {own.half_time:.2g} s"))
 
 
 def _fit(found: Identification) -> str:

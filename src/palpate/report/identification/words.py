@@ -151,6 +151,25 @@ def lost(share: float) -> str:
     return f"{100 * share:.2g} % of the work of loading is lost"
 
 
+def press_facts(found: Identification) -> list[str]:
+    """Sentences on the press: the slope at each force, the lost work, the relaxation."""
+    press, point = found.press, found.working_point
+    if press is None:
+        return []
+    force, stiffness = units_of(found)[0], point.stiffness.unit if point else "1"
+    slopes = [
+        f"{quantity(t.stiffness, stiffness, t.half)} at {quantity(t.force, force)}" for t in press.tangent
+    ]
+    facts = [f"Slope by force: {', '.join(slopes)}."] if slopes else []
+    if press.hysteresis_loss is not None:
+        facts.append(f"{lost(press.hysteresis_loss)}.")
+    if press.relaxation is not None:
+        own = press.relaxation
+        share = f"{100 * own.share:.2g} % of the force relaxes"
+        facts.append(f"{share} in {own.duration:.3g} s, half of that in {own.half_time:.2g} s.")
+    return facts
+
+
 def limited_by(found: Identification) -> Cause:
     """Largest cause of the working point's interval."""
     point = found.working_point

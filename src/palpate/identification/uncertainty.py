@@ -1,0 +1,166 @@
+"""The uncertainty budget of a result: contributions by cause, and how they combine (GUM, JCGM 100:2008).
+
+A standard uncertainty is a standard deviation; u_c is the root of the sum of their squares, its degrees of freedom are
+Welch's and Satterthwaite's (annex G.4), and the expanded uncertainty U = k u_c is the half-width of the 95 % interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import hypot, isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate.arrays import Array
+from palpate.identification.causes import cause_of
+from palpate.signals.types import NORMAL
+
+_MOST_FREEDOM = 1e9
+"""Degrees of freedom from which on Student's t is the normal distribution."""
+
+
+def student(freedom: float, level: float = 0.95) -> float:
+    """Two-sided quantile of Student's t.
+
+    Args:
+        freedom: degrees of freedom; fewer than one count as one.
+        level: probability within.
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), (1 + level) / 2))
+
+
+def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
+    """Degrees of freedom of a sum of variances (Welch and Satterthwaite, JCGM 100, G.2b), shape (p,).
+
+    Args:
+        variance: by cause, shape (c, p).
+        freedom: degrees of freedom of each, shape (c, p).
+    """
+    variance = np.asarray(variance, np.float64)
+    total = variance.sum(axis=0)
+    loss = ((variance / np.where(total > 0, total, 1.0)) ** 2 / np.asarray(freedom)).sum(axis=0)
+    found: Array = 1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0)
+    return found
+
+
+class Contribution(NamedTuple):
+    """Contribution of one cause to the uncertainty of a result.
+
+    Args:
+        std: standard uncertainty, in the unit of the result.
+        freedom: its degrees of freedom.
+    """
+
+    std: float
+    freedom: float = np.inf
+
+    @classmethod
+    def within(cls, half: float) -> Contribution:
+        """Of a bound that is the half-width of a normal distribution's 95 % (JCGM 100, 4.3.4)."""
+        return cls(half / NORMAL)
+
+    @property
+    def half(self) -> float:
+        """95 % half-width by this cause alone."""
+        return (student(self.freedom) if isfinite(self.freedom) else NORMAL) * self.std
+
+    def times(self, gain: float) -> Contribution:
+        """Of a result that is a multiple of this one."""
+        return Contribution(abs(gain) * self.std, self.freedom)
+
+
+Contributions = Mapping[str, Contribution]
+
+
+class Input(NamedTuple):
+    """An input quantity that a cause stands for: estimate, standard uncertainty, and their unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Combined and expanded uncertainty of one result.
+
+    Args:
+        contributions: by cause; independent of each other.
+        expanded: half-width of the 95 % interval.
+    """
+
+    contributions: Contributions
+    expanded: float
+
+    @property
+    def combined(self) -> float:
+        """Combined standard uncertainty u_c."""
+        return hypot(*(own.std for own in self.contributions.values()))
+
+    @property
+    def freedom(self) -> float:
+        """Effective degrees of freedom; infinite where the normal distribution holds."""
+        variance, freedom = np.array([(own.std**2, own.freedom) for own in self.contributions.values()]).T
+        found = float(effective_freedom(variance, freedom))
+        return found if found < 0.99 * _MOST_FREEDOM else np.inf
+
+    @property
+    def coverage(self) -> float:
+        """Coverage factor k, the expanded over the combined uncertainty."""
+        return self.expanded / self.combined
+
+    def to_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
+        """Plain values that JSON can hold, largest contribution first; an infinite number is None.
+
+        Args:
+            inputs: of causes that are input quantities. The effect of any other is estimated in the unit of the result,
+                and its sensitivity is 1.
+        """
+        rows = sorted(self.contributions.items(), key=lambda item: -item[1].std)
+        return {
+            "combined_standard_uncertainty": self.combined,
+            "effective_degrees_of_freedom": _finite(self.freedom),
+            "coverage_factor": self.coverage,
+            "expanded_uncertainty": self.expanded,
+            "sources": [self._source(name, own, inputs.get(name)) for name, own in rows if own.std > 0],
+        }
+
+    def _source(self, name: str, own: Contribution, read: Input | None) -> dict[str, Any]:
+        cause = cause_of(name)
+        return {
+            "source": name,
+            "description": cause.described,
+            "type": cause.kind,
+            "distribution": "t" if isfinite(own.freedom) else "normal",
+            "input": read._asdict() if read else None,
+            "sensitivity": own.std / read.std if read and read.std else 1.0,
+            "standard_uncertainty": own.std,
+            "degrees_of_freedom": _finite(own.freedom),
+            "share": (own.std / self.combined) ** 2,
+        }
+
+
+def correlations(names: Sequence[str], cov: Array) -> dict[str, float]:
+    """Correlation coefficient of each pair of parameters, by their names with a comma between.
+
+    Args:
+        names: of the parameters, shape (p,).
+        cov: their covariance, shape (p, p).
+    """
+    std = np.sqrt(np.diag(cov))
+    pairs = combinations(range(len(names)), 2)
+    return {
+        f"{names[i]},{names[j]}": float(cov[i, j] / (std[i] * std[j]))
+        for i, j in pairs
+        if std[i] * std[j] > 0
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
