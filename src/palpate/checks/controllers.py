@@ -73,8 +73,7 @@ def a_step_keeps_nothing_on_the_part(controller: Any) -> None:
     first, _ = ticks(controller)
     again, _ = ticks(controller)
     require(
-        np.array_equal(first, again),
-        "repeated ticks give different torques; keep all memory in the state",
+        np.array_equal(first, again), "repeated ticks give different torques; keep all memory in the state"
     )
 
 

@@ -101,16 +101,15 @@ class InnerLoop:
 
     def to_json(self) -> dict[str, object]:
         """As plain JSON values."""
-        return {
-            "bandwidth_hz": self.bandwidth.to_json(),
-            "damping": self.damping.to_json(),
-            "delay_s": self.delay.to_json(),
-            "lag_s": self.lag.to_json(),
-            "stiffness_N_m": None if self.stiffness is None else self.stiffness.to_json(),
-            "gain": self.gain.to_json(),
-            "explained": self.explained,
-            "rate_hz": self.rate,
+        named = {
+            "bandwidth_hz": self.bandwidth,
+            "damping": self.damping,
+            "delay_s": self.delay,
+            "lag_s": self.lag,
         }
+        named |= {"gain": self.gain} | ({} if self.stiffness is None else {"stiffness_N_m": self.stiffness})
+        numbers = {name: p.to_json() for name, p in named.items()}
+        return {**numbers, "explained": self.explained, "rate_hz": self.rate}
 
     def of(self, arm: Arm, source: str) -> Arm:
         """The arm with this inner loop instead of its own; a servo takes the place of any.
@@ -127,17 +126,9 @@ class InnerLoop:
                 f"kind {arm.kind}: record a push and name the column of its force with --push, which makes it "
                 "a servo, or set [inner] by hand"
             )
-        inner = msgspec.structs.replace(
-            arm.inner,
-            **{
-                name: found
-                for key in ("bandwidth", "damping", "delay")
-                for name, found in (
-                    (key, getattr(self, key).value),
-                    (f"{key}_interval", (getattr(self, key).low, getattr(self, key).high)),
-                )
-            },
-        )
+        own = {name: getattr(self, name) for name in ("bandwidth", "damping", "delay")}
+        ends = {f"{name}_interval": (p.low, p.high) for name, p in own.items()}
+        inner = msgspec.structs.replace(arm.inner, **{name: p.value for name, p in own.items()}, **ends)
         return msgspec.structs.replace(arm, inner=inner, title=title)
 
     def _servo(self, shift: Array) -> ServoLoop:
@@ -181,13 +172,8 @@ def identify_inner_loop(
 
     A force moves a servo as the command does, less 1/K_s of it, and its rate takes up what its sensor is late. The
     blocks of K_s are eight parts of the push.
-
-    Args:
-        time: of the rows, evenly spaced [s], shape (n,).
-        command: position sent [m], shape (n,).
-        position: position measured at the same moment [m], shape (n,).
-        where: names the log in errors.
-        force: on the tip along the position, of either sign [N], shape (n,): a servo is identified.
+    Time of the rows, evenly spaced [s], position sent and position measured at the same moment [m], and force on the
+    tip along it, of either sign [N], with which a servo is identified, shapes (n,); `where` names the log in errors.
 
     Raises:
         InputError: too short, uneven, without motion, or without the excitation to tell the numbers apart.

@@ -83,8 +83,7 @@ class Cell(NamedTuple):
         step: of the physics [s].
         steps: of the physics in a tick.
         elastic: 1 where springs lead the links to a set-point, 0 where torques act on the links.
-        yields: 1 where those springs are the servos' own, of which the encoders show how they give way; 0 where motors
-            with encoders stand before them.
+        yields: 1 where those springs are servos' own, and encoders show how they give way; 0 behind motors.
         spring: of each joint [N m/rad, N/m], shape (n,).
         damper: beside it, or of the link's own rate for a servo [N m s/rad, N s/m], shape (n,).
         first: w^2 of the motors, which follow their set-points whatever pushes [1/s^2].

@@ -32,8 +32,7 @@ class ArmOptions:
     loop_from
         A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay.
     push
-        Column of the measured force in that log, as force_N:N, for an arm whose encoders show how it yields: the tip is
-        pushed once while the command rests, and the log identifies a servo.
+        Column of the measured force in that log, in which the tip is pushed once: it identifies a servo that yields.
     """
 
     arm: Annotated[LoopArm, QUIET]

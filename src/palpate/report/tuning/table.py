@@ -39,10 +39,7 @@ def rows(told: Tuning) -> list[tuple[str, str]]:
         ("peak at touch", _peak(told)),
         ("settling", f"{slowest:.3g} s with known stiffness" if isfinite(slowest) else "-"),
         ("overshoot", f"{100 * told.overshoot:.2g} % with known stiffness"),
-        (
-            "margins",
-            f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms",
-        ),
+        ("margins", f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms"),
         ("stable, exact", f"{low:.4g} to {high:.4g} N/m with constant gain, B = 0"),
     ]
     found += [("first touches", _domain(told)), ("stiffening", _stiffening(told))]
