@@ -46,7 +46,7 @@ def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
     listening.setblocking(False)
     master, speed = None, 0.0
     for _ in paced(arm, seconds):
-        master = _heard(listening, master, arm.arm.rate)
+        master = _heard(listening, master, arm)
         wanted = 0.0
         if master is not None:
             master.ticks += 1
@@ -60,7 +60,7 @@ def serve(arm: OneDirection, listening: socket.socket, seconds: float) -> None:
             _send(listening, protocol.packed(protocol.STATE, master.session, body), master.address)
 
 
-def _heard(listening: socket.socket, master: Master | None, rate: float) -> Master | None:
+def _heard(listening: socket.socket, master: Master | None, arm: OneDirection) -> Master | None:
     """Take all that came; a second master is told that the arm is busy."""
     now = time.monotonic()
     while True:
@@ -80,18 +80,21 @@ def _heard(listening: socket.socket, master: Master | None, rate: float) -> Mast
                 continue
             if master is None or master.session != session:
                 master = Master(address, session, now)
-            _send(listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(rate)), address)
+            _send(
+                listening, protocol.packed(protocol.WELCOME, session, protocol.welcome(arm.arm.rate)), address
+            )
         elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
-            _obey(master, kind, body)
+            _obey(master, arm, kind, body)
 
 
-def _obey(master: Master, kind: int, body: bytes) -> None:
+def _obey(master: Master, arm: OneDirection, kind: int, body: bytes) -> None:
     if kind == protocol.STOP:
         master.speed, master.heard = 0.0, master.heard - _LEFT
     found = protocol.read_move(body) if kind == protocol.MOVE else None
     if found is not None and found[0] > master.number:
-        master.number, master.speed, master.ticks = found[0], -found[1][2], 0
+        master.number, master.ticks = found[0], 0
+        arm.aside, master.speed = found[1][:2], -found[1][2]
 
 
 def _send(listening: socket.socket, data: bytes, address: Any) -> None:
