@@ -278,6 +278,12 @@ def test_a_bad_phantom_is_one_line(tmp_path, capsys, line):
     assert not (tmp_path / "o").exists()
 
 
+@pytest.mark.parametrize("words", [("--page", "map.html"), ("--presses", "20"), ("--stiffer-than", "2000")])
+def test_options_of_a_phantom_need_a_phantom(capsys, words):
+    assert main(["press", "--arm", "ur5e", "--force", "5:N", *words]) == 2
+    assert "--map is missing" in capsys.readouterr().err
+
+
 @pytest.mark.long
 def test_an_arm_maps_a_phantom(tmp_path, capsys):
     path = tmp_path / "phantom.toml"
@@ -292,6 +298,8 @@ def test_an_arm_maps_a_phantom(tmp_path, capsys):
         "19",
         "--stiffer-than",
         "2:kN/m",
+        "--page",
+        str(tmp_path / "live.html"),
         "--out",
         str(tmp_path / "o"),
     ]
@@ -299,6 +307,9 @@ def test_an_arm_maps_a_phantom(tmp_path, capsys):
     capsys.readouterr()
     assert main(["map", "--table", str(tmp_path / "o" / "places.csv"), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
+    live = (tmp_path / "live.html").read_text(encoding="utf-8")
+    assert "19 presses" in live
+    assert 'http-equiv="refresh"' not in live
     phantom = load_phantom(path)
     for row in answer["places"]:
         true = phantom.stiffness_at(np.array([[row["x"], row["y"]]]))[0]

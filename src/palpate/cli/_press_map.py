@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
@@ -11,7 +12,10 @@ from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.map import MapOptions
 from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions
-from palpate.files import fresh_folder, signed, write_json, write_text
+from palpate.files import check_place, fresh_folder, signed, write_json, write_text
+
+if TYPE_CHECKING:
+    from palpate.maps.result import MapResult
 
 
 def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
@@ -28,7 +32,9 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     from palpate.report import map as page
 
     assert phantom.map is not None
-    surface = load_phantom(phantom.map)
+    if phantom.page is not None:
+        check_place(phantom.page, "--page", ending=".html")
+    surface, title = load_phantom(phantom.map), f"Phantom {phantom.map.name}"
     request = MapOptions(stiffer_than=phantom.stiffer_than).request()
     question = simulated.question(asked, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
     folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"
@@ -40,11 +46,16 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
                 progress.update(task, completed=done, description=last)
                 return not interrupted()
 
-            result = palpate_phantom(question, surface, phantom.presses, request, show)
+            def grow(result: MapResult) -> None:
+                if phantom.page is not None:
+                    write_text(phantom.page, page.page(result, title, command(), live=True))
+
+            result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
         result.write_presses(fresh / "places.csv")
         result.write_csv(fresh / "map.csv")
         write_json(fresh / "summary.json", signed({"command": command(), **result.to_json()}))
-        write_text(fresh / "report.html", page.page(result, f"Phantom {phantom.map.name}", command()))
+        for path in filter(None, (fresh / "report.html", phantom.page)):
+            write_text(path, page.page(result, title, command()))
     if json:
         print_answer(result.to_json())
     else:

@@ -77,6 +77,7 @@ def press(
 
             code = press_map(asked, simulated, phantom, json=json)
         else:
+            only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
             code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")

@@ -89,6 +89,7 @@ def palpate_phantom(
     count: int,
     request: MapRequest,
     show: Callable[[int, str], bool],
+    grow: Callable[[MapResult], None],
 ) -> MapResult:
     """Press a grid, then where the map is worst known for what is asked.
 
@@ -99,6 +100,7 @@ def palpate_phantom(
         request: of the map.
         show: is called after each press, with the number of presses and a line about the last; it returns whether to
             go on.
+        grow: is called with each map.
 
     Raises:
         InputError: an arm that cannot reach the phantom, or too few presses.
@@ -111,16 +113,16 @@ def palpate_phantom(
     steps = [(np.arange(FIRST) / (FIRST - 1.0)) * side for side in phantom.size]
     waiting = list(np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2))
     size = np.asarray(phantom.size)
-    presses = Presses(np.empty((0, 2)), np.empty(0), np.empty(0), [])
+    presses, done = Presses(np.empty((0, 2)), np.empty(0), np.empty(0), []), 0
     while True:
         for place in waiting:
-            stiffness, half = _press(presser, phantom, place, len(presses.names) + len(presses.refused))
-            name = f"press {len(presses.names) + len(presses.refused) + 1}"
-            presses = _with(presses, place, stiffness, half, name)
-            done = len(presses.names) + len(presses.refused)
+            stiffness, half = _press(presser, phantom, place, done)
+            done += 1
+            presses = _with(presses, place, stiffness, half, f"press {done}")
             if not show(done, f"{stiffness:.4g} N/m" if half else "not identified"):
                 return map_of(presses, request)
         result = map_of(presses, request)
+        grow(result)
         if done >= count:
             return result
         grid = np.stack(np.meshgrid(*(np.linspace(0.0, side, 25) for side in size)), axis=-1).reshape(-1, 2)

@@ -159,11 +159,14 @@ class PhantomOptions:
         How many presses: sixteen on a grid, then where the map is worst known.
     stiffer_than
         A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it.
+    page
+        Where to write the page after each map; it loads itself again until the last.
     """
 
     map: Path | None = None
     presses: Annotated[int, WHOLE] = 40
     stiffer_than: str | None = None
+    page: Path | None = None
 
 
 @Parameter(name="*", group=Group("A real arm, over its wire", sort_key=3))
@@ -227,7 +230,7 @@ class LimitOptions:
     time_limit: Annotated[str | None, SIGNED] = None
 
 
-def only(part: SimulatedOptions | WireOptions | LimitOptions, of: str) -> None:
+def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, of: str) -> None:
     """Refuse options of the other kind of arm.
 
     Raises:
