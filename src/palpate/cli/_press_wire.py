@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -20,12 +21,18 @@ if TYPE_CHECKING:
     from palpate.contact_frame import Payload
     from palpate.force.gains import Gains
     from palpate.wires import AtRest, Limits, Order, Outcome, Wire
+    from palpate.wires.order import Path as SlidePath
 
-_WORD = "press"
 
-
-def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *, json: bool) -> int:
-    """Press with a real arm, or only read it.
+def press_over(
+    asked: AskOptions,
+    options: WireOptions,
+    limits: LimitOptions,
+    *,
+    json: bool,
+    path: SlidePath | None = None,
+) -> int:
+    """Press with a real arm, or slide with it along a path, or only read it, or recover a record.
 
     Returns:
         0 if it pressed for the requested time, 1 if not, 128 and the number of a signal that ended it.
@@ -33,17 +40,21 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
     Raises:
         InputError: a fault found before the arm moves.
     """
+    from palpate.wires import checked, look, open_wire, recover
+
+    if options.recover is not None:
+        print_lines(f"written: {recover(options.recover)}")
+        return 0
     task, most = task_of(asked, options, limits)
     if json and not (options.yes or options.dry_run):
         raise InputError("--json cannot ask for confirmation; add --yes or --dry-run")
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     from palpate.force import ForceLoop
-    from palpate.wires import checked, look, open_wire
     from palpate.wires.at_rest import notes_on, with_noise_of
 
     assert asked.gains is not None
-    order = checked(ForceLoop.load(asked.gains, options.certificate), task, most)
+    order = checked(ForceLoop.load(asked.gains, options.certificate), replace(task, path=path), most)
     tool = asked.tool
     arm = open_wire(str(options.wire))
     try:
@@ -58,7 +69,7 @@ def press_over(asked: AskOptions, options: WireOptions, limits: LimitOptions, *,
                 return _look(air, [*plan, *notes], notes, json)
             if not json:
                 print_lines(*notes)
-        _ask(options.yes)
+        _ask(options.yes, "press" if path is None else "slide")
         return _press(arm, order, options, _about(arm, order, tool), json)
     finally:
         arm.close()
@@ -128,10 +139,12 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     x, y, z = task.direction
     lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
     last = 1e3 * (gains.theta + gains.arm.tick)
+    path = task.path
+    along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
     does = (
         f"rests 0.5 s in the air and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
-        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}, goes"
-        f" back {1e3 * task.retreat:g} mm, rests"
+        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}{along},"
+        f" goes back {1e3 * task.retreat:g} mm, rests"
     )
     stops = (
         f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:.3g} mm from here, after"
@@ -163,15 +176,15 @@ def _lies(gains: Gains, limits: Limits) -> str:
     )
 
 
-def _ask(yes: bool) -> None:
+def _ask(yes: bool, word: str) -> None:
     if yes:
         return
     if not sys.stdin.isatty():
         raise InputError(
             "the arm would move, and there is no terminal to ask for confirmation; use --dry-run first, then add --yes"
         )
-    say(f"the arm will move; type {_WORD} to go on")
-    if sys.stdin.readline().strip() != _WORD:
+    say(f"the arm will move; type {word} to go on")
+    if sys.stdin.readline().strip() != word:
         raise InputError("not confirmed; nothing was moved")
 
 
@@ -208,6 +221,13 @@ def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
     if outcome.stiffness is not None:
         value, std = outcome.stiffness
         lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
+    if outcome.surface is not None:
+        n, mu = outcome.surface["normal"], outcome.surface["friction"]
+        low, high = (float("nan"),) * 2 if mu is None else mu["ci95"]
+        lines.append(
+            f"normal {n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f} within {outcome.surface['cone95_deg']:.2g} deg, friction"
+            f" {low:.2f} to {high:.2f}"
+        )
     lines += [*outcome.lateness.sentences(), words]
     if where is not None:
         lines.append(f"written: {where}; palpate identify {where} reads it")

@@ -9,7 +9,7 @@ from palpate.cli import _terminal
 from palpate.cli._answer import print_answer
 from palpate.cli._program import command
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import console, place, print_lines, show_answer
+from palpate.cli._terminal import console, place, show_answer
 from palpate.cli.options.flags import FLAG
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.press import (
@@ -69,12 +69,7 @@ def press(
     asked, simulated = asked or AskOptions(), simulated or SimulatedOptions()
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
     cell.check()
-    if wire.recover is not None:
-        from palpate.wires import recover
-
-        print_lines(f"written: {recover(wire.recover)}")
-        return 0
-    if wire.wire is None:
+    if wire.wire is None and wire.recover is None:
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
         if phantom is not None and phantom.map is not None:

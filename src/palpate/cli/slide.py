@@ -14,7 +14,9 @@ from palpate.cli._program import command
 from palpate.cli._terminal import console, place
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.force import with_slide
+from palpate.cli.options.kept import options_given
 from palpate.cli.options.names import QUIET, LoopArm, Physics
+from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
 from palpate.cli.options.values import vector
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD, fresh_folder, with_author, write_json
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
     from palpate.force.sliding.ground import Ground
     from palpate.press.sliding import JointedArm
 
+SHORTEST = 0.003
+"""Path that is one [m]."""
+_OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
 _SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
 
 
@@ -54,7 +59,7 @@ class SlideOptions:
     seconds
         Duration of the slide.
     normal
-        Direction into the surface as the law is told, x,y,z: the true one is 0,0,-1.
+        Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is 0,0,-1.
     mu_max
         Largest friction coefficient that there may be.
     tilt
@@ -79,7 +84,7 @@ class SlideOptions:
     path: str = "circle"
     length: Annotated[str, SIGNED] = "40:mm"
     seconds: Annotated[float, SIGNED] = 8.0
-    normal: Annotated[str, SIGNED] = "0,0,-1"
+    normal: Annotated[str | None, SIGNED] = None
     mu_max: Annotated[float, SIGNED] = 0.9
     tilt: Annotated[float, SIGNED] = 7.0
     step: Annotated[str, SIGNED] = "0:mm"
@@ -116,6 +121,16 @@ class SlideOptions:
         height = {"height": self.radius, "period": 0.02} if name == "step" else {}
         radius = 0.2 if name == "step" else self.radius
         return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
+
+    @property
+    def extent(self) -> float:
+        """Of the path [m]."""
+        length = in_si("--length", self.length, "length")
+        if not 1.0 <= self.seconds <= 600.0:
+            raise InputError(f"--seconds must be from 1 to 600, got {self.seconds:g}")
+        if not length >= SHORTEST:
+            raise InputError(f"--length must be at least {1e3 * SHORTEST:g} mm, got {1e3 * length:g} mm")
+        return length
 
     @property
     def radius(self) -> float:
@@ -169,16 +184,24 @@ class SlideOptions:
 def slide(
     *,
     asked: SlideOptions | None = None,
+    wire: WireOptions | None = None,
+    limits: LimitOptions | None = None,
     out: Path | None = None,
     replace: Annotated[bool, FLAG] = False,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
-    """Hold a force while the tip moves along an unknown curved surface, in simulation.
+    """Hold a force while the tip moves along an unknown curved surface, in simulation or with a real arm.
 
     palpate slide --arm fr3 --force 15:N --speed 30:mm/s --shape bowl:150:mm --surface K=20000,mu=0.3 --path raster
 
     The arm looks for the surface along --normal, presses, and slides. It estimates normal, friction and stiffness, each
     with an interval. Exit code 1: the force was not held within 3 % rms and 10 %.
+
+    A real arm slides with the gains of palpate tune --slide, after a confirmation, and with --dry-run not at all. The
+    path's first direction is the base's x along the surface. The arm stops as in palpate press --wire:
+
+    palpate slide --wire rtde:192.168.0.10 --gains gains.toml --force 15:N --normal 0,0,-1 --path line --length 40:mm
+    --force-limit 40:N --speed-limit 50:mm/s --travel-limit 60:mm --time-limit 30:s --dry-run
 
     Parameters
     ----------
@@ -190,18 +213,17 @@ def slide(
         Print one JSON object and nothing else.
     """
     from palpate.force.sliding.slide_domain import numbers_of
-    from palpate.force.sliding.slide_world import GAP, directions
+    from palpate.force.sliding.slide_world import directions
     from palpate.report.slide import sentence, summarise, write_report
 
-    asked = asked or SlideOptions()
+    asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
+    if wire.wire is not None or wire.recover is not None:
+        return _slide_over(asked, wire, limits, json)
+    for part in (wire, limits):
+        only(part, "a real arm, and --wire is missing; add --wire")
     gains = asked.tuned()
     slide_numbers = numbers_of(gains)
-    if not 1.0 <= asked.seconds <= 600.0:
-        raise InputError(f"--seconds must be from 1 to 600, got {asked.seconds:g}")
-    length = in_si("--length", asked.length, "length")
-    if not length >= GAP:
-        raise InputError(f"--length must be at least {1e3 * GAP:g} mm, got {1e3 * length:g} mm")
-    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, length)
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
     ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
@@ -221,3 +243,17 @@ def slide(
             screen.print(f"! {note}", soft_wrap=True)
         place(screen, "report:", folder / "report.html")
     return 0 if summary["end"] == "held" else 1
+
+
+def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
+    from palpate.cli._press_wire import press_over
+    from palpate.wires.order import Path as SlidePath
+
+    other = next((name for name in options_given((asked,)) if name not in _OF_WIRE), None)
+    if other is not None:
+        raise InputError(
+            f"--{other} is for a simulated slide, and --wire names a real arm; leave out --{other}"
+        )
+    path = SlidePath(asked.path, asked.extent, asked.seconds)
+    press = AskOptions(force=asked.force, gains=asked.gains, normal=asked.normal, seconds=asked.seconds)
+    return press_over(press, wire, limits, json=json, path=path)

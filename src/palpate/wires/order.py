@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate._vector import Vec3
+from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force import ForceLoop
+from palpate.force import ForceLoop, SlidingLoop
 from palpate.force.gains import Gains
+from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.slide_state import beside
+from palpate.force.sliding.slide_world import directions
 from palpate.press.tare import TARE
 from palpate.press.tool import Plan
 from palpate.wires.protocol import Triple, triple
@@ -46,6 +51,32 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Path:
+    """A path along a surface.
+
+    Args:
+        name: line, back, raster or circle.
+        length: of a line or a pass, radius of a circle [m].
+        seconds: of the slide [s].
+    """
+
+    name: str
+    length: float
+    seconds: float
+
+    def directions(self, gains: Gains, into: Array) -> Array:
+        """Unit vectors in the base's axes for each tick, shape (n, 3).
+
+        Args:
+            gains: with a table `slide`.
+            into: direction into the surface, of unit length, shape (3,).
+        """
+        e1 = np.array(beside(Vec3(*into.tolist())))  # type: ignore[no-untyped-call]
+        ways = directions(self.name, self.seconds, gains.arm.rate, numbers_of(gains).speed, self.length)
+        return np.asarray(ways @ np.array([e1, np.cross(e1, into), -into]))
+
+
+@dataclass(frozen=True)
 class Task:
     """The order.
 
@@ -55,6 +86,7 @@ class Task:
         hold: how long to press after the touch [s].
         retreat: way back afterwards [m].
         probe: share of the force by which it is lowered now and then.
+        path: along the surface; None for a press.
 
     Raises:
         InputError: a probe that is no share, a hold that is no time.
@@ -65,6 +97,7 @@ class Task:
     hold: float
     retreat: float
     probe: float = 0.0
+    path: Path | None = None
 
     def __post_init__(self) -> None:
         self.plan  # noqa: B018 - it refuses what it cannot be
@@ -154,4 +187,24 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
     if not 0.0 <= task.retreat <= limits.travel:
         raise InputError(f"--retreat must be from 0 to the travel limit of {1e3 * limits.travel:g} mm")
     loop.desired = task.force
-    return Order(loop, replace(task, direction=triple(np.array(task.direction) / size)), limits)
+    task = replace(task, direction=triple(np.array(task.direction) / size))
+    if task.path is not None:
+        _check_path(task.path, gains, task, limits)
+    return Order(loop, task, limits)
+
+
+def _check_path(path: Path, gains: Gains, task: Task, limits: Limits) -> None:
+    speed, into = numbers_of(gains).speed, np.array(task.direction)
+    SlidingLoop(gains, into)  # compiled before the arm is read
+    if speed > limits.speed:
+        raise InputError(
+            f"the slide's {1e3 * speed:g} mm/s are above the speed limit of {1e3 * limits.speed:g} mm/s; tune for a "
+            "slower slide"
+        )
+    ways = path.directions(gains, into)
+    reach = float(np.linalg.norm(speed * gains.arm.tick * ways.cumsum(axis=0), axis=1).max())
+    if not reach <= limits.travel:
+        raise InputError(
+            f"the path reaches {1e3 * reach:.3g} mm from its start, beyond the travel limit of "
+            f"{1e3 * limits.travel:.3g} mm; raise --travel-limit, or make --length smaller"
+        )

@@ -18,6 +18,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
+from palpate.force import SlidingLoop
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.wires.at_rest import AtRest
@@ -39,6 +40,7 @@ class Outcome:
         force: mean over the last third of the hold [N]; None if it was not reached.
         settled: seconds from the touch until the force was within 5 % for good; None if it was not.
         stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
+        surface: normal and friction at the end of a slide with their intervals; None of a press.
         lateness: of the loop.
         rest: what was seen before.
         troubles: ticks of each trouble of the law, by its sentence.
@@ -50,6 +52,7 @@ class Outcome:
     force: float | None
     settled: float | None
     stiffness: tuple[float, float] | None
+    surface: Mapping[str, Any] | None
     lateness: Lateness
     rest: AtRest
     troubles: Mapping[str, int]
@@ -63,6 +66,7 @@ class Outcome:
             "force_N": self.force,
             "settled_s": self.settled,
             "stiffness_N_per_m": None if self.stiffness is None else list(self.stiffness),
+            **({} if self.surface is None else {"surface": self.surface}),
             "lateness": self.lateness.to_json(),
             "bias_N": self.rest.bias.tolist(),
             "noise_N": self.rest.noise,
@@ -70,6 +74,16 @@ class Outcome:
             "troubles": dict(self.troubles),
             "rate_Hz": self.rest.rate,
         }
+
+
+def surface_of(loop: SlidingLoop) -> dict[str, Any]:
+    """Normal and friction of a slide with their 95 % intervals, as plain JSON values."""
+    mu = loop.friction
+    return {
+        "normal": loop.normal.tolist(),
+        "cone95_deg": float(np.degrees(loop.normal_cone95)),
+        "friction": None if mu is None else {"value": float(mu), "ci95": list(mu.ci95)},
+    }
 
 
 def force_reached(times: Array, forces: Array) -> float | None:

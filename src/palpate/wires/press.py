@@ -1,4 +1,4 @@
-"""A press over a wire: tare in the air, approach and press with `ForceLoop`, withdraw, rest; stop at any limit.
+"""A press over a wire, or a slide: tare in free motion, approach, `ForceLoop` or `SlidingLoop`, withdraw, rest.
 
 The loop is driven by the arm's own readings. In each tick a reading comes through the guard, is compared with all stop
 conditions, and goes through the law; its speed goes out through the guard. Whatever ends the press, the arm is told to
@@ -12,15 +12,16 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.force import ForceLoop, SlidingLoop
 from palpate.press.tool import Troubles
 from palpate.wires.at_rest import AtRest, look, with_noise_of
 from palpate.wires.order import Limits, Order
-from palpate.wires.outcome import Outcome, Rows, force_reached, settling_time
+from palpate.wires.outcome import Outcome, Rows, force_reached, settling_time, surface_of
 from palpate.wires.protocol import (
     Command,
     EndedError,
@@ -234,6 +235,25 @@ def _age(now: Moment, order: Order) -> str | None:
 
 
 _PHASES = {"air": 0.0, "learning": 1.0, "locked": 2.0}
+_SLIDING = 3.0
+_STILL = 1e-12
+"""Speed that is none [m/s]."""
+
+
+class Known(NamedTuple):
+    """The surface as a law knows it.
+
+    Args:
+        phase: of the press; 0 in free motion.
+        bound: K_u [N/m].
+        stiffness: as the position feels it, and its standard deviation [N/m]; None before any was found.
+        normal: into the surface, shape (3,).
+    """
+
+    phase: float
+    bound: float
+    stiffness: tuple[float, float] | None
+    normal: Array
 
 
 def press(
@@ -261,14 +281,16 @@ def press(
         order, note = with_noise_of(rest, order)
         if note is not None:
             show(note)
-        under_way = _Press(wire, order, rows, rest, asked_to_stop, show)
-        return under_way.run()
+        kind = _Press if order.task.path is None else _Slide
+        return kind(wire, order, rows, rest, asked_to_stop, show).run()
     finally:
         wire.stop()
 
 
 class _Press:
     """A press under way; see `press`."""
+
+    _did = "pressed"
 
     def __init__(
         self,
@@ -286,7 +308,8 @@ class _Press:
         self._troubles = Troubles(lag, show)
         self._watch = Stopwatch(self._tick, order.jitter, order.most)
         self._direction = np.array(order.task.direction)
-        self._last, self._depth, self._commanded = rest.last, 0.0, 0.0
+        self._last, self._depth, self._commanded = rest.last, 0.0, np.zeros(3)
+        self._law: ForceLoop | SlidingLoop = order.loop
         self._touched: float | None = None
         self._pressed: list[tuple[float, float]] = []
         self._stiffness: tuple[float, float] | None = None
@@ -296,7 +319,7 @@ class _Press:
         self._guard.begin()
         try:
             self._hold()
-            ended, ok = f"pressed for {self._order.task.hold:g} s", True
+            ended, ok = f"{self._did} for {self._order.task.hold:g} s", True
             self._retreat()
         except EndedError as reason:
             ended, ok = str(reason), False
@@ -310,8 +333,19 @@ class _Press:
             now = self._read()
             if now.since_touch is not None:
                 self._loop.desired = self._plan.desired(now.since_touch)
-            self._move(now, self._loop.update(now.force, now.depth, float(now.missed)))
-            self._end_if(self._troubles.lasting(self._loop.trouble, now.since_start))
+            self._move(now, self._velocity(now))
+            self._end_if(self._troubles.lasting(self._law.trouble, now.since_start))
+
+    def _velocity(self, now: Moment) -> Array:
+        """That the law asks of the tool [m/s], shape (3,)."""
+        return self._loop.update(now.force, now.depth, float(now.missed)) * self._direction
+
+    def _known(self) -> Known:
+        """The surface as the law knows it."""
+        loop, found = self._loop, self._loop.estimate
+        bound = loop.gains.seen_cap if found is None else found.bound
+        stiffness = None if found is None else (found.stiffness, found.stiffness_std)
+        return Known(_PHASES[loop.phase], bound, stiffness, self._direction)
 
     def _retreat(self) -> None:
         """Go back from the surface."""
@@ -319,7 +353,7 @@ class _Press:
         # At half the limit: a pose that a network delays shows the way of two or three ticks as that of one.
         speed = min(0.5 * self._order.limits.speed, 10.0 * self._loop.gains.approach)
         while self._order.task.retreat and self._depth > back:
-            self._move(self._read(), -speed)
+            self._move(self._read(), -speed * self._direction)
 
     def _held(self) -> bool:
         return self._touched is not None and self._last.stamp - self._touched >= self._order.task.hold
@@ -344,40 +378,37 @@ class _Press:
             sense=sense,
             force=float((np.array(sense.force) - self._rest.bias) @ self._direction),
             depth=depth,
-            speed=(depth - self._depth) / max(ticks, 1.0) / self._tick,
+            speed=math.dist(sense.position, self._last.position) / max(ticks, 1.0) / self._tick,
             missed=max(round(ticks) - 1, 0),
             age=self._watch.age(sense.stamp, time.monotonic()),
             since_start=sense.stamp - self._rest.last.stamp,
             since_touch=None if self._touched is None else sense.stamp - self._touched,
         )
 
-    def _move(self, now: Moment, wanted: float) -> None:
-        """Command a speed along the direction [m/s], within the limit, and keep the row.
+    def _move(self, now: Moment, wanted: Array) -> None:
+        """Command a velocity [m/s], within the limit, and keep the row.
 
         A speed that the arm cannot have, or that is no number, is a fault of the law: the guard refuses it as it is.
         """
-        most, speed = self._order.limits.speed, wanted
-        if abs(wanted) <= self._loop.gains.arm.limits.speed:
-            speed = min(max(wanted, -most), most)
-        self._commanded += self._tick * speed
-        way = self._order.task.direction  # plain numbers: the guard names those that are none
-        place = [p + self._commanded * w for p, w in zip(self._rest.position, way, strict=True)]
-        self._guard.write(Command(triple([speed * w for w in way]), triple(place)))
+        size, velocity = float(np.linalg.norm(wanted)), wanted
+        if size <= self._loop.gains.arm.limits.speed:
+            velocity = wanted * min(1.0, self._order.limits.speed / max(size, _STILL))
+        self._commanded = self._commanded + self._tick * velocity
+        self._guard.write(Command(triple(velocity), triple(self._rest.position + self._commanded)))
         self._watch.done(now.sense.stamp, time.monotonic(), now.missed)
-        self._keep(now, speed)
+        self._keep(now, velocity)
 
-    def _keep(self, now: Moment, speed: float) -> None:
-        loop, sense = self._loop, now.sense
-        found = loop.estimate
-        if found is not None:
-            self._stiffness = (found.stiffness, found.stiffness_std)
-        if self._touched is None and loop.phase != "air":
+    def _keep(self, now: Moment, velocity: Array) -> None:
+        known, sense = self._known(), now.sense
+        self._stiffness = known.stiffness or self._stiffness
+        if self._touched is None and known.phase:
             self._touched = sense.stamp
         if self._touched is not None and not self._held():
-            self._pressed.append((sense.stamp - self._touched, now.force))
+            force = float((np.array(sense.force) - self._rest.bias) @ known.normal)
+            self._pressed.append((sense.stamp - self._touched, force))
         self._rows.add(
-            sense.stamp, sense.received, now.depth, now.force, speed, self._commanded,
-            found.bound if found is not None else loop.gains.seen_cap, _PHASES[loop.phase], float(now.missed),
+            sense.stamp, sense.received, now.depth, now.force, float(velocity @ self._direction),
+            float(self._commanded @ self._direction), known.bound, known.phase, float(now.missed),
             *sense.force, *sense.torque, *sense.position, *sense.quaternion,
         )  # fmt: skip
         self._end_if("there is no room for more readings" if self._rows.full else None)
@@ -391,7 +422,32 @@ class _Press:
             force=force_reached(times, forces) if ok else None,
             settled=settling_time(times, forces, self._order) if ok else None,
             stiffness=self._stiffness,
+            surface=surface_of(self._law) if isinstance(self._law, SlidingLoop) else None,
             lateness=self._watch.summary(),
             rest=self._rest,
             troubles=self._troubles.ticks,
         )
+
+
+class _Slide(_Press):
+    """A slide under way: time counts from where the force is held, and the tip begins to slide."""
+
+    _did = "slid"
+
+    def __init__(self, *given: Any):
+        super().__init__(*given)
+        self._law = self._sliding = SlidingLoop(self._loop.gains, self._direction)
+        self._sliding.desired = self._order.task.force
+        assert self._order.task.path is not None
+        self._ways = self._order.task.path.directions(self._loop.gains, self._direction)
+
+    def _velocity(self, now: Moment) -> Array:
+        tick = 0 if now.since_touch is None else round(now.since_touch / self._tick)
+        force, place = (np.array(now.sense.force) - self._rest.bias, np.array(now.sense.position))
+        way = self._ways[min(tick, len(self._ways) - 1)]
+        return self._sliding.update(force, place, way, float(now.missed))
+
+    def _known(self) -> Known:
+        law, K = self._sliding, self._sliding.stiffness
+        stiffness = None if K is None else (float(K), K.std)
+        return Known(_SLIDING * law.sliding, law.bound, stiffness, law.normal)

@@ -18,12 +18,16 @@ from palpate.wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""
+FRICTION = 0.3
+"""Of the surface."""
 _BEHIND = 1.0
 """Behind real time by which this process must have been stopped [s]: so much is not made up for in a hurry."""
 
 
 class ToolAxisArm:
-    """An arm that moves along its tool's axis, -z of the base, towards a surface.
+    """An arm that moves along its tool's axis, -z of the base, towards a plane, and at once along it.
+
+    Friction is Coulomb's, behind a spring as stiff as the plane.
 
     Args:
         arm: how it moves and senses.
@@ -40,11 +44,17 @@ class ToolAxisArm:
         self._rng = np.random.default_rng(seed)
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
+        self.at, self.aside, self.bent = np.array([0.4, 0.0]), np.zeros(2), np.zeros(2)
         self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
 
     def tick(self, speed: float) -> None:
-        """Go on by one tick of the arm's own clock with this commanded speed [m/s]."""
+        """Go on by one tick of the arm's own clock with this commanded speed, if it is any with `aside` [m/s]."""
         world = self.world
+        self.aside = np.array(self.aside) * (speed != 0.0)
+        self.at += world.tick * self.aside
+        bent = self.bent + world.tick * self.aside
+        most = FRICTION * abs(self.body.reading) / self.surface.stiffness
+        self.bent = bent * min(1.0, most / max(float(np.linalg.norm(bent)), 1e-12))
         self.command += world.tick * min(max(speed, -world.speed), world.speed)
         into = self.command
         if world.torque > 0.0:
@@ -58,8 +68,8 @@ class ToolAxisArm:
 
     def reading(self) -> tuple[float, ...]:
         """Force, torque, position, quaternion: the tool points down."""
-        force = (self.bias[0], self.bias[1], self.bias[2] - self.body.reading)
-        return (*force, 0.0, 0.0, 0.0, 0.4, 0.0, START - self.body.x, 1.0, 0.0, 0.0, 0.0)
+        force = self.bias + np.array([*self.surface.stiffness * self.bent, -self.body.reading])
+        return (*force, 0.0, 0.0, 0.0, *self.at, START - self.body.x, 1.0, 0.0, 0.0, 0.0)
 
 
 def words_of(module: str, about: str | None) -> argparse.ArgumentParser:

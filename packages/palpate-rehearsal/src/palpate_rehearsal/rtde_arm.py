@@ -16,6 +16,8 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from palpate_rehearsal.rehearsal import START, ToolAxisArm, arm_of, loopback, ready, ticks, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
@@ -25,13 +27,6 @@ READY, DONE = 1, 2
 # Numbers of ur-rtde's commands.
 NOTHING, ZERO, SPEEDL, SPEED_STOP, SERVO_STOP, SERVOL, WATCHDOG, STOP = 0, 8, 10, 15, 16, 24, 35, 255
 _DONE = {ZERO, SPEED_STOP, SERVO_STOP, WATCHDOG}
-_NAMES = {
-    1: "moveJ", 2: "moveJ_IK", 3: "moveL", 4: "moveL_FK", 6: "forceMode", 7: "forceModeStop", 9: "speedJ", 11: "servoJ",
-    12: "servoC", 13: "setStandardDigitalOut", 14: "setToolDigitalOut", 17: "setPayload", 18: "teachMode",
-    19: "endTeachMode", 20: "forceModeSetDamping", 21: "forceModeSetGainScaling", 22: "setSpeedSlider",
-    23: "setAnalogOutput", 25: "toolContact", 29: "setTcp", 31: "triggerProtectiveStop", 33: "stopL", 34: "stopJ",
-}  # fmt: skip
-"""Of ur-rtde's commands that are not simulated."""
 _TYPES = {
     "VECTOR6D": "target_q target_qd target_qdd target_current target_moment actual_q actual_qd actual_current"
     " actual_current_window joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose"
@@ -133,6 +128,7 @@ class Controller:
         value = [float(numbers.get(f"input_double_register_{i}", 0.0)) for i in range(8)]
         if command in {SPEEDL, SERVOL}:
             self.speed, self.height = -value[2], (value[2] if command == SERVOL else None)
+            self.arm.aside = np.array(value[:2]) if command == SPEEDL else np.zeros(2)
             return
         if command in {SPEED_STOP, SERVO_STOP, STOP}:
             self.speed, self.height = 0.0, None
@@ -149,10 +145,7 @@ class Controller:
 
     def _refuse(self, command: int) -> None:
         """End the script, as a controller does with a command that it cannot execute."""
-        name = _NAMES.get(command, "a command")
-        sys.stderr.write(
-            f"rtde_arm: {name} (number {command} of ur-rtde) is not simulated: the script has ended\n"
-        )
+        sys.stderr.write(f"rtde_arm: command {command} of ur-rtde is not simulated: the script has ended\n")
         self.speed, self.height, self.running = 0.0, None, False
 
     def tick(self) -> None:
@@ -165,14 +158,13 @@ class Controller:
 
     def value(self, name: str) -> Any:
         """Value of a variable, by its name."""
-        x, y, z = self.arm.reading()[6:9]
-        # The controller shows what the surface exerts on the tool.
-        up = -(self.arm.reading()[2] - self.zero)
+        fx, fy, fz, *_, x, y, z = self.arm.reading()[:9]
         code = _CODES[kind_of(name)]
         known = {
             "timestamp": self.arm.time,
             "actual_TCP_pose": (x, y, z, 3.14159, 0.0, 0.0),
-            "actual_TCP_force": (0.0, 0.0, up, 0.0, 0.0, 0.0),
+            # The controller shows what the surface exerts on the tool.
+            "actual_TCP_force": (-fx, -fy, self.zero - fz, 0.0, 0.0, 0.0),
             "robot_status_bits": 1 | (2 if self.running else 0),
             "safety_status_bits": 1,
             "runtime_state": _RUNNING if self.running else _STOPPED,

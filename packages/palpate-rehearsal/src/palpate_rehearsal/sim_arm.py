@@ -11,6 +11,8 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from palpate.wires import sim as protocol
 from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, ready, ticks, words_of
 
@@ -46,7 +48,7 @@ def serve(arm: ToolAxisArm, listening: socket.socket, seconds: float) -> None:
     listening.setblocking(False)
     master, speed = None, 0.0
     for _ in ticks(arm, seconds):
-        master = _receive(listening, master, arm.arm.rate)
+        master = _receive(listening, master, arm)
         wanted = 0.0
         if master is not None:
             master.ticks += 1
@@ -60,7 +62,7 @@ def serve(arm: ToolAxisArm, listening: socket.socket, seconds: float) -> None:
             _send(listening, protocol.pack(protocol.STATE, master.session, body), master.address)
 
 
-def _receive(listening: socket.socket, master: Master | None, rate: float) -> Master | None:
+def _receive(listening: socket.socket, master: Master | None, arm: ToolAxisArm) -> Master | None:
     """Take all that came; a second master is told that the arm is busy."""
     now = time.monotonic()
     while True:
@@ -80,18 +82,21 @@ def _receive(listening: socket.socket, master: Master | None, rate: float) -> Ma
                 continue
             if master is None or master.session != session:
                 master = Master(address, session, now)
-            _send(listening, protocol.pack(protocol.WELCOME, session, protocol.welcome(rate)), address)
+            _send(
+                listening, protocol.pack(protocol.WELCOME, session, protocol.welcome(arm.arm.rate)), address
+            )
         elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
-            _obey(master, kind, body)
+            _obey(master, arm, kind, body)
 
 
-def _obey(master: Master, kind: int, body: bytes) -> None:
+def _obey(master: Master, arm: ToolAxisArm, kind: int, body: bytes) -> None:
     if kind == protocol.STOP:
         master.speed, master.heard = 0.0, master.heard - _LEFT
     found = protocol.read_move(body) if kind == protocol.MOVE else None
     if found is not None and found[0] > master.number:
-        master.number, master.speed, master.ticks = found[0], -found[1][2], 0
+        master.number, master.ticks = found[0], 0
+        arm.aside, master.speed = np.array(found[1][:2]), -found[1][2]
 
 
 def _send(listening: socket.socket, data: bytes, address: Any) -> None:
