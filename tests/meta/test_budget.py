@@ -20,8 +20,9 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=370, lines=63943, tokens=434098),
+    "src/palpate": Weight(files=360, lines=62456, tokens=421756),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=67, lines=10575, tokens=80801),
+    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2715, tokens=21005),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=768, tokens=6210),
     "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2329, tokens=14922),
     "packages/palpate-export/src/palpate_export": Weight(files=8, lines=1950, tokens=12448),
@@ -31,7 +32,7 @@ LARGEST = {
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 120, 12
+PARTICIPLES, SHORT_DOCSTRINGS = 118, 12
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {

@@ -23,7 +23,7 @@ from palpate.force.slide_table import Slide
 from palpate.logs import read_record
 from palpate.wires import Limits, Rows, Task, checked, press
 from palpate.wires.order import Path as SlidePath
-from palpate_rehearsal.rehearsal import FRICTION, OneDirection
+from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
 from wires.slow_cell import PATIENCE, WORDS, arm, cell, child, relayed, wait_for_rows
 from wires.test_press import FakeWire
 
@@ -56,7 +56,7 @@ def order_of(folder, path=PATH, **limits):
 
 
 def sliding(folder, lie=lambda sense, first: sense, since=4.0):
-    tip = OneDirection(load_arm(str(folder / "arm.toml")), surface(4000.0, 20.0), 0.002, (1.0, -0.5, 2.0), 0)
+    tip = ToolAxisArm(load_arm(str(folder / "arm.toml")), surface(4000.0, 20.0), 0.002, (1.0, -0.5, 2.0), 0)
     wire, order = SlidingWire(tip, lie, since), order_of(folder)
     rows = Rows(None, order.most, {})
     outcome = press(wire, order, rows, lambda: None)

@@ -147,7 +147,7 @@ def export(
 
 
 _EXPORTERS = {"scene": ("a simulator", "palpate-export"), "law": ("C", "palpate-native")}
-"""What each exporter writes, and the distribution that has it."""
+"""Target of each exporter, and the distribution that has it."""
 
 
 def _exporter(name: str) -> Callable[..., int]:

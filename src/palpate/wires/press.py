@@ -240,7 +240,7 @@ _STILL = 1e-12
 """Speed that is none [m/s]."""
 
 
-class Known(NamedTuple):
+class SurfaceBelief(NamedTuple):
     """The surface as a law knows it.
 
     Args:
@@ -338,14 +338,16 @@ class _Press:
 
     def _velocity(self, now: Moment) -> Array:
         """That the law asks of the tool [m/s], shape (3,)."""
-        return self._loop.update(now.force, now.depth, float(now.missed)) * self._direction
+        speed = self._loop.update(now.force, now.depth, float(now.missed))
+        with np.errstate(invalid="ignore"):  # of an infinite speed, which the guard refuses
+            return speed * self._direction
 
-    def _known(self) -> Known:
+    def _known(self) -> SurfaceBelief:
         """The surface as the law knows it."""
         loop, found = self._loop, self._loop.estimate
         bound = loop.gains.seen_cap if found is None else found.bound
         stiffness = None if found is None else (found.stiffness, found.stiffness_std)
-        return Known(_PHASES[loop.phase], bound, stiffness, self._direction)
+        return SurfaceBelief(_PHASES[loop.phase], bound, stiffness, self._direction)
 
     def _retreat(self) -> None:
         """Go back from the surface."""
@@ -447,7 +449,7 @@ class _Slide(_Press):
         way = self._ways[min(tick, len(self._ways) - 1)]
         return self._sliding.update(force, place, way, float(now.missed))
 
-    def _known(self) -> Known:
+    def _known(self) -> SurfaceBelief:
         law, K = self._sliding, self._sliding.stiffness
         stiffness = None if K is None else (float(K), K.std)
-        return Known(_SLIDING * law.sliding, law.bound, stiffness, law.normal)
+        return SurfaceBelief(_SLIDING * law.sliding, law.bound, stiffness, law.normal)

@@ -44,7 +44,8 @@ class ToolAxisArm:
         self._rng = np.random.default_rng(seed)
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
-        self.at, self.aside, self.bent = np.array([0.4, 0.0]), np.zeros(2), np.zeros(2)
+        self.at, self.bent = np.array([0.4, 0.0]), np.zeros(2)
+        self.aside: Any = (0.0, 0.0)
         self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
 
     def tick(self, speed: float) -> None:
@@ -54,7 +55,7 @@ class ToolAxisArm:
         self.at += world.tick * self.aside
         bent = self.bent + world.tick * self.aside
         most = FRICTION * abs(self.body.reading) / self.surface.stiffness
-        self.bent = bent * min(1.0, most / max(float(np.linalg.norm(bent)), 1e-12))
+        self.bent = bent * min(1.0, most / max(np.hypot(*bent), 1e-12))
         self.command += world.tick * min(max(speed, -world.speed), world.speed)
         into = self.command
         if world.torque > 0.0:

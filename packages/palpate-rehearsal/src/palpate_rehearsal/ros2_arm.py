@@ -80,7 +80,7 @@ class Node:
         self._taken = ros2_messages.message(SENT[kind])
         self._commands = DataReader(participant, topic("/command", SENT[kind]), qos=qos)
 
-    def heard(self, arm: ToolAxisArm) -> float | None:
+    def speed_commanded(self, arm: ToolAxisArm) -> float | None:
         """The speed downwards that was commanded since [m/s]; None if nothing came."""
         speed = None
         for sample in self._commands.take(10):
@@ -116,7 +116,7 @@ def serve(arm: ToolAxisArm, node: Node, seconds: float) -> None:
     """Run at real time until the seconds of the arm are over."""
     speed, silent = 0.0, 0
     for _ in ticks(arm, seconds):
-        heard = node.heard(arm)
+        heard = node.speed_commanded(arm)
         silent = 0 if heard is not None else silent + 1
         speed = heard if heard is not None else (speed if silent < _REST else 0.0)
         arm.tick(speed)

@@ -16,8 +16,6 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from palpate_rehearsal.rehearsal import START, ToolAxisArm, arm_of, loopback, ready, ticks, words_of
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
@@ -110,7 +108,7 @@ class Controller:
         self.commands: list[int] = []
         self.master: Client | None = None
 
-    def uploaded(self) -> None:
+    def start_script(self) -> None:
         """A control script has come, and runs."""
         self.running, self.state = True, READY
         self.least, self.heard, self.speed, self.height = 0.0, self.arm.time, 0.0, None
@@ -128,7 +126,7 @@ class Controller:
         value = [float(numbers.get(f"input_double_register_{i}", 0.0)) for i in range(8)]
         if command in {SPEEDL, SERVOL}:
             self.speed, self.height = -value[2], (value[2] if command == SERVOL else None)
-            self.arm.aside = np.array(value[:2]) if command == SPEEDL else np.zeros(2)
+            self.arm.aside = value[:2] if command == SPEEDL else (0.0, 0.0)
             return
         if command in {SPEED_STOP, SERVO_STOP, STOP}:
             self.speed, self.height = 0.0, None
@@ -235,7 +233,7 @@ class Server:
         elif port == DASHBOARD:
             self._dashboard(one, data)
         else:
-            self.controller.uploaded()
+            self.controller.start_script()
 
     def _lose(self, one: socket.socket) -> None:
         self.selector.unregister(one)

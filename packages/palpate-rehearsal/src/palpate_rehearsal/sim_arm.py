@@ -11,8 +11,6 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from palpate.wires import sim as protocol
 from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, ready, ticks, words_of
 
@@ -96,7 +94,7 @@ def _obey(master: Master, arm: ToolAxisArm, kind: int, body: bytes) -> None:
     found = protocol.read_move(body) if kind == protocol.MOVE else None
     if found is not None and found[0] > master.number:
         master.number, master.ticks = found[0], 0
-        arm.aside, master.speed = np.array(found[1][:2]), -found[1][2]
+        arm.aside, master.speed = found[1][:2], -found[1][2]
 
 
 def _send(listening: socket.socket, data: bytes, address: Any) -> None:

@@ -51,7 +51,7 @@ def curves_of(table: StudyRows, asked: Curves, number: int) -> Drawn:
     """Curves that a study asks for."""
     metric, x = metric_of(asked.metric), table.scale(asked.x)
 
-    def made() -> list[LinePanel]:
+    def curves() -> list[LinePanel]:
         panels = []
         for title, value, rows in table.panels(asked):
             drawn = [*lines(table, rows, asked, x), *references(table, asked, x, value)]
@@ -63,7 +63,7 @@ def curves_of(table: StudyRows, asked: Curves, number: int) -> Drawn:
         f"{sentence(metric)}, over {x.label}{restricted_to(asked)}: median, and the range over the seeds and "
         f"the other parameters. Settings with an incomplete run have no point.{against}"
     )
-    return Drawn(f"curves{number}", caption, metric, made, curves_figure)
+    return Drawn(f"curves{number}", caption, metric, curves, curves_figure)
 
 
 def lines(table: StudyRows, rows: DataFrame, asked: Curves, x: Scale) -> Iterator[MetricLine]:
