@@ -24,8 +24,7 @@ FEWEST = 50 * BLOCKS
 TOLERANCE = 0.25
 """Largest half-width of a number that counts as identified, as a share of its value: as for `palpate identify`."""
 _STARTS = ((3.0, 1.0), (10.0, 0.7), (30.0, 0.7), (5.0, 4.0))
-"""w/2 pi [Hz] and z from which a fit starts; the delay starts from what is left of the whole lag. The last is that of a
-servo that yields."""
+"""w/2 pi [Hz] and z from which a fit starts, a servo's last; the delay starts from what is left of the whole lag."""
 _THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
 """Of log w, log z, delay [s] and log K_s, for the slope of theta."""
 ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
@@ -216,8 +215,7 @@ def _check(found: InnerLoop, where: str) -> None:
         )
     lag = found.lag.value + found.delay.value
     sizes = {"bandwidth": found.bandwidth.value, "damping": found.damping.value, "delay": lag}
-    if found.stiffness is not None:  # of a servo, what lies between its lag and its delay counts in theta
-        sizes = {"lag": found.lag.value}
+    sizes = sizes if found.stiffness is None else {"lag": found.lag.value}  # theta counts the rest of a servo
     wide = [name for name, size in sizes.items() if getattr(found, name).half > TOLERANCE * size]
     if wide:
         raise InputError(
