@@ -24,12 +24,9 @@ FEWEST = 50 * BLOCKS
 TOLERANCE = 0.25
 """Largest half-width of a number that counts as identified, as a share of its value: as for `palpate identify`."""
 _STARTS = ((3.0, 1.0), (10.0, 0.7), (30.0, 0.7), (5.0, 4.0))
-"""w/2 pi [Hz] and z from which a fit starts; the delay starts from what is left of the whole lag. The last is that of a
-servo that yields."""
+"""w/2 pi [Hz] and z from which a fit starts, a servo's last; the delay starts from what is left of the whole lag."""
 _THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
 """Of log w, log z, delay [s] and log K_s, for the slope of theta."""
-
-
 ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
 """By which one mass misses an arm of several joints: standard deviations, as shares of the number, of the delay of m/D.
 Measured by benchmarks/arms/servo_logs.py --seed 11, as what the fit's own errors leave."""
@@ -186,8 +183,8 @@ def identify_inner_loop(
     delay, lag = Parameter(late, max(late - half, 0.0), late + half), errors.factor(2.0 * z / w, -1.0, 1.0)
     stiffness = None
     if force is not None:
-        stiffness = errors.factor(1.0 / abs(float(best[4])), 0.0, 0.0, 0.0, 1.0)
-        stiffness = stiffness.beside(ONE_MASS["stiffness"] * stiffness.value)
+        K = 1.0 / abs(float(best[4]))
+        stiffness = errors.factor(K, 0.0, 0.0, 0.0, 1.0).beside(ONE_MASS["stiffness"] * K)
         delay, lag = delay.beside(ONE_MASS["delay"] * 0.5 / (z * w)), lag.beside(ONE_MASS["lag"] * lag.value)
     found = InnerLoop(
         bandwidth=errors.factor(w / (2.0 * pi), 1.0),
@@ -218,8 +215,7 @@ def _check(found: InnerLoop, where: str) -> None:
         )
     lag = found.lag.value + found.delay.value
     sizes = {"bandwidth": found.bandwidth.value, "damping": found.damping.value, "delay": lag}
-    if found.stiffness is not None:  # of a servo, what lies between its lag and its delay counts in theta
-        sizes = {"lag": found.lag.value}
+    sizes = sizes if found.stiffness is None else {"lag": found.lag.value}  # theta counts the rest of a servo
     wide = [name for name, size in sizes.items() if getattr(found, name).half > TOLERANCE * size]
     if wide:
         raise InputError(
@@ -364,8 +360,7 @@ def _errors(log_: _Log, p: Array, halves: list[Array]) -> tuple[FitErrors, Array
     columns = _columns(log_, p)
     best = np.asarray(np.linalg.lstsq(columns, log_.position, rcond=None)[0], dtype=np.float64)
     J = np.column_stack([*_slopes(log_, p, best), columns])
-    # In units of their own size: numbers of metres and of seconds are far apart.
-    size = np.linalg.norm(J, axis=0)
+    size = np.linalg.norm(J, axis=0)  # metres and seconds are far apart
     scores = J / size * (log_.position - columns @ best)[:, None]
     influence = scores @ np.linalg.pinv((J / size).T @ (J / size)) / size
     even = _blocks(influence, np.ones(len(scores)))
