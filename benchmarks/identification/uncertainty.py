@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate_references.models import FLOATS
-from palpate_references.problem import Problem, motion_and_force, problems
+from palpate_references.problem import CertifiedProblem, motion_and_force, problems
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Ratios(NamedTuple):
         return " / ".join(f"{one:.2f}" if one < MANY else f"{one:.0f}" for one in self)
 
 
-def record_of(problem: Problem, lag: float, rng: np.random.Generator) -> Record:
+def record_of(problem: CertifiedProblem, lag: float, rng: np.random.Generator) -> Record:
     """A log of the certified motion and model with noise of its own.
 
     Args:
@@ -76,7 +76,7 @@ def record_of(problem: Problem, lag: float, rng: np.random.Generator) -> Record:
     )
 
 
-def drawn(problem: Problem, draws: int, lag_std: float) -> Iterator[Identification]:
+def drawn(problem: CertifiedProblem, draws: int, lag_std: float) -> Iterator[Identification]:
     """Identifications of a log drawn again and again.
 
     Args:
@@ -118,7 +118,7 @@ def ratios(found: list[Identification], sources: tuple[str, ...]) -> dict[str, R
     return own
 
 
-def row(problem: Problem, draws: int) -> tuple[str, list[Ratios]]:
+def row(problem: CertifiedProblem, draws: int) -> tuple[str, list[Ratios]]:
     """A row of the table, and its ratios."""
     cells: list[str] = []
     every: list[Ratios] = []
