@@ -29,7 +29,7 @@ _THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
 """Of log w, log z, delay [s] and log K_s, for the slope of theta."""
 ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
 """Deviations by which one mass misses an arm of several joints: shares of the number, of the delay of m/D.
-Chosen on 79 logs of the kind of `benchmarks/arms/servo_logs.py`, which counts on others how often the intervals hold."""
+Chosen on 79 logs of the kind of `benchmarks/arms/servo_logs.py`, which counts on others how often they hold."""
 
 
 @dataclass(frozen=True)
