@@ -34,6 +34,9 @@ _OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
 _SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
 
 
+_SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
+
+
 @Parameter(name="*", group=Group("The slide", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SlideOptions:
@@ -73,14 +76,14 @@ class SlideOptions:
     physics
         own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms).
     seed
-        Of the noise.
+        Of the sensor's noise.
     """
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
     force: Annotated[str | None, SIGNED] = None
     speed: Annotated[str, SIGNED] = "30:mm/s"
-    shape: str = "sphere:200:mm"
-    surface: str = "K=20000,mu=0.3"
+    shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
+    surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
     path: str = "circle"
     length: Annotated[str, SIGNED] = "40:mm"
     seconds: Annotated[float, SIGNED] = 8.0
@@ -90,8 +93,8 @@ class SlideOptions:
     step: Annotated[str, SIGNED] = "0:mm"
     touches: Annotated[str, SIGNED] = "10:mm"
     gains: Path | None = None
-    physics: Annotated[Physics, QUIET] = "own"
-    seed: Annotated[int, WHOLE, Parameter(group=Group("Noise", sort_key=2))] = 0
+    physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
+    seed: Annotated[int, WHOLE, _SIMULATED] = 0
 
     def ground(self, ways: Array, speed: float, rate: float) -> Ground:
         """The surface under a path."""
