@@ -18,10 +18,12 @@ import pytest
 from cli.asked import refused
 from cli.json_keys import documented
 from palpate.cli import main
-from palpate.force import ForceLoop
+from palpate.force import ForceLoop, load_arm
+from palpate.force.simulated_press import surface
 from palpate.logs import read_record
 from palpate.wires import LostError, open_wire, sim
 from palpate_rehearsal import sim_arm
+from palpate_rehearsal.rehearsal import ToolAxisArm
 from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
 
 
@@ -211,12 +213,13 @@ def test_nobody_but_its_master_moves_an_arm_even_with_the_number_of_its_session(
         arm.settimeout(5.0)
         greeting = sim.pack(sim.HELLO, 7)
         down = sim.pack(sim.MOVE, 7, sim.move(1, (0.0, 0.0, -0.01)))
+        tip = ToolAxisArm(load_arm("ur5e"), surface(4000.0, 20.0), 0.002, (0.0, 0.0, 0.0), 0)
 
         def hear(sender, datagram, heard):
             sender.sendto(datagram, arm.getsockname())
             arm.recvfrom(512, socket.MSG_PEEK)
             arm.setblocking(False)
-            heard = sim_arm._receive(arm, heard, 100.0)
+            heard = sim_arm._receive(arm, heard, tip)
             arm.settimeout(5.0)
             return heard
 
