@@ -239,7 +239,7 @@ def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
 
 def equality():
     """The benchmark that asks every compiler."""
-    path = Path(__file__).parents[2] / "benchmarks" / "native" / "equality.py"
+    path = Path(__file__).parents[4] / "benchmarks" / "native" / "equality.py"
     spec = importlib.util.spec_from_file_location("equality", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
