@@ -61,10 +61,10 @@ def laws(gains: Gains) -> dict:
     from pathlib import Path
 
     sys.path.append(str(Path(__file__).parents[1] / "force"))
-    from rivals import AfterTouch, Impedance, Integral
+    from palpate_benchmark.rivals import AfterTouch, FixedAdmittance, Integral
 
     law, g, tick = gains.cautious(), gains.gain, gains.arm.tick
-    fixed = {"fixed integral": Integral(g), "admittance": Impedance(gains.theta / g, 1.0 / g, tick)}
+    fixed = {"fixed integral": Integral(g), "admittance": FixedAdmittance(gains.theta / g, 1.0 / g, tick)}
     after = {name: AfterTouch(one, gains.approach, gains.arm.sensor.noise) for name, one in fixed.items()}
     return {"cautious": law, "cautious, no lead": law._replace(lead=0.0)} | after
 
