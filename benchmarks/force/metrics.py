@@ -33,7 +33,7 @@ def main() -> None:
         ]
         results = [press_surfaces(e, FORCE, surfaces) for e in track(entries, arm, transient=True)]
         table = leaderboard(results)
-        print(f"\n**{results[0].arm}**\n")
+        print(f"### {results[0].arm}")
         for row in (table.head, ["---"] * len(table.head), *table.rows):
             print(f"| {' | '.join(row)} |")
 
