@@ -22,8 +22,8 @@ from scipy.linalg import expm
 
 from palpate.arrays import Array
 from palpate.controllers import Neural
-from palpate.controllers.direct_neural import direct_neural
 from palpate.force.lyapunov import common
+from palpate_thesis.direct_neural import direct_neural
 from palpate_thesis.figures.fig_4_03 import TICK, TIP, LoopParameters
 from palpate_thesis.one_joint import JOINT_2
 
