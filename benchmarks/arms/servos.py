@@ -58,14 +58,13 @@ def gains_from_log(name: str, seed: int) -> Gains:
 
 def cautious(gains: Gains):
     """palpate's own law with its guard, as a user runs it."""
-    loop = ForceLoop(gains)
-    return lambda force, position: loop.update(force, position)
+    return ForceLoop(gains).update
 
 
 def integral(gains: Gains):
     """v = g e after a reading of four standard deviations."""
     gain = fixed_gain(gains)
-    return after_touch(gains, lambda error, speed: gain * error)
+    return after_touch(gains, lambda error, _: gain * error)
 
 
 def admittance(gains: Gains):

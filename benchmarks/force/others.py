@@ -3,9 +3,9 @@
     python benchmarks/force/others.py --settings 1000
 
 Each setting is drawn at random and simulated as its makers' equations stand, with the delay as a line of past values,
-200 steps a delay. The stiffness at which the motion begins to grow is bisected to 0.3 %. The corrected numbers then take
-a step of force on surfaces from a hundredth of the stiffest to it. An impedance has no force loop: of it only whether it
-is stable is counted, since its overshoot is the swing of its tip, whatever the numbers of the file.
+200 steps a delay. The stiffness at which the motion begins to grow is bisected to 0.3 %. The corrected numbers then
+take a step of force on surfaces from a hundredth of the stiffest to it. An impedance has no force loop: of it only
+whether it is stable is counted, since its overshoot is the swing of its tip, whatever the numbers of the file.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ def prove(law: ForceLaw, damping: float, low: float, high: float) -> list[Stabil
 
 
 def norm_of(law: ForceLaw, damping: float, low: float, high: float) -> Array | None:
-    """L such that every tick on these stiffnesses, with every gain of the law, contracts in it; None if none is found."""
+    """L such that every tick on these stiffnesses, with every gain of the law, contracts; None if none is found."""
     ends = np.array([low, high])
     loops = [law.loop(damping, ki) for ki in dict.fromkeys(law.ki)]
     corners = [Phi for loop in loops for Phi in loop.ticks(ends)]
