@@ -72,7 +72,7 @@ class LawOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ExportOutput(FileOptions):
-    """Files to write."""
+    """Where the scene or the law is written."""
 
     out: Path | None = None
     """The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list

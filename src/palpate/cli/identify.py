@@ -67,8 +67,8 @@ class ModelOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(PictureOptions):
-    """Files to write."""
+class IdentifyOutput(PictureOptions):
+    """Files of an identification, and how much is printed."""
 
     figure: Path | None = None
     """Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if
@@ -108,7 +108,7 @@ def identify(
     arm: ArmOptions | None = None,
     fitted: ModelOptions | None = None,
     pressed_by: IndenterOptions | None = None,
-    output: OutputOptions | None = None,
+    output: IdentifyOutput | None = None,
     cell: CellOptions | None = None,
 ) -> int:
     """Identify the touched surface from a log: stiffness, damping, mass.
@@ -143,7 +143,7 @@ def identify(
     """
     from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
-    output, cell = output or OutputOptions(), cell or CellOptions()
+    output, cell = output or IdentifyOutput(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
     pressed_by.check()
@@ -165,7 +165,7 @@ def identify(
     return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
 
 
-def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
+def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
     figure, page, table = output.png(log.stem), output.page(), output.paper_table()
     found, origin = asked.identification(log)
     if found.traces is None:
@@ -187,7 +187,7 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
     return 0 if has_number(found) else 1
 
 
-def _print(found: Identification, origin: Source, written: list[Path], output: OutputOptions) -> None:
+def _print(found: Identification, origin: Source, written: list[Path], output: IdentifyOutput) -> None:
     if output.json:
         from palpate.report.identification.words import as_json
 

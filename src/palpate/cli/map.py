@@ -108,7 +108,7 @@ class MapOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(ReportOption, JsonOption):
-    """Files to write."""
+    """Files of a map, and their formats."""
 
     figure: Path | None = None
     "Where to write a picture of the map, PNG, SVG or PDF by its ending."

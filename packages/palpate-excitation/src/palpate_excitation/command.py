@@ -87,7 +87,7 @@ class BudgetOptions:
 @Parameter(name="*", group=Group("Goals", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class GoalOptions:
-    """Precision and time."""
+    """Wanted precision, and the time for it."""
 
     precision: Annotated[str, SIGNED] = "10%"
     "Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%."
@@ -145,7 +145,7 @@ class SensorOptions:
 @Parameter(name="*", group=Group("The robot", sort_key=5))
 @dataclass(frozen=True, kw_only=True)
 class LoopOptions:
-    """Its force control."""
+    """Force control of the arm."""
 
     loop_bandwidth: Annotated[str | None, SIGNED] = None
     "Of the robot's force control, Hz, if nothing else is known of it."
@@ -182,7 +182,7 @@ class LoopOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ExcitationOutput(PictureOptions, FileOptions):
-    """Files to write."""
+    """Where the excitation is written."""
 
     out: Path | None = None
     "Where to write the desired force over time: .csv or .parquet."

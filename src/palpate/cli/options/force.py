@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The arm", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ArmOptions:
-    """The arm."""
+    """The arm whose loop is tuned."""
 
     arm: Annotated[LoopArm, QUIET]
     "ur5e, fr3, panda, iiwa14, thesis, or a TOML file."
@@ -190,7 +190,7 @@ class ColumnOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(FileOptions):
-    """Files to write."""
+    """Where gains or a certificate are written."""
 
     out: Path | None = None
     "Where to write the gains (a TOML file) or the certificate (a JSON file)."

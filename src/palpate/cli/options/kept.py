@@ -37,7 +37,7 @@ _KNOWN_BY = ("identify", "press")
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
 @dataclass(frozen=True, kw_only=True)
 class CellOptions:
-    """Saved options."""
+    """Options saved in a file."""
 
     options: Path | None = None
     'A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.'

@@ -119,7 +119,7 @@ class KnownOptions:
 @Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class FolderOptions:
-    """Files to write."""
+    """The folder of results."""
 
     out: Path | None = None
     "Folder for results; when left out, one in runs/ with the name of the run."

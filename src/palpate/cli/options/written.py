@@ -26,7 +26,7 @@ class JsonOption:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ReportOption:
-    """A page."""
+    """A page with all results."""
 
     report: Path | None = None
     "Where to write a page with all results, an HTML file."

@@ -61,7 +61,7 @@ class RunnerOptions:
 @Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class InferredOptions(FolderOptions):
-    """Files to write."""
+    """Where the inferred laboratory is written."""
 
     out: Path = Path("runs/laboratory")
     """Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there
