@@ -63,7 +63,7 @@ class MapOptions:
     next: int = 5
     "How many next presses to choose."
     goal: Annotated[Literal["interval", "edge", "maximum"] | None, QUIET] = None
-    """What they are for: the interval everywhere, the edge of what is stiffer, or the maximum; edge if
+    """Purpose: the interval everywhere, the edge of what is stiffer, or the maximum; edge if
     --stiffer-than is given, else interval."""
     stiffer_than: str | None = None
     "A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place."
