@@ -3,8 +3,8 @@
     python benchmarks/force/sliding_proof.py [--draws 1000000] [--runs 2000] [--ticks 1000] [--arms ur5e fr3] [--seed 0]
 
 The loop of a tip that is moved along a normal off by phi, with friction mu, is that of a surface of m K, m = cos phi
-(cos phi -+ mu sin phi), for phi up to 10 degrees and mu up to 0.9. `fixed`: K even in the logarithm over what is proved,
-phi and mu at random, judged by eigenvalues. `redrawn`: phi and mu drawn anew every tick, half of them at their ends.
+(cos phi -+ mu sin phi), for phi up to 10 degrees and mu up to 0.9. `fixed`: K even in the logarithm over what is
+proved, phi and mu at random, judged by eigenvalues. `redrawn`: phi and mu drawn anew every tick, half at their ends.
 `worst`: at every tick the end of m that leaves the state largest in the norm of the loop's middle. A run grows if its
 state is larger after all ticks; its K is one on which the loop settles within them. `outside`: the eigenvalues at the
 upper end with 5 times the gain.
@@ -65,10 +65,8 @@ def growing(gains, claim, rng, args, low, high, worst):
         before = np.linalg.norm(x)
         for share in (m - ends[0]) / (ends[1] - ends[0]):
             one, two = low_end @ x, high_end @ x
-            if L is None:
-                x = (1.0 - share) * one + share * two
-            else:
-                x = max(one, two, key=lambda v: np.linalg.norm(L.T @ v))
+            either = (1.0 - share) * one + share * two
+            x = either if L is None else max(one, two, key=lambda v: np.linalg.norm(L.T @ v))
         grown += np.linalg.norm(x) >= before
     return int(grown)
 

@@ -407,7 +407,8 @@ def check_slide(data: bytes | str, low: float, high: float) -> None:
 
     Args:
         data: the file of a certificate that holds.
-        low, high: as the measured position feels it [N/m].
+        low: of K as the measured position feels it, from [N/m].
+        high: to [N/m].
 
     Raises:
         RefusedError: some K is not proved.

@@ -40,7 +40,8 @@ def sliding_claim(gains: Gains, low: float, high: float) -> Claim | None:
 
     Args:
         gains: of a torque arm, with a table `slide`.
-        low, high: m K + B/theta [N/m].
+        low: m K + B/theta from [N/m].
+        high: to [N/m].
     """
     assert gains.slide is not None
     least, most = gain_factors(gains.slide.mu_max)
@@ -84,7 +85,8 @@ def slide_proof(certificate: Certificate) -> dict[str, Any] | None:
     ]
     return {
         "gain_factor": [least, most], "angle_deg": 10.0, "friction": slide.mu_max,
-        "felt_stiffness": widest([one for one in ends if one[0] < one[1]]), "bound_share": [list(share) for share in shares],
+        "felt_stiffness": widest([one for one in ends if one[0] < one[1]]),
+        "bound_share": [list(share) for share in shares],
     }  # fmt: skip
 
 
@@ -92,8 +94,8 @@ def slide_proof_sentence(proof: dict[str, Any]) -> str:
     """`slide_proof` in words."""
     low, high = proof["gain_factor"]
     said = (
-        f"the normal off by up to {proof['angle_deg']:g} degrees and friction up to {proof['friction']:g}, both changing "
-        f"from tick to tick ({low:.3g} to {high:.3g} of the gain)"
+        f"the normal off by up to {proof['angle_deg']:g} degrees and friction up to {proof['friction']:g}, both "
+        f"changing from tick to tick ({low:.3g} to {high:.3g} of the gain)"
     )
     if proof["felt_stiffness"] is None:
         return f"no surface is proved with {said}"
