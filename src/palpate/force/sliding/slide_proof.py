@@ -91,7 +91,7 @@ def slide_proof(certificate: Certificate) -> dict[str, Any] | None:
 
 
 def slide_proof_sentence(proof: dict[str, Any]) -> str:
-    """`slide_proof` in words."""
+    """Surfaces on which a slide is proved, and what may change, in a sentence."""
     low, high = proof["gain_factor"]
     said = (
         f"the normal off by up to {proof['angle_deg']:g} degrees and friction up to {proof['friction']:g}, both "
