@@ -1,4 +1,4 @@
-"""What a certificate proves of a slide, whose normal is not quite known while friction pulls along the surface.
+"""Surfaces on which a slide is proved, whose normal is not quite known while friction pulls along the surface.
 
 A tip that is moved along an estimated normal at an angle phi to the true one changes its reading along it by
 m = cos phi (cos phi -+ mu sin phi) times what it would. So the loop is that of a surface of m K, where m goes from tick
