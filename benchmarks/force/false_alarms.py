@@ -1,4 +1,4 @@
-"""How often the law takes noise in the air for a contact, and what it makes of it.
+"""How often the law takes noise in free motion for a contact, and what it makes of it.
 
     python benchmarks/force/false_alarms.py [--hours 100] [--arms ur5e fr3] [--seed 0]
 

@@ -112,7 +112,7 @@ def test_evidence_of_a_contact_is_rare_in_the_air_whatever_the_noise():
 
 
 def test_a_rise_as_slow_as_noise_is_found_before_the_force_asked_for():
-    # 0.45 N in a second: the mean in the air follows it, and what it does not follow counts as noise.
+    # 0.45 N in a second: the mean in free motion follows it, and what it does not follow counts as noise.
     gains = gains_of("ur5e", noise=0.15)
     slow = gains.cautious()._replace(approach=0.0015)
     rows = pressed(world_of(gains.arm, noise=0.15), surface(300.0), slow, 1e-3, np.full(6000, 20.0), 1)
@@ -215,7 +215,9 @@ def test_dropping_the_offset_keeps_what_is_known_of_the_slopes():
 def test_no_information_is_no_certainty():
     even = Fit(PRIOR, Vec3(0.0, 0.0, 0.0))
     for _ in range(20_000):
-        even = even.with_reading(Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999)  # the tip moves evenly in the air
+        even = even.with_reading(
+            Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999
+        )  # the tip moves evenly in free motion
     assert even.std(Vec3(1.0, 0.0, 0.0)) > 0.9
     assert np.isfinite(list(even.solution())).all()
 

@@ -8,7 +8,7 @@ import pytest
 from palpate.force.onset import EMPTY, NO_STARTS, explained_variance, later, latest
 
 NEVER = 1e12
-"""Readings in the air without end: its mean is exact."""
+"""Readings in free motion without end: its mean is exact."""
 
 
 def told(force, step=1e-5, every=8.0):
@@ -59,7 +59,7 @@ def test_a_tip_that_stands_has_no_slope():
 
 
 def test_a_mean_of_few_readings_shows_no_contact():
-    """The error of the mean in the air is in every reading since: as large as it is, it stays below an alarm."""
+    """The error of the mean in free motion is in every reading since: as large as it is, it stays below an alarm."""
     rng, behind, shown = np.random.default_rng(2), 100, []
     for _ in range(300):
         rest = rng.normal(size=behind).mean()

@@ -266,7 +266,7 @@ def press(
     """Press as told; the arm rests when this returns or raises.
 
     Args:
-        wire: to an arm at rest in the air.
+        wire: to an arm at rest in free motion.
         order: what to do with it, from `checked`.
         rows: keeps everything.
         asked_to_stop: the reason why the user wants it to end; None while he does not.
