@@ -16,7 +16,7 @@ from palpate.files import RECORD
 from palpate.logs import read_record
 from palpate.press.tool import Plan
 from palpate.records import Record
-from palpate_benchmark.metrics import RunMetrics, ForceStep, step, touch
+from palpate_benchmark.metrics import ForceStep, RunMetrics, step, touch
 from palpate_benchmark.plan import ForcePlan
 from palpate_benchmark.simulated import ForceResult, OnSurface
 
