@@ -124,13 +124,10 @@ def _scale(answer: dict[str, Any]) -> Any:
         for name, end in answer["axes"].items()
         if end != 0.0
     ]
-    if proved:
-        extents.append(Extent("proved, as it stands", *proved, "proved", f"to {quantity(proved[1], 'N/m')}"))
-    if better:
-        high = better["stiffness"][1]
-        extents.append(
-            Extent("proved, corrected", *better["stiffness"], "proved", f"to {quantity(high, 'N/m')}")
-        )
+    for name, ends in (("as it stands", proved), ("corrected", better and better["stiffness"])):
+        if ends:
+            low, high = ends
+            extents.append(Extent(f"proved, {name}", low, high, "proved", f"to {quantity(high, 'N/m')}"))
     if not extents:
         return None
     caption = "The dashed line is the stiffest surface asked for; at an arrowhead nothing bounds it."
