@@ -99,7 +99,7 @@ class OthersOptions(ReportOption):
 
     @property
     def seconds(self) -> float:
-        """The delay [s]."""
+        """Everything late between contact and motion [s]."""
         from palpate.cli.options.quantities import quantity
 
         if self.delay is None:
@@ -110,7 +110,7 @@ class OthersOptions(ReportOption):
 
     @property
     def kilograms(self) -> float | None:
-        """The mass of the tip [kg]."""
+        """Mass of the tip along the normal [kg]."""
         from palpate.cli.options.quantities import quantity
 
         return None if self.mass is None else quantity("--mass", self.mass, "mass")
