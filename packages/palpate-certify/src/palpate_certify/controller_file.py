@@ -19,8 +19,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from palpate.errors import InputError, unknown
 from palpate.files import read_text
@@ -192,6 +190,11 @@ def _finite(value: float) -> float | None:
 
 def _load(path: Path) -> tuple[Any, Any]:
     """The file, and the parser that writes it again as it was, comments included."""
+    try:
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import YAMLError
+    except ImportError:
+        raise InputError("a parameter file needs the extra 'certify': pip install palpate[certify]") from None
     parser = YAML()
     parser.width, parser.preserve_quotes = 4096, True
     try:
