@@ -50,7 +50,7 @@ UNCOVERED = (
 
 
 class ControllerVerdict(NamedTuple):
-    """What `palpate certify --controller` prints, the corrected file, and the loop of the worst axis in both.
+    """Answer of `palpate certify --controller`, the corrected file, and the loop of the worst axis before and after.
 
     Args:
         answer: as JSON has it.
