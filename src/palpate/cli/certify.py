@@ -214,17 +214,21 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     elif gains is not None:
         certificate.check_of(load_gains(gains))
     with console(stderr=True).status("checking"):
-        verdict = confirm(path, certificate.check())
+        verdict = confirm(path, certificate)
     _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
 
 
-def confirm(path: Path, verdict: Verdict) -> Verdict:
+def confirm(path: Path, certificate: Certificate) -> Verdict:
     """The verdict, if the independent check has the same."""
-    from palpate.checks.force_certificate import RefusedError, check
+    from palpate.checks.force_certificate import RefusedError, check, check_slide
+    from palpate.force.sliding.slide_proof import slide_proof
 
+    verdict, slide = certificate.check(), slide_proof(certificate)
     try:
         check(path.read_bytes())
+        if slide is not None and slide["felt_stiffness"] is not None:
+            check_slide(path.read_bytes(), *slide["felt_stiffness"])
     except RefusedError as error:
         return replace(verdict, holds=False, why=verdict.why or f"by the independent check, {error}")
     return verdict

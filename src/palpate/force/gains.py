@@ -84,7 +84,7 @@ class Gains(Table):
     cap: Positive
     """Largest K + B/theta of any surface that there may be [N/m]."""
     approach: Positive
-    """Speed in the air [m/s]."""
+    """Speed in free motion [m/s]."""
     force_limit: Positive
     """Above which the tip withdraws [N]."""
     level: Positive
@@ -144,7 +144,7 @@ class Gains(Table):
 
     @property
     def floor(self) -> float:
-        """Lowest K_u [N/m]."""
+        """Lowest K_u that the law uses [N/m]."""
         return max(_SLOWEST * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
 
     @property
@@ -158,7 +158,7 @@ class Gains(Table):
         return max(DRIFT, self.arm.sensor.drift or 0.0)
 
     def cautious(self) -> Cautious:
-        """The law's numbers."""
+        """Numbers of the compiled law."""
         arm = self.arm
         low_pass = arm.low_pass
         memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
@@ -187,7 +187,7 @@ class Gains(Table):
         return hashlib.sha256(msgspec.json.encode(known)).hexdigest()
 
     def to_toml(self) -> str:
-        """The file's text."""
+        """Text of the gains file."""
         return "# Made by palpate tune; ForceLoop.load takes it.\n" + _toml(msgspec.to_builtins(self))
 
 
@@ -271,7 +271,7 @@ def _any_noise(arm: Arm) -> Arm:
 
 
 def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: float = ALPHA) -> float:
-    """Highest speed in the air [m/s]: what a touch at K_u = cap bears, and what the tip's mass allows.
+    """Highest speed in free motion [m/s]: what a touch at K_u = cap bears, and what the tip's mass allows.
 
     Args:
         arm: what moves.

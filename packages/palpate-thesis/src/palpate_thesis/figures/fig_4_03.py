@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
-from palpate.bench.metrics.window import losses
+from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2

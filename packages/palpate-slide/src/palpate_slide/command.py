@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
-from palpate.cli._terminal import console, place
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.force import with_slide
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
 from palpate.cli.options.values import vector
+from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
@@ -25,8 +23,8 @@ from palpate.text import printable
 if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.force import Gains
-    from palpate.force.sliding.ground import Ground
-    from palpate.press.sliding import JointedArm
+    from palpate_slide.ground import Ground
+    from palpate_slide.jointed_arm import JointedArm
 
 SHORTEST = 0.003
 """Path that is one [m]."""
@@ -98,7 +96,7 @@ class SlideOptions:
 
     def ground(self, ways: Array, speed: float, rate: float) -> Ground:
         """The surface under a path."""
-        from palpate.force.sliding.ground import ground_of
+        from palpate_slide.ground import ground_of
 
         numbers: dict[str, float] = {}
         for part in self.surface.split(","):
@@ -112,7 +110,7 @@ class SlideOptions:
         name, _, size = self.shape.partition(":")
         stiffness, heights = numbers.pop("stiffness", 0.0), None
         if name == "mesh":
-            from palpate.force.sliding.mesh import heights_of
+            from palpate_slide.mesh import heights_of
 
             file, _, unit = size.rpartition(":")
             if not file:
@@ -150,7 +148,7 @@ class SlideOptions:
     def joints(self) -> JointedArm:
         """The arm with its joints, for MuJoCo's physics."""
         from palpate.press.engines import ENGINES
-        from palpate.press.sliding import jointed_arm
+        from palpate_slide.jointed_arm import jointed_arm
 
         if self.physics not in ENGINES:
             raise unknown("physics", self.physics, ENGINES)
@@ -160,7 +158,7 @@ class SlideOptions:
         """Rows of the slide."""
         into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
         if self.physics == "own":
-            from palpate.force.sliding.slide_world import simulate
+            from palpate_slide.world import simulate
 
             return simulate(gains, ground, ways, into=into, seed=self.seed)
         return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
@@ -215,9 +213,9 @@ def slide(
     json
         Print one JSON object and nothing else.
     """
+    from palpate.force.sliding.paths import directions
     from palpate.force.sliding.slide_domain import numbers_of
-    from palpate.force.sliding.slide_world import directions
-    from palpate.report.slide import sentence, summarise, write_report
+    from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
     if wire.wire is not None or wire.recover is not None:
