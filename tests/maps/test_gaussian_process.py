@@ -84,3 +84,14 @@ def test_presses_beyond_one_block_are_fitted_too():
     mean, _ = process.predict(at)
     assert np.sqrt(np.mean((mean - np.sin(60.0 * at[:, 0])) ** 2)) < 0.05
     assert process.repeat == pytest.approx(np.sqrt(0.05**2 - 0.02**2), rel=0.25)
+
+
+def test_the_95_percent_quantile_of_values_left_out_is_that_of_the_normal_one_or_wider_where_tails_are_heavy():
+    """Of a normal field it is near 1.96; a region that jumps makes it wider, and the share left out is then in it."""
+    places = RNG.uniform(0.0, 0.1, (80, 2))
+    noise = np.full(80, 0.03)
+    plain = fit(places, 5.0 * places[:, 0] + noise * RNG.normal(size=80), noise)
+    jump = fit(places, (np.hypot(*(places - 0.05).T) < 0.015) + noise * RNG.normal(size=80), noise)
+    assert plain.z95 == pytest.approx(1.96, abs=0.15)
+    assert jump.z95 > 2.2
+    assert np.mean(np.abs(jump.likeliest.leave_one_out()) < jump.z95) >= 0.94

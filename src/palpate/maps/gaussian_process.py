@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangular
 from scipy.linalg.lapack import dpotri
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
+from scipy.stats import norm
 
 from palpate.arrays import Array
 
@@ -32,6 +33,10 @@ CHUNK = 16_000
 PRODUCT = 500_000
 """Multiplications of one matrix product: so few that BLAS starts no threads of its own, which on a busy machine
 wait for each other a hundred times longer than they compute."""
+LEVEL = 0.05
+"""Share of values outside their intervals."""
+Z95 = float(norm.isf(LEVEL / 2.0))
+"""Half-width of a normal distribution's central 95 % over its standard deviation."""
 ROUNDING = 1e-3
 """Share of the variance that rounding to single precision may take: a twentieth of a per cent of an interval."""
 LEAST_WEIGHT = 0.02
@@ -242,6 +247,21 @@ class GaussianProcess:
     def repeat(self) -> float:
         """Standard deviation from press to press at one place, beyond what each press states."""
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
+
+    @cached_property
+    def z95(self) -> float:
+        """Half-width of the central 95 % over the standard deviation, for fields that are not normal, as beside edges.
+
+        The quantile of the deviations of values left out and of one unseen (conformal prediction; Vovk et al. 2005),
+        among which the normal distribution counts as so many values as have one outside.
+        """
+        found, normal = np.abs(self.likeliest.leave_one_out()), 1.0 / LEVEL
+        allowed = LEVEL * (normal + len(found) + 1.0) - 1.0
+
+        def excess(z: float) -> float:
+            return float(2.0 * normal * norm.sf(z) + np.sum(found > z)) - allowed
+
+        return float(brentq(excess, 0.0, max(5.0, *found)))
 
     @cached_property
     def _reduction(self) -> Reduction:

@@ -182,7 +182,7 @@ def _cards(result: MapResult) -> list[Card]:
         )
         for k, lump in enumerate(result.lumps[:3])
     ]  # fmt: skip
-    halves = np.expm1(1.96 * result.prediction.std[result.grid.inside])
+    halves = result.prediction.relative_half[result.grid.inside]
     return [
         *cards,
         *([Card("To press yet", more[0], why=more[1])] if (more := further(result)) else []),
@@ -255,7 +255,7 @@ def draw_map(result: MapResult) -> Figure:
 
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
-    half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
+    half = 100.0 * result.prediction.relative_half
     with style.ink(9.0):
         figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
