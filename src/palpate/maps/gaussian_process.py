@@ -217,7 +217,7 @@ def loss(theta: Array, distance: Array, values: Array, noise: Array) -> tuple[fl
     w = P.sum(axis=0)
     P -= np.outer(w, w) / w.sum()
     a = np.einsum("ij,j", P, values)
-    G = P - np.outer(a, a)  # the derivative by the covariance is G / 2, and each pair of places stands in it twice
+    G = P - np.outer(a, a)  # G / 2 is the derivative by the covariance; each pair stands in that twice
     pairs, own = squareform(G, checks=False), np.trace(G)
     slopes = (2.0 * smooth, s * s * (1.0 + s) / 3.0 * fall_s, 2.0 * rough, r * r * fall_r)
     gradient = [np.einsum("i,i", pairs, slope) for slope in slopes]
@@ -274,7 +274,7 @@ class GaussianProcess:
         scalars = np.array([(part.level, part.unknown, part.prior) for part in parts]).T[:, :, None]
         exact = Reduction(Hyperparameters(*each), np.array([part.rows for part in parts]), *scalars)
         with np.errstate(all="ignore"):  # what does not fit into single precision fails the comparison
-            rows = exact.rows.astype(np.float32)
+            rows: Any = exact.rows.astype(np.float32)
             short = replace(exact, parameters=Hyperparameters(*each.astype(np.float32)), rows=rows)
             places = self.likeliest.places
             (mean, variance), (near, rounded) = (r.predict(cdist(places, places)) for r in (exact, short))
