@@ -86,8 +86,7 @@ def test_presses_beyond_one_block_are_fitted_too():
     assert process.repeat == pytest.approx(np.sqrt(0.05**2 - 0.02**2), rel=0.25)
 
 
-def test_the_95_percent_quantile_of_values_left_out_is_that_of_the_normal_one_or_wider_where_tails_are_heavy():
-    """Of a normal field it is near 1.96; a region that jumps makes it wider, and the share left out is then in it."""
+def test_intervals_are_wider_than_normal_ones_where_the_field_jumps():
     places = RNG.uniform(0.0, 0.1, (80, 2))
     noise = np.full(80, 0.03)
     plain = fit(places, 5.0 * places[:, 0] + noise * RNG.normal(size=80), noise)

@@ -60,8 +60,8 @@ class Surface:
             ConvexHull(self.coordinates(self.presses))
         except (QhullError, ValueError):
             raise InputError(
-                f"a map needs presses at three places at least that are not in one line, got {len(self.presses)} "
-                f"presses at {len(np.unique(self.presses, axis=0))} places"
+                "a map needs presses at three places at least that are not in one line; number of places given: "
+                f"{len(np.unique(self.presses, axis=0))}"
             ) from None
 
     @property
