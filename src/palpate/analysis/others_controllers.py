@@ -20,7 +20,7 @@ from typing import Any
 
 from palpate.analysis.delayed_contact import LEAST, DelayedContact
 from palpate.errors import InputError, unknown
-from palpate.files import read_text
+from palpate.files import read_yaml
 
 ALPHA = 0.42
 """K T/D, with the lag of M/D in T, of corrected numbers: 3 % over with a pure delay (benchmarks/force/others.py)."""
@@ -86,7 +86,7 @@ def certify_controller(
         raise unknown("controller", controller, [*READERS, *REFUSED])
     if not 0.0 < delay < 10.0 or not 0.0 < stiffest < inf or not (mass is None or 0.0 < mass < inf):
         raise InputError("the delay must be above 0 and below 10 s, stiffness and mass above 0")
-    file, parser = _load(path)
+    file, parser = read_yaml(path, "a parameter file")
     setting = ControllerFile(file, delay, mass)
     axes = [axis for name, own in _nodes(file) for axis in READERS[controller](name, own, setting)]
     if not axes:
@@ -132,24 +132,6 @@ def _correction(axes: list[ControlledAxis], ends: list[float], stiffest: float) 
 
 def _finite(value: float) -> float | None:
     return value if value < inf else None
-
-
-def _load(path: Path) -> tuple[Any, Any]:
-    """The file, and the parser that writes it again as it was, comments included."""
-    try:
-        from ruamel.yaml import YAML
-        from ruamel.yaml.error import YAMLError
-    except ImportError:
-        raise InputError("a parameter file needs the extra 'bags': pip install palpate[bags]") from None
-    parser = YAML()
-    parser.width, parser.preserve_quotes = 4096, True
-    try:
-        file = parser.load(read_text(path, "a parameter file"))
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
-    if not isinstance(file, dict):
-        raise InputError(f"{path} is no parameter file: it has no names at its top")
-    return file, parser
 
 
 def _nodes(file: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

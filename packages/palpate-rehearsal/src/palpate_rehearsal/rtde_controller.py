@@ -1,4 +1,4 @@
-"""What a UR's controller and ur-rtde's control script on it do with a simulated arm: commands in, variables out."""
+"""A UR's controller with ur-rtde's control script, on a simulated arm: commands in, variables out."""
 
 from __future__ import annotations
 
@@ -170,13 +170,16 @@ class Controller:
         return zero if len(code) == 1 else (zero,) * int(code[0])
 
     def pose(self) -> Any:
+        """Of the tool: position [m] and rotation vector [rad], shape (6,)."""
         return (*self.arm.reading()[6:9], *_ROTATION)
 
     def raw_wrench(self) -> Any:
+        """Of the sensor, which nobody zeroes, in the flange's axes [N], [N m], shape (6,)."""
         fx, fy, fz = self.arm.reading()[:3]
         return (-fx, fy, fz, 0.0, 0.0, 0.0)  # the reaction, in the axes of a tool that points down
 
     def twist(self) -> Any:
+        """Of the tool, linear above turning [m/s], [rad/s], shape (6,)."""
         return (*self.velocity[:2], -self.arm.body.v, 0.0, 0.0, 0.0)
 
 
