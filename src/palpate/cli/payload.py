@@ -30,6 +30,7 @@ _ENDINGS = (".toml", ".script", ".json", ".yaml")
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class PayloadOutput(ReportOption, FileOptions):
+<<<<<<< HEAD
     """Files to write.
 
     Parameters
@@ -38,8 +39,12 @@ class PayloadOutput(ReportOption, FileOptions):
         Where to write the payload: a .toml for --payload, or the load file of a controller: .script (UR), .json
         (Franka), .yaml (ROS 2).
     """
+=======
+    """Where the payload is written."""
+>>>>>>> main
 
     out: Path | None = None
+    "Where to write the payload, a TOML file for --payload."
 
 
 def payload(
