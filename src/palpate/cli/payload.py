@@ -30,21 +30,22 @@ _ENDINGS = (".toml", ".script", ".json", ".yaml")
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class PayloadOutput(ReportOption, FileOptions):
-<<<<<<< HEAD
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Where to write the payload: a .toml for --payload, or the load file of a controller: .script (UR), .json
-        (Franka), .yaml (ROS 2).
-    """
-=======
-    """Where the payload is written."""
->>>>>>> main
+    """Where the payload is written, and a load file that is compared with it."""
 
     out: Path | None = None
-    "Where to write the payload, a TOML file for --payload."
+    """Where to write the payload: a .toml for --payload, or the load file of a controller: .script (UR), .json
+    (Franka), .yaml (ROS 2)."""
+    check: Path | None = None
+    "A controller's load file, to be compared with the log. With --gravity-compensated the controller had it."
+    flange: Annotated[str | None, SIGNED] = None
+    """The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z in
+    m, or with :mm. In a .yaml the sensor."""
+
+    def origin(self, torque_at: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The flange from the point that the torque is about, which is given from the pose's origin [m]."""
+        x, y, z = vector("flange", self.flange, "length") or (0.0, 0.0, 0.0)
+        a, b, c = torque_at
+        return x - a, y - b, z - c
 
 
 def payload(
@@ -55,8 +56,6 @@ def payload(
     frame: FrameOptions | None = None,
     cell: CellOptions | None = None,
     tolerance: float = 0.25,
-    flange: Annotated[str | None, SIGNED] = None,
-    check: Path | None = None,
     output: PayloadOutput | None = None,
 ) -> int:
     """Weigh a tool by a log of free motion: mass, centre, the sensor's bias and drift.
@@ -79,11 +78,6 @@ def payload(
         A log of wrench and pose, as for palpate identify.
     tolerance
         Largest half-width of the mass' 95 % interval, as a share of its value.
-    flange
-        The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z
-        in m, or with :mm. In a .yaml the sensor.
-    check
-        A controller's load file, to be compared with the log. With --gravity-compensated the controller had it.
     """
     cell, output = cell or CellOptions(), output or PayloadOutput()
     cell.check()
@@ -94,7 +88,7 @@ def payload(
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
     from palpate.contact_frame import ContactFrame, compare, load_text, read_load, weigh
 
-    load = None if check is None else read_load(check)
+    load = None if output.check is None else read_load(output.check)
     cell.save((source or LogOptions(), frame or FrameOptions()))
     record = (source or LogOptions()).read(log)
     if "force_x" not in record.columns:
@@ -103,12 +97,7 @@ def payload(
         )
     contact = (frame or FrameOptions()).frame() or ContactFrame()
     found = weigh(record, contact, tolerance)
-    place = vector("flange", flange, "length") or (0.0, 0.0, 0.0)
-    start = (
-        place[0] - contact.wrench_at[0],
-        place[1] - contact.wrench_at[1],
-        place[2] - contact.wrench_at[2],
-    )
+    start = output.origin(contact.wrench_at)
     written = []
     if output.out is not None and found.payload is not None:
         write_text(output.out, load_text(found, ending, start))
@@ -121,14 +110,15 @@ def payload(
     rows = []
     if load is not None and found.payload is not None:
         rows = compare(found, load, start, compensated=contact.gravity_compensated)
-    _print(found, log, check, rows, written, output.json)
+    _print(found, log, rows, written, output)
     return 0 if found.payload is not None and all(row.agrees for row in rows) else 1
 
 
 def _print(
-    found: Weighed, log: Path, check: Path | None, rows: list[NumberOfLoad], written: list[Path], json: bool
+    found: Weighed, log: Path, rows: list[NumberOfLoad], written: list[Path], output: PayloadOutput
 ) -> None:
-    if json:
+    check = output.check
+    if output.json:
         answer = found.to_json()
         if check is not None:
             numbers = [row._asdict() | {"agrees": row.agrees} for row in rows]
