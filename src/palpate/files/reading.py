@@ -117,7 +117,7 @@ def read_yaml(path: Path, what: str = "a file") -> tuple[dict[str, Any], Any]:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import YAMLError
     except ImportError:
-        raise InputError(f"{what} in YAML needs the extra 'bags': pip install palpate[bags]") from None
+        raise InputError(f"{what} in YAML needs ruamel.yaml: pip install palpate[bags]") from None
     parser = YAML()
     parser.width, parser.preserve_quotes = 4096, True
     try:
