@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, print_lines
-from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class ProofOptions:
     @property
     def surfaces(self) -> tuple[float, float] | None:
         """K + B/theta [N/m]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.stiffness is None:
             return None
@@ -63,7 +63,7 @@ class ProofOptions:
     @property
     def longest(self) -> float | None:
         """Longest damping time B/K [s]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.damping_time is None:
             return None
@@ -162,7 +162,7 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
     from palpate.analysis.others_controllers import STIFFEST, certify_controller
-    from palpate.cli.options.quantities import quantity
+    from palpate.cli.options.values import quantity
     from palpate.files import MADE, write_text
 
     output.check_new(output.out, ending=".yaml")
@@ -179,7 +179,7 @@ def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: Tuni
     if output.json:
         print_answer(answer)
     else:
-        from palpate.report.tuning.table import controller_lines
+        from palpate.report.tuning import controller_lines
 
         print_lines(*controller_lines(answer, output.out))
     return (
@@ -232,6 +232,6 @@ def _print(
         print_lines(*lines(certificate, verdict))
         return
     from palpate.report.terminal import print_hanging
-    from palpate.report.tuning.table import proof_lines
+    from palpate.report.tuning import proof_lines
 
     print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())
