@@ -101,8 +101,8 @@ def of_position_noise(system: System, solution: Solution, noise: Array) -> Sprea
     """Bias by noise of the position, (A - N)^-1 N theta, and its apparent information.
 
     A are the normal equations, N what the noise adds to them (errors in variables: Fuller, 1987, ch. 1). Where the
-    columns tell two parameters apart by little more than their noise, as K from M at one frequency, nothing is told:
-    (A - N)^-1 has no bound there.
+    columns tell two parameters apart by little more than their noise, as K from M at one frequency, nothing is told but
+    by the prior, as of a lag beside a damping: A - N is no less than that.
 
     Args:
         system: of the log.
@@ -115,7 +115,8 @@ def of_position_noise(system: System, solution: Solution, noise: Array) -> Sprea
     value, vector = np.linalg.eigh(solution.cov / np.outer(size, size))
     half = size[:, None] * vector * np.sqrt(np.maximum(value, 0.0))  # cov = half half^T
     share, turn = np.linalg.eigh(half.T @ added @ half)
-    own, kept = half @ turn, np.maximum(1 - share, _ALONE)
+    own = half @ turn
+    kept = np.maximum(1 - share, np.maximum(system.prior_weight @ own**2, _ALONE))
     pulled = (own / kept) @ (own.T @ added @ solution.theta)
     return Spread(pulled**2 + np.sum(own**2 * np.maximum(kept**-2 - 1, 0.0), axis=1))
 
