@@ -84,6 +84,7 @@ class Linearisation:
         model: Model,
         segments: list[Segment],
         theta: dict[str, float],
+        use: Mask | None = None,
     ) -> Linearisation:
         """Linearise a model about some parameters, and sum its columns by octave.
 
@@ -93,6 +94,8 @@ class Linearisation:
             segments: rows without a gap.
             theta: the parameters, the other forces' and the lag's among them; what is not is looked for (those that
                 the force is not linear in), zero (the others), or its prior's value (the lag).
+            use: octaves that count, shape (octaves,): likelihoods compare over the same; None for those in which the
+                columns are more than noise.
         """
         motion = problem.motion
         dt = float(np.median(np.diff(problem.time)))
@@ -117,8 +120,8 @@ class Linearisation:
         orders = model.derivatives if not model.nonlinear else {}
         most = max(orders.values(), default=0) + (LAG in free)
         noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
-        places = {free.index(name): k for name, k in orders.items()}
-        use = seen(motion, noisy, whole, {-1: 0, **places})
+        if use is None:
+            use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
         names = (*free, *effects, *bending)
         system = system_of(octaves.only(use), names, prior)
         return cls(problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system)
