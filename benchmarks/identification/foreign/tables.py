@@ -87,8 +87,8 @@ def tables(scores: list[Score]) -> dict[str, list[dict[str, Any]]]:
 
 HEAD = (
     f"{'':28}{'logs':>5} {'K id hold wrong':>17} {'B id hold wrong':>17} {'M id hold wrong':>17} "
-    f"{'all id hold wrong':>19} {'apparent':>15} {'working point':>17} {'K known':>9} {'sharp':>6} {'width':>6} {'lag':>5} "
-    f"{'none':>5} {'err':>4} {'s':>6}"
+    f"{'all id hold wrong':>19} {'apparent':>15} {'working point':>17} {'K known':>9} {'sharp':>6} {'width':>6} "
+    f"{'lag':>5} {'none':>5} {'err':>4} {'s':>6}"
 )
 
 

@@ -135,9 +135,7 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
     return (min(told), max(told)) if told else None
 
 
-def _slope_in(
-    depth: Array, force: Array, edges: NDArray[np.intp], low: float, high: float
-) -> float | None:
+def _slope_in(depth: Array, force: Array, edges: NDArray[np.intp], low: float, high: float) -> float | None:
     """Of one force over the depth, a level for each loading that goes half as deep as the deepest.
 
     Args:

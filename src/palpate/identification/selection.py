@@ -112,7 +112,9 @@ def _descent(start: Linearisation) -> tuple[Linearisation, float]:
             step = step / 2
         if np.all(np.abs(step) <= rests):
             break
-        local = Linearisation.of(start.problem, start.model, start.segments, best.moved(theta, step), best.use)
+        local = Linearisation.of(
+            start.problem, start.model, start.segments, best.moved(theta, step), best.use
+        )
     return best, least
 
 
@@ -136,7 +138,9 @@ def _starts(local: Linearisation) -> list[Linearisation]:
         tried.append(dict(zip(other.names, here.theta.tolist(), strict=True)))
     return [
         Linearisation.of(problem, local.model, local.segments, tried[i], local.use)
-        for i, (before, own, after) in enumerate(zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False))
+        for i, (before, own, after) in enumerate(
+            zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
+        )
         if own < before and own <= after
     ]
 

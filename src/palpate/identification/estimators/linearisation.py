@@ -124,7 +124,9 @@ class Linearisation:
             use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
         names = (*free, *effects, *bending)
         system = system_of(octaves.only(use), names, prior)
-        return cls(problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system)
+        return cls(
+            problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system
+        )
 
     @property
     def searched(self) -> dict[int, float]:
