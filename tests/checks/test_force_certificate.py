@@ -24,15 +24,20 @@ from palpate.checks.force_certificate import (
     ExactClaim,
     RefusedError,
     check,
+    check_slide,
     exponential,
     is_positive,
 )
 from palpate.errors import InputError
+from palpate.force.arm import load_arm
 from palpate.force.boundary import radius
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import proved_claim
 from palpate.force.claims import adapting_claims, held_claim, one_sided_claim
+from palpate.force.gains import gains_for
 from palpate.force.sampled_loop import Law, SampledLoop
+from palpate.force.slide_table import Slide
+from palpate.force.sliding.slide_proof import MISALIGNED, gain_factors, slide_proof, sliding_claim
 
 
 @pytest.fixture(scope="module")
@@ -238,3 +243,36 @@ def test_forgeries_by_the_hundred_are_refused_or_true(file):
             passed += 1
             assert is_true(made, rng)
     assert 20 < passed < 200  # a narrower claim is as true as before
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.9])
+def test_both_checks_prove_the_same_slides(proof, friction):
+    gains = msgspec.structs.replace(proof.gains, slide=Slide(speed=0.03, mu_max=friction))
+    one = msgspec.structs.replace(proof, gains=gains)
+    low, high = slide_proof(one)["felt_stiffness"]
+    data = msgspec.json.encode(one)
+    check_slide(data, low, high)
+    for wrong in ((0.99 * low, high), (low, 1.01 * high)):
+        with pytest.raises(RefusedError, match="not proved"):
+            check_slide(data, *wrong)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.9])
+def test_misalignment_and_friction_scale_the_gain_between_two_ends(friction):
+    phi, mu = np.meshgrid(np.linspace(-MISALIGNED, MISALIGNED, 401), np.linspace(0.0, friction, 101))
+    m = np.cos(phi) * (np.cos(phi) - mu * np.sin(phi))
+    assert gain_factors(friction) == pytest.approx((m.min(), m.max()), rel=1e-6)
+
+
+def test_cells_of_a_torque_arm_overlap_by_what_a_slide_changes():
+    gains = msgspec.structs.replace(
+        gains_for(load_arm("fr3"), 15.0, cap=4e4), slide=Slide(speed=0.03, mu_max=0.9)
+    )
+    claim = sliding_claim(gains, 2e3, 8e3)
+    one = Certificate(form=FORM, gains=gains, claims=(claim,))
+    low, high = slide_proof(one)["felt_stiffness"]
+    least, most = gain_factors(0.9)
+    assert (low, high) == pytest.approx((2e3 / least, 8e3 / most), rel=1e-6)
+    data = msgspec.json.encode(one)
+    assert check(data) == one.check().cells == len(claim.cells)
+    check_slide(data, low, high)

@@ -23,7 +23,7 @@ SLICE = [cell for i, cell in enumerate(CELLS) if i % 23 == 5]
 
 
 def pressed(surface, depth, dt, seconds=2.0, below=0.6):
-    """Pressed with a sine that leaves the surface, from rest in the air."""
+    """Pressed with a sine that leaves the surface, from rest in free motion."""
     t = np.arange(int(seconds / dt)) * dt
     command = depth * (0.5 * (1 - np.cos(2 * np.pi * 1.5 * t)) * (1 + below) - below)
     x, v, a = tracked(command, 25.0, dt)

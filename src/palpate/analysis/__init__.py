@@ -1,18 +1,6 @@
-"""The linear model of bench and control law: eigenvalues, margins, and where it is stable."""
+"""Others' force controllers on a spring, with delay: where they are stable, proved, and corrected numbers."""
 
-from palpate.analysis.boundaries import stable_intervals, stable_stiffness
-from palpate.analysis.linear_loop import LinearLoop, Mode
-from palpate.analysis.linear_model import linearise
-from palpate.analysis.margins import Margins, growth_with, loop_gain, margins
+from palpate.analysis.delayed_contact import DelayedContact
+from palpate.analysis.others_controllers import certify_controller
 
-__all__ = [
-    "LinearLoop",
-    "Margins",
-    "Mode",
-    "growth_with",
-    "linearise",
-    "loop_gain",
-    "margins",
-    "stable_intervals",
-    "stable_stiffness",
-]
+__all__ = ["DelayedContact", "certify_controller"]

@@ -142,7 +142,7 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     path = task.path
     along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
     does = (
-        f"rests 0.5 s in the air and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
+        f"rests 0.5 s in free motion and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
         f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}{along},"
         f" goes back {1e3 * task.retreat:g} mm, rests"
     )

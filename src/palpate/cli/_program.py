@@ -34,7 +34,6 @@ COMMANDS = {
     "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
-    "slide": "Hold a force along an unknown curved surface while the tip moves, in simulation.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
     "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
@@ -59,6 +58,7 @@ COMPANIONS = {
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",
     "references": "palpate-references",
+    "slide": "palpate-slide",
 }
 ENTRY_POINTS = "palpate.commands"
 """The group of entry points by which a distribution adds a command: its name, and module:function."""

@@ -47,7 +47,7 @@ class Tuning(Result, shown_by="palpate.report.tuning.page"):
 
     @property
     def proved(self) -> bool:
-        """Whether anything is."""
+        """Whether any surface is proved stable."""
         return any(c.kind != "adapting" for c in self.certificate.claims)
 
     @property

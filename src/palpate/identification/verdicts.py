@@ -196,7 +196,7 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
 
     Args:
         parameters: as found.
-        weighed: a tool's inertia was found in the air and removed: it is not that, and K rests on the same fit.
+        weighed: a tool's inertia was found in free motion and removed: it is not that, and K rests on the same fit.
     """
     negative = [name for name, p in parameters.items() if _BELOW in p.reason]
     if "K" in negative:
@@ -210,10 +210,12 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     return parameters | {name: _reject(p, reason) for name, p in parameters.items() if name in touched}
 
 
-_UNSIGNED = "the log does not show the signs of force and position: begin it in the air, or give --force-sign"
+_UNSIGNED = (
+    "the log does not show the signs of force and position: begin it in free motion, or give --force-sign"
+)
 _UNTOUCHED = (
     "a power law needs depth and force from the touch on, and the log never leaves the surface:"
-    " let it begin in the air"
+    " let it begin in free motion"
 )
 
 

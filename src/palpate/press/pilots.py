@@ -67,7 +67,7 @@ class Cautious:
         force, place = float(sense.force[:3] @ self._normal), float(self._normal @ sense.pose[:3, 3])
         speed = self.loop.update(force, place)
         self._wire.write(Command(velocity=np.concatenate([speed * self._normal, np.zeros(3)])))
-        pressing = self.loop.phase != "air"
+        pressing = self.loop.phase != "free motion"
         self._touched = self._touched or pressing
         phase = CONTACT if pressing else LOST if self._touched else APPROACH
         estimate = self.loop.estimate

@@ -1,4 +1,4 @@
-"""A press from the air to its end: a record with the columns of `palpate run`, for any number of joints."""
+"""A press from free motion to its end: a record with the columns of `palpate run`, for any number of joints."""
 
 from __future__ import annotations
 

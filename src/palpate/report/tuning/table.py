@@ -10,6 +10,7 @@ from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, bounds, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
+from palpate.force.sliding.slide_proof import slide_proof
 from palpate.force.tuning import RIGID, Tuning, surface_ends
 from palpate.report.numbers import quantity
 from palpate.report.terminal import print_hanging
@@ -133,7 +134,9 @@ def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None
         yield Text(f"Stable on surfaces with K + B/theta (theta {1e3 * gains.theta:.2g} ms) of")
     else:
         yield Text(printable(f"✕ The certificate does not hold: {verdict.why}."), "bold red")
-    for claim in certificate.claims:
+    for i, claim in enumerate(certificate.claims):
+        if claim.kind == "held" and i > 0:
+            continue  # that of a slide, below
         low, high = surface_ends(gains.arm, claim.low, claim.high)
         times, span = "", _span(low, high)
         if claim.kind == "one-sided":
@@ -151,6 +154,13 @@ def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None
             times = f", at up to {claim.shares[1]:g} times the gain"
         damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
         yield Text(f"  {_CLAIMS[claim.kind]:24}{span}{times}{damping}")
+    if (slide := slide_proof(certificate)) is not None:
+        ends, (least, most) = slide["felt_stiffness"], slide["gain_factor"]
+        span = "no surface" if ends is None else _span(*surface_ends(gains.arm, *ends))
+        off = (
+            f"normal off by up to {slide['angle_deg']:g}\N{DEGREE SIGN}, friction up to {slide['friction']:g}"
+        )
+        yield Text(f"  {'slide':24}{span}, {off}, both changing (gain x {least:.2g} to {most:.3g}); B = 0")
     yield Text(f"Not covered: {len(UNCOVERED)} cases, which --verbose lists.")
 
 

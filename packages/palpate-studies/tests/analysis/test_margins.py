@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.worlds import surface
-from palpate.analysis import growth_with, linearise, loop_gain, margins
 from palpate.bench import load
 from palpate.bench.tables import changed
 from palpate.errors import InputError
+from palpate_studies.analysis import growth_with, linearise, loop_gain, margins
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from palpate.analysis.linear_loop import LoopMotion, leaves, rebuilt, vector
-from palpate.analysis.linear_model import at_equilibrium, pressing
 from palpate.bench import build, load, start_at
+from palpate_studies.analysis.linear_loop import LoopMotion, leaves, rebuilt, vector
+from palpate_studies.analysis.linear_model import at_equilibrium, pressing
 
 
 def test_there_and_back():

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from palpate._vector import ZERO3, Vec3
-from palpate.analysis.linear_loop import LinearLoop, LoopMotion, change
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
@@ -16,6 +15,7 @@ from palpate.bench.force_input import COLUMNS, CONTACT, SequenceState
 from palpate.bench.plant import Loop, LoopState, start_at
 from palpate.bench.tables import Experiment
 from palpate.errors import InputError
+from palpate_studies.analysis.linear_loop import LinearLoop, LoopMotion, change
 
 FINE_BITS = 50
 """Of every converter: the rounding of `signals.quantise` is exact up to 2^51 steps."""

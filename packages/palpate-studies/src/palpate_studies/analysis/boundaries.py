@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.linear_loop import change, effective_states
-from palpate.analysis.linear_model import linearise
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.tables import Experiment, changed
 from palpate.environments.surface import alone
 from palpate.errors import InputError, unknown
 from palpate.force.lyapunov import single
+from palpate_studies.analysis.linear_loop import change, effective_states
+from palpate_studies.analysis.linear_model import linearise
 
 Period = Callable[[float], Array]
 

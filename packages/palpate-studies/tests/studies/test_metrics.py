@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from palpate.bench.force_input import APPROACH, COLUMNS, CONTACT, LOST
-from palpate.bench.metrics import METRICS, Window
 from palpate.records import Record
+from palpate_studies.metrics import METRICS, Window
 
 TICK = 1e-3
 

@@ -21,8 +21,6 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
-from palpate.force.sliding.ground import Ground
-from palpate.force.sliding.slide_world import COLUMNS, LONGEST, Carried, contact, note
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
 from palpate.press.cell import Body, Cell, Reading, Touch, driven, sensed
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
@@ -33,6 +31,8 @@ from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate_slide.ground import Ground
+from palpate_slide.world import COLUMNS, LONGEST, Carried, contact, note
 
 
 @part

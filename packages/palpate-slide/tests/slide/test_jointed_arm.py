@@ -13,9 +13,10 @@ from palpate.errors import InputError
 from palpate.force import Gains
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate.force.sliding.ground import ground_of
-from palpate.force.sliding.slide_world import GAP, directions, figures_of
-from palpate.press.sliding import JointedArm, jointed_arm
+from palpate.force.sliding.paths import directions
+from palpate_slide.ground import ground_of
+from palpate_slide.jointed_arm import JointedArm, jointed_arm
+from palpate_slide.world import GAP, figures_of
 
 pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
 

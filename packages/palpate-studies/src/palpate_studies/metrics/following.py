@@ -8,18 +8,8 @@ from typing import Literal
 import numpy as np
 
 from palpate.bench.force_input import LOST
-from palpate.bench.metrics.window import (
-    BAND,
-    FRONT_ENDS,
-    IDENTIFIER,
-    PARAMETERS,
-    SETTLE,
-    Metric,
-    Value,
-    Window,
-    losses,
-    rms,
-)
+from palpate.bench.summary import BAND, FRONT_ENDS, IDENTIFIER, PARAMETERS, losses
+from palpate_studies.metrics.window import SETTLE, Metric, Value, Window, rms
 
 JOINTS = (1, 2, 3)
 

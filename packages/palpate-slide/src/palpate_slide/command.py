@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
-from palpate.cli._terminal import console, place
 from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.options.force import with_slide
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
 from palpate.cli.options.values import vector
+from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
@@ -25,8 +23,8 @@ from palpate.text import printable
 if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.force import Gains
-    from palpate.force.sliding.ground import Ground
-    from palpate.press.sliding import JointedArm
+    from palpate_slide.ground import Ground
+    from palpate_slide.jointed_arm import JointedArm
 
 SHORTEST = 0.003
 """Path that is one [m]."""
@@ -40,65 +38,46 @@ _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
 @Parameter(name="*", group=Group("The slide", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SlideOptions:
-    """Arm, force and path.
-
-    Parameters
-    ----------
-    arm
-        ur5e, fr3, panda, iiwa14, or a TOML file.
-    force
-        Desired force, as 20:N; that of the gains if left out, or 15 N.
-    speed
-        Along the surface, as 30:mm/s.
-    shape
-        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
-        mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms).
-    surface
-        K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck).
-    path
-        line, back, raster or circle.
-    length
-        Of a line or a pass, radius of a circle, as 60:mm.
-    seconds
-        Duration of the slide.
-    normal
-        Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is 0,0,-1.
-    mu_max
-        Largest friction coefficient that there may be.
-    tilt
-        Standard deviation of --normal in degrees.
-    step
-        Highest step that is expected, as 1:mm: the slide is slow enough to stop on it.
-    touches
-        Spacing of three light touches that measure the normal before the slide; 0:mm for none.
-    gains
-        Gains from palpate tune --slide; made for the arm if left out.
-    physics
-        own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms).
-    seed
-        Of the sensor's noise.
-    """
+    """Arm, force and path."""
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
+    "ur5e, fr3, panda, iiwa14, or a TOML file."
     force: Annotated[str | None, SIGNED] = None
+    "Desired force, as 20:N; that of the gains if left out, or 15 N."
     speed: Annotated[str, SIGNED] = "30:mm/s"
+    "Along the surface, as 30:mm/s."
     shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
+    """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
+    mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
     surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
+    "K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck)."
     path: str = "circle"
+    "line, back, raster or circle."
     length: Annotated[str, SIGNED] = "40:mm"
+    "Of a line or a pass, radius of a circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
+    "Duration of the slide."
     normal: Annotated[str | None, SIGNED] = None
+    """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
+    0,0,-1."""
     mu_max: Annotated[float, SIGNED] = 0.9
+    "Largest friction coefficient that there may be."
     tilt: Annotated[float, SIGNED] = 7.0
+    "Standard deviation of --normal in degrees."
     step: Annotated[str, SIGNED] = "0:mm"
+    "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
     touches: Annotated[str, SIGNED] = "10:mm"
+    "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
     gains: Path | None = None
+    "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
+    "own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms)."
     seed: Annotated[int, WHOLE, _SIMULATED] = 0
+    "Of the sensor's noise."
 
     def ground(self, ways: Array, speed: float, rate: float) -> Ground:
         """The surface under a path."""
-        from palpate.force.sliding.ground import ground_of
+        from palpate_slide.ground import ground_of
 
         numbers: dict[str, float] = {}
         for part in self.surface.split(","):
@@ -112,7 +91,7 @@ class SlideOptions:
         name, _, size = self.shape.partition(":")
         stiffness, heights = numbers.pop("stiffness", 0.0), None
         if name == "mesh":
-            from palpate.force.sliding.mesh import heights_of
+            from palpate_slide.mesh import heights_of
 
             file, _, unit = size.rpartition(":")
             if not file:
@@ -150,7 +129,7 @@ class SlideOptions:
     def joints(self) -> JointedArm:
         """The arm with its joints, for MuJoCo's physics."""
         from palpate.press.engines import ENGINES
-        from palpate.press.sliding import jointed_arm
+        from palpate_slide.jointed_arm import jointed_arm
 
         if self.physics not in ENGINES:
             raise unknown("physics", self.physics, ENGINES)
@@ -160,7 +139,7 @@ class SlideOptions:
         """Rows of the slide."""
         into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
         if self.physics == "own":
-            from palpate.force.sliding.slide_world import simulate
+            from palpate_slide.world import simulate
 
             return simulate(gains, ground, ways, into=into, seed=self.seed)
         return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
@@ -215,9 +194,9 @@ def slide(
     json
         Print one JSON object and nothing else.
     """
+    from palpate.force.sliding.paths import directions
     from palpate.force.sliding.slide_domain import numbers_of
-    from palpate.force.sliding.slide_world import directions
-    from palpate.report.slide import sentence, summarise, write_report
+    from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
     if wire.wire is not None or wire.recover is not None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from palpate.bench.metrics.following import CONTACT_METRICS, FOLLOWING, SURFACE
-from palpate.bench.metrics.verdicts import CLAIMS, own_metric
-from palpate.bench.metrics.window import Metric, Value, Window
 from palpate.errors import unknown
 from palpate.plugins import is_plugin
+from palpate_studies.metrics.following import CONTACT_METRICS, FOLLOWING, SURFACE
+from palpate_studies.metrics.verdicts import CLAIMS, own_metric
+from palpate_studies.metrics.window import Metric, Value, Window
 
 METRICS: dict[str, Metric] = {m.name: m for m in (*FOLLOWING, *CONTACT_METRICS, *SURFACE, *CLAIMS)}
 """All metrics by name, in the order of the documentation."""

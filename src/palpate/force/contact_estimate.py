@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, sqrt
-from palpate.force.contact_evidence import AIR, EDGE, LEVEL, spread_of
-from palpate.force.onset import explained, latest
+from palpate.force.contact_evidence import EDGE, FREE_MOTION, LEVEL, spread_of
+from palpate.force.onset import explained_variance, latest
 from palpate.force.regression import AXIS_B, AXIS_K, BOTH, UNKNOWN, Fit, fit_of, fit_through, without_offset
 from palpate.force.stage import LEARNING, LOCKED
 
 
 @part
-class Learned(NamedTuple):
+class ContactEstimate(NamedTuple):
     """Estimate of the surface."""
 
     slow: Fit  # since the touch
@@ -19,25 +19,25 @@ class Learned(NamedTuple):
     since: float  # ticks since the contact began
     origin: float  # of the position in both fits [m]
     shown: float  # 1 where lines through the readings showed the surface
-    found: Vec3  # K, B/theta in caps, offset [N]
+    value: Vec3  # K, B/theta in caps, offset [N]
     std: Vec3  # of K, B/theta and their sum, in caps
 
 
 @law
-def begun(law, known, before, stage, w, f, starts, air):
-    """Estimate at the begin of this stage: none in free motion, that of the start at a touch, a quarter after a step.
+def first_estimate(law, estimate, before, stage, w, f, starts, behind):
+    """Estimate at the beginning of a phase: none in free motion, that of the line at a touch, a quarter after a step.
 
     A stiff contact begins where the force last was within the noise: there it is at rest, but for the noise and for
     what comes between two readings.
     """
     sigma = sqrt(w.variance)
-    slow, fast, since, origin, shown, found, std = known
-    if stage.phase == AIR:
-        since, origin, shown, found, std = 0.0, f.y, 0.0, ZERO3, ZERO3
+    slow, fast, since, origin, shown, value, std = estimate
+    if stage.phase == FREE_MOTION:
+        since, origin, shown, value, std = 0.0, f.y, 0.0, ZERO3, ZERO3
     if stage.firm == 0.0:
         x = law.cap * (f.y - 0.004 / law.tick * (f.y - f.y0) - origin)
         fast = fit_through(x, w.rest + 0.5 * sigma, sigma)
-    if before.phase == AIR and stage.phase == LEARNING:
+    if before.phase == FREE_MOTION and stage.phase == LEARNING:
         if w.mean - w.rest > LEVEL * sigma and stage.firm * law.tick < law.blind:
             readings = stage.firm * law.tick / law.period + 1.0
             back = (stage.firm + 0.004 / law.tick) * (f.y - f.y0)
@@ -45,45 +45,49 @@ def begun(law, known, before, stage, w, f, starts, air):
             fast = fit_through(
                 law.cap * (f.y - back - origin), w.rest + 0.5 * sigma, sigma + level / readings
             )
-            slow, since, found, std = fast, stage.firm, ZERO3, ZERO3
+            slow, since, value, std = fast, stage.firm, ZERO3, ZERO3
         else:
-            line = latest(starts, air, explained(starts, air) - spread_of(law, w))
+            line = latest(starts, behind, explained_variance(starts, behind) - spread_of(law, w))
             pace = 2.0 * law.cap * law.theta * line.u / (line.n * line.n * law.period)
             slow = fit_of(line, law.cap, origin, pace, w.rest, spread_of(law, w))
-            since, shown, found = line.n * law.period / law.tick, 1.0, slow.solved()
+            since, shown, value = line.n * law.period / law.tick, 1.0, slow.solution()
             std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
     if before.phase == LOCKED and stage.phase == LEARNING:
         slow = without_offset(slow, 0.25)
-    return Learned(slow, fast, since, origin, shown, found, std)
+    return ContactEstimate(slow, fast, since, origin, shown, value, std)
 
 
 @law
-def taken(law, known, state, stage, w, f, force):
-    """Estimate with this tick's reading."""
-    since = known.since + 1.0
+def next_estimate(law, estimate, state, stage, w, f, force):
+    """Estimate after this tick's reading."""
+    since = estimate.since + 1.0
     if w.age > 0.0 or since * law.tick < law.blind:
-        return Learned(known.slow, known.fast, since, known.origin, known.shown, known.found, known.std)
+        return ContactEstimate(
+            estimate.slow, estimate.fast, since, estimate.origin, estimate.shown, estimate.value, estimate.std
+        )
     rate = (f.y - f.y0) / law.tick
-    phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - known.origin), law.cap * law.theta * rate, 1.0)
+    phi = Vec3(law.cap * (0.5 * (f.y + f.y0) - estimate.origin), law.cap * law.theta * rate, 1.0)
     if state.bound.sure.refuted > 0.0:  # it was no surface: what it seemed to tell is forgotten
-        nothing = fit_through(law.cap * (f.y - known.origin), w.mean, UNKNOWN)
-        return Learned(nothing, nothing, law.blind / law.tick, known.origin, 0.0, ZERO3, ZERO3)
+        nothing = fit_through(law.cap * (f.y - estimate.origin), w.mean, UNKNOWN)
+        return ContactEstimate(nothing, nothing, law.blind / law.tick, estimate.origin, 0.0, ZERO3, ZERO3)
     if (
         state.bound.used >= law.cap
-        and known.std.z > 0.0
-        and force - known.found @ phi > EDGE * max(sqrt(w.variance), 2.0 * sqrt(w.tide))
+        and estimate.std.z > 0.0
+        and force - estimate.value @ phi > EDGE * max(sqrt(w.variance), 2.0 * sqrt(w.slow_variance))
     ):
         here = fit_through(phi.x, force, sqrt(w.variance))  # refuted: it begins here
-        return Learned(here, known.fast, stage.firm, known.origin, 0.0, ZERO3, ZERO3)
-    moving = min(max(known.found.x, 0.0), 1.0) * law.cap * rate * law.tick
-    noise = 2.0 * law.theta * w.tide / (w.gap * law.tick)
+        return ContactEstimate(here, estimate.fast, stage.firm, estimate.origin, 0.0, ZERO3, ZERO3)
+    moving = min(max(estimate.value.x, 0.0), 1.0) * law.cap * rate * law.tick
+    noise = 2.0 * law.theta * w.slow_variance / (w.gap * law.tick)
     weight = 1.0 / (noise + moving * moving / 12.0)
-    fast = known.fast
+    fast = estimate.fast
     if stage.firm * law.tick >= law.blind:
-        fast = fast.taking(phi, force, weight, 1.0 - law.tick / law.theta)
+        fast = fast.with_reading(phi, force, weight, 1.0 - law.tick / law.theta)
     if stage.phase == LOCKED:
-        return Learned(known.slow, fast, since, known.origin, known.shown, known.found, known.std)
+        return ContactEstimate(
+            estimate.slow, fast, since, estimate.origin, estimate.shown, estimate.value, estimate.std
+        )
     keep = 1.0 if state.bound.used >= law.cap else 1.0 - law.tick / (6.0 * law.theta)
-    slow = known.slow.taking(phi, force, weight, keep)
+    slow = estimate.slow.with_reading(phi, force, weight, keep)
     std = Vec3(slow.std(AXIS_K), slow.std(AXIS_B), slow.std(BOTH))
-    return Learned(slow, fast, since, known.origin, known.shown, slow.solved(), std)
+    return ContactEstimate(slow, fast, since, estimate.origin, estimate.shown, slow.solution(), std)

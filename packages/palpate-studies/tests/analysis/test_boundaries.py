@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from analysis.worlds import surface
-from palpate.analysis import linearise, stable_intervals, stable_stiffness
-from palpate.analysis.boundaries import growth, stable_pieces
 from palpate.bench import build
 from palpate.bench.tables import changed
 from palpate.errors import InputError
 from palpate.force.boundary import stable_between
+from palpate_studies.analysis import linearise, stable_intervals, stable_stiffness
+from palpate_studies.analysis.boundaries import growth, stable_pieces
 
 # Of a tip alone, y and phi left out, as a feasibility study had them [N/m].
 ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]

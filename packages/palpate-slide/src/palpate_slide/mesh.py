@@ -11,8 +11,8 @@ from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files.limits import GB
-from palpate.force.sliding.ground import SPACING
 from palpate.robots.serial.loading import load_mjcf, mujoco
+from palpate_slide.ground import SPACING
 
 MARGIN = 0.012
 """About the path [m]: touches beside its beginning, and the way to them."""

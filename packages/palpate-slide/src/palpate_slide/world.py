@@ -14,10 +14,8 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3, exp, sqrt
 from palpate.arrays import Array
-from palpate.errors import unknown
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
-from palpate.force.sliding.ground import Ground, outside
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import (
     NORMAL,
@@ -39,6 +37,7 @@ from palpate.force.sliding.tangent_filter import (
     stiffness_of,
     variance,
 )
+from palpate_slide.ground import Ground, outside
 
 COLUMNS = (
     "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness",
@@ -207,7 +206,6 @@ def note(ground, s, tip, velocity, reading, mean, row):
 
 compiled_slide = kernel(slide_run)
 
-PATHS = ("line", "back", "circle", "raster")
 GAP = 3e-3
 """Between tip and surface at the start [m]."""
 LONGEST = 30.0
@@ -216,37 +214,6 @@ SPARE = 6
 """Numbers behind the law's state, for laws that it is compared with."""
 SETTLED = 0.5
 """Time after which a slide is judged [s]."""
-
-
-def directions(
-    path: str, seconds: float, rate: float, speed: float, extent: float, heading: float = 0.0
-) -> Array:
-    """Unit vectors along the surface for each tick, shape (n, 3).
-
-    Args:
-        path: one of `PATHS`.
-        seconds: of the slide [s].
-        rate: ticks a second [Hz].
-        speed: along the surface [m/s].
-        extent: length of a line or a pass, radius of a circle [m].
-        heading: of the beginning [rad].
-
-    Raises:
-        InputError: no such path.
-    """
-    if path not in PATHS:
-        raise unknown("path", path, PATHS)
-    way = speed / rate * np.arange(round(seconds * rate))
-    if path == "circle":
-        angle = heading + way / extent
-    elif path == "raster":  # a pass, a tenth of it aside, and the pass back
-        turn = way % (2.2 * extent)
-        angle = heading + np.pi * ((turn >= 1.1 * extent) & (turn < 2.1 * extent))
-        aside = ((turn >= extent) & (turn < 1.1 * extent)) | (turn >= 2.1 * extent)
-        angle = np.where(aside, heading + 0.5 * np.pi, angle)
-    else:
-        angle = heading + np.pi * (np.floor(way / extent) % 2.0) * (path == "back")
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
 
 
 def simulate(

@@ -11,8 +11,8 @@ import pytest
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.force.sliding.ground import SPACING, ground_of, height_at
-from palpate.force.sliding.mesh import heights_of
+from palpate_slide.ground import SPACING, ground_of, height_at
+from palpate_slide.mesh import heights_of
 
 pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from palpate.analysis.linear_loop import LinearLoop, moving
 from palpate.arrays import Complex, Mask
 from palpate.errors import InputError
+from palpate_studies.analysis.linear_loop import LinearLoop, moving
 
 Array = NDArray[np.floating]
 CUT = "force.line"

@@ -7,11 +7,11 @@ import pytest
 
 from analysis.one_direction import growth
 from analysis.worlds import decoupled, ringing, surface, tip_mass
-from palpate.analysis import growth_with, linearise, stable_stiffness
-from palpate.analysis.linear_model import period_of
 from palpate.bench import build, load
 from palpate.bench.tables import changed
 from palpate.errors import InputError
+from palpate_studies.analysis import growth_with, linearise, stable_stiffness
+from palpate_studies.analysis.linear_model import period_of
 
 CASES = [(12e3, 60.0, 1.0, 0.003), (30e3, 60.0, 0.25, 0.0015), (430e3, 480.0, 0.25, 0.0015)]
 

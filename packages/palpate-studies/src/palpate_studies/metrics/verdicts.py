@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from palpate.bench.metrics.following import (
+from palpate.bench.summary import STEADY, losses
+from palpate.errors import InputError
+from palpate.plugins import plugin, reason
+from palpate_studies.metrics.following import (
     LIMIT,
     QUOTIENT,
     SHARE,
@@ -18,9 +21,7 @@ from palpate.bench.metrics.following import (
     rings,
     settled_rms,
 )
-from palpate.bench.metrics.window import STEADY, Metric, Value, Window, losses
-from palpate.errors import InputError
-from palpate.plugins import plugin, reason
+from palpate_studies.metrics.window import Metric, Value, Window
 
 APART = 0.10
 """How far two numbers for the stiffness may be apart, as a share, to be called the same."""

@@ -10,16 +10,16 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.files import write_text
 from palpate.force.gains import Gains
-from palpate.force.sliding.ground import Ground
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
 from palpate.force.sliding.slide_state import SLIDING_TROUBLES
-from palpate.force.sliding.slide_world import COLUMNS, SETTLED, figures_of
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
+from palpate_slide.ground import Ground
+from palpate_slide.world import COLUMNS, SETTLED, figures_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
