@@ -139,9 +139,11 @@ def _slope_in(depth: Array, force: Array, edges: NDArray[np.intp], low: float, h
     """Of one force over the depth, a level for each loading that goes half as deep as the deepest.
 
     Args:
-        depth, force: shape (n,) [m], [N].
+        depth: shape (n,) [m].
+        force: shape (n,) [N].
         edges: first row, and past the last, of one contact after the other, shape (2 c,).
-        low, high: shares of a loading's largest force.
+        low: share of a loading's largest force at which it begins.
+        high: the same of its end.
     """
     xx = xf = 0.0
     spans = list(zip(edges[::2], edges[1::2], strict=True))
