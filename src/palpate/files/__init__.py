@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from palpate.files.ownership import FORCE, MADE, SIGNATURE, WRITTEN, check_place, ours
-from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml
+from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
 from palpate.files.writing import (
     RECORD,
     as_json,
@@ -33,6 +33,7 @@ __all__ = [
     "read_table",
     "read_text",
     "read_toml",
+    "read_yaml",
     "whole",
     "with_author",
     "write_json",

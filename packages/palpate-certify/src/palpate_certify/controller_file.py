@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.files import read_text
+from palpate.files import read_yaml
 from palpate_certify.delayed_contact import LEAST, DelayedContact
 
 ALPHA = 0.42
@@ -123,7 +123,7 @@ def certify_controller(
         raise InputError("the delay must be above 0 and below 10 s, stiffness and mass above 0")
     if not 0.0 <= damping_time <= 10.0:
         raise InputError(f"the damping time must be from 0 to 10 s, got {damping_time:g}")
-    file, parser = _load(path)
+    file, parser = read_yaml(path, "a parameter file")
     setting = ControllerFile(file, delay, mass)
     axes = [axis for name, own in _nodes(file) for axis in READERS[controller](name, own, setting)]
     if not axes:
@@ -186,24 +186,6 @@ def _correction(
 
 def _finite(value: float) -> float | None:
     return value if value < inf else None
-
-
-def _load(path: Path) -> tuple[Any, Any]:
-    """The file, and the parser that writes it again as it was, comments included."""
-    try:
-        from ruamel.yaml import YAML
-        from ruamel.yaml.error import YAMLError
-    except ImportError:
-        raise InputError("a parameter file needs the extra 'certify': pip install palpate[certify]") from None
-    parser = YAML()
-    parser.width, parser.preserve_quotes = 4096, True
-    try:
-        file = parser.load(read_text(path, "a parameter file"))
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
-    if not isinstance(file, dict):
-        raise InputError(f"{path} is no parameter file: it has no names at its top")
-    return file, parser
 
 
 def _nodes(file: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
