@@ -17,7 +17,7 @@ from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, onl
 from palpate.cli.options.values import vector
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
-from palpate.files import RECORD, fresh_folder, with_author, write_json
+from palpate.files import fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def slide(
     Parameters
     ----------
     out
-        Folder for record.parquet, summary.json, slide.png and report.html; runs/slide-ARM-SEED when left out.
+        Folder for record.parquet, summary.json, film.svg, slide.png and report.html; runs/slide-ARM-SEED when left out.
     replace
         Replace the results at --out.
     json
@@ -233,7 +233,7 @@ def slide(
         summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
-        write_report(rows, gains, summary, fresh, RECORD)
+        write_report(rows, gains, ground, summary, fresh)
         write_json(fresh / "summary.json", summary)
     if json:
         print_answer(summary)

@@ -3,7 +3,7 @@
 The surface's own axes are x and y along it at its first point and z out of it.
 """
 
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -149,3 +149,16 @@ def ground_of(
         )
     grid = np.zeros((3, 2, 2)) if heights is None else heights
     return Ground(SHAPES[shape], heights=grid, **{name: float(value) for name, value in numbers.items()})
+
+
+def surface_height(ground: Ground, x: float, y: float) -> float:
+    """Height of any surface over a place of its plane at the first point [m]; NaN beside a sphere."""
+    z = 0.0
+    for _ in range(30):
+        distance, out = outside(ground, Vec3(x, y, z))
+        if not out.z > 0.05:
+            return nan
+        z -= distance / out.z
+        if abs(distance) < 1e-7:
+            return float(z)
+    return nan
