@@ -1,6 +1,6 @@
 """Slides along surfaces that nobody has measured: how well the force is held, and whether the intervals hold.
 
-    python benchmarks/force/sliding.py slides|joints|rivals|faults [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
+    python benchmarks/force/sliding.py slides|joints|rivals|leaderboard|faults [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
 
 The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N,
 noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along circles, there and back, 4 s
@@ -8,7 +8,7 @@ each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (stan
 `touches` it is as far off, and three touches 10 mm apart measure it first. `obeys`: after
 0.5 s the true normal force is within 3 % rms and 10 %, contact kept. `domain`: the slides that the closed form of
 palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along paths of at most 60 mm. `rivals` begin
-where the force is first held, with the same K_u. `faults`: steps of 1 mm over 2 mm, up or down, with and without
+where the force is first held, with the same K_u; `leaderboard` has a row for each, by rms. `faults`: steps of 1 mm over 2 mm, up or down, with and without
 `step` in the gains, and friction that is 1.5 times as high at rest, from the near start.
 """
 
@@ -158,6 +158,28 @@ def rivals(args):
     in_markdown(["lower rms than: touches; far; near", *(TITLES[arm] for arm in args.arms)], rows.values())
 
 
+def leaderboard(args):
+    """A row for each law on the same slides, the better ones first."""
+    rows = []
+    for arm in args.arms:
+        rng, found = np.random.default_rng(args.seed), {name: [] for name in ("cautious slide", *RIVALS)}
+        for _ in range(args.slides):
+            gains, ground, ways, into, seed, _ = drawn(load_arm(arm), rng, "touches")
+            for name, results in found.items():
+                law = {"control": RIVALS[name]} if name in RIVALS else {}
+                results.append(
+                    figures_of(simulate(gains, ground, ways, into=into, seed=seed, **law), gains, ground)
+                )
+        order = sorted(found.items(), key=lambda item: -sum(f.obeys for f in item[1]))
+        for name, results in order:
+            cells = numbers_of(results)
+            tail = np.percentile([f.rms for f in results], 95)
+            rows.append(
+                [f"{TITLES[arm]}, {name}", cells[0], cells[1], f"{100 * tail:.3g} %", cells[2], cells[3]]
+            )
+    in_markdown(["slide", "obeys", "rms, median", "rms, 95 % below", "worst force (p99)", "lost"], rows)
+
+
 def faults(args):
     """Steps and friction at rest."""
     rows = []
@@ -174,7 +196,7 @@ def faults(args):
     in_markdown(["", "slides", "obeys", "worst force (p99)", "lost", "said, where beyond 10 %"], rows)
 
 
-PARTS = {part.__name__: part for part in (slides, joints, rivals, faults)}
+PARTS = {part.__name__: part for part in (slides, joints, rivals, leaderboard, faults)}
 
 
 def main():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -154,14 +155,18 @@ class SlideOptions:
             raise unknown("physics", self.physics, ENGINES)
         return jointed_arm(self.arm)
 
+    @property
+    def into(self) -> tuple[float, ...]:
+        """Direction into the surface that is given to the law."""
+        return tuple(vector("normal", self.normal, "number") or (0.0, 0.0, -1.0))
+
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
-        into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
         if self.physics == "own":
             from palpate_slide.world import simulate
 
-            return simulate(gains, ground, ways, into=into, seed=self.seed)
-        return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
+            return simulate(gains, ground, ways, into=self.into, seed=self.seed)
+        return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
 
     def tuned(self) -> Gains:
         """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
@@ -189,6 +194,7 @@ def slide(
     limits: LimitOptions | None = None,
     out: Path | None = None,
     replace: Annotated[bool, FLAG] = False,
+    live: Annotated[bool, FLAG] = False,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Hold a force while the tip moves along an unknown curved surface, in simulation or with a real arm.
@@ -210,6 +216,8 @@ def slide(
         Folder for record.parquet, summary.json, film.svg, slide.png and report.html; runs/slide-ARM-SEED when left out.
     replace
         Replace the results at --out.
+    live
+        Watch the slide in the browser, around a circle, its joints moved by MuJoCo (extras: arms, live).
     json
         Print one JSON object and nothing else.
     """
@@ -226,6 +234,8 @@ def slide(
     slide_numbers = numbers_of(gains)
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
     ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
+    if live:
+        return _watch(replaced(asked, physics="mujoco"))
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
@@ -244,6 +254,26 @@ def slide(
             screen.print(f"! {note}", soft_wrap=True)
         place(screen, "report:", folder / "report.html")
     return 0 if summary["end"] == "held" else 1
+
+
+def _watch(asked: SlideOptions) -> int:
+    """Serves the live page of a slide."""
+    from palpate.force.sliding.paths import directions
+    from palpate.force.sliding.slide_domain import numbers_of
+
+    try:
+        from palpate_live.command import ServedOptions, show_live
+        from palpate_slide.watched import WatchedSlide
+    except ImportError:
+        raise InputError(
+            "--live needs palpate-live, which is not installed: pip install palpate-live"
+        ) from None
+    gains = asked.tuned()
+    ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
+    ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
+    return show_live(
+        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed), ServedOptions()
+    )
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
