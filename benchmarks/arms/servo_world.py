@@ -88,7 +88,7 @@ class ServoWorld:
         self._E, self._e, self._c = middle @ (np.eye(3) + 0.5 * self._h * A), middle @ b[:, 0] * self._h, c[0]
         self._z, self._sampling, self._next, self._steps = np.zeros(3), sampling, phase, 0
         self._jacp, self._jacr = np.zeros((2, 3, self.model.nv))
-        self.reading = 0.0
+        self.reading, self.samples = 0.0, 0
 
     @property
     def position(self) -> float:
@@ -136,3 +136,4 @@ class ServoWorld:
         self._steps += 1
         if self._steps * self._h >= self._next:
             self.reading, self._next = float(self._c @ self._z), self._next + 1.0 / self._sampling
+            self.samples += 1

@@ -22,31 +22,22 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ProofOptions:
-    """Surfaces, gains and delays of the proof.
-
-    Parameters
-    ----------
-    stiffness
-        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability limit if
-        not given.
-    damping_time
-        Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
-    jitter
-        Ticks by which a reading may be older than the sensor's period while the law adapts.
-    margin
-        Factor by which the gains may grow.
-    held_only
-        Leave out the proof of the adapting law.
-    loop_from
-        A log of commanded and measured position in free motion: the proof uses the inner loop identified from it.
-    """
+    """Surfaces, gains and delays of the proof."""
 
     stiffness: Annotated[str | None, SIGNED] = None
+    """Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability
+    limit if not given."""
     damping_time: Annotated[str | None, SIGNED] = None
+    "Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0)."
     jitter: Annotated[int, SIGNED] = 1
+    "Ticks by which a reading may be older than the sensor's period while the law adapts."
     margin: Annotated[float, SIGNED] = 1.0
+    "Factor by which the gains may grow."
     held_only: Annotated[bool, FLAG] = False
+    "Leave out the proof of the adapting law."
     loop_from: Path | None = None
+    """A log of commanded and measured position in free motion: the proof uses the inner loop identified from
+    it."""
 
     def check(self) -> None:
         """Finds numbers out of range."""
@@ -85,22 +76,15 @@ class ProofOptions:
 @Parameter(name="*", group=Group("Another controller", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class OthersOptions:
-    """A controller of others, by its parameter file.
-
-    Parameters
-    ----------
-    controller
-        ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the corrected
-        numbers are for, --out a file with these.
-    delay
-        Everything that is late between contact and motion, such as 24:ms.
-    mass
-        Mass of the tip along the normal, for crisp and franka, such as 3:kg.
-    """
+    """A controller of others, by its parameter file."""
 
     controller: str | None = None
+    """ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the
+    corrected numbers are for, --out a file with these."""
     delay: str | None = None
+    "Everything that is late between contact and motion, such as 24:ms."
     mass: str | None = None
+    "Mass of the tip along the normal, for crisp and franka, such as 3:kg."
 
 
 def certify(

@@ -24,15 +24,10 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class PayloadOutput(ReportOption, FileOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Where to write the payload, a TOML file for --payload.
-    """
+    """Where the payload is written."""
 
     out: Path | None = None
+    "Where to write the payload, a TOML file for --payload."
 
 
 def payload(

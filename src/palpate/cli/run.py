@@ -33,15 +33,10 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=DRAWN)
 @dataclass(frozen=True, kw_only=True)
 class DrawnOptions(FigureOptions):
-    """Figures and a film.
-
-    Parameters
-    ----------
-    movie
-        Write a film of the arm too, arm.gif; it takes some ten seconds.
-    """
+    """Figures and a film."""
 
     movie: Annotated[bool, FLAG] = False
+    "Write a film of the arm too, arm.gif; it takes some ten seconds."
 
 
 def run(

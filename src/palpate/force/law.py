@@ -150,7 +150,8 @@ class Cautious(NamedTuple):
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == FREE_MOTION:
             speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
-        speed, pace = lead_speed(self, state.pace, speed, bound.used, limit)
+        most = self.speed if bound.sure.stiffness > 0.0 else limit
+        speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
         return speed, CautiousState(
             state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace
         )  # fmt: skip
@@ -191,7 +192,8 @@ def lead_speed(law, pace, speed, bound, limit):
 
     A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
     m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
-    that it stays the speed that the tip can have.
+    that it stays the speed that the tip can have. The speed that a surface has earned is the tip's: the command is
+    ahead of it by up to the arm's own limit.
     """
     if law.lead == 0.0:
         return speed, speed

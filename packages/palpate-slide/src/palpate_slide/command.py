@@ -39,61 +39,42 @@ _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
 @Parameter(name="*", group=Group("The slide", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SlideOptions:
-    """Arm, force and path.
-
-    Parameters
-    ----------
-    arm
-        ur5e, fr3, panda, iiwa14, or a TOML file.
-    force
-        Desired force, as 20:N; that of the gains if left out, or 15 N.
-    speed
-        Along the surface, as 30:mm/s.
-    shape
-        plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
-        mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms).
-    surface
-        K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck).
-    path
-        line, back, raster or circle.
-    length
-        Of a line or a pass, radius of a circle, as 60:mm.
-    seconds
-        Duration of the slide.
-    normal
-        Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is 0,0,-1.
-    mu_max
-        Largest friction coefficient that there may be.
-    tilt
-        Standard deviation of --normal in degrees.
-    step
-        Highest step that is expected, as 1:mm: the slide is slow enough to stop on it.
-    touches
-        Spacing of three light touches that measure the normal before the slide; 0:mm for none.
-    gains
-        Gains from palpate tune --slide; made for the arm if left out.
-    physics
-        own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms).
-    seed
-        Of the sensor's noise.
-    """
+    """Arm, force and path."""
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
+    "ur5e, fr3, panda, iiwa14, or a TOML file."
     force: Annotated[str | None, SIGNED] = None
+    "Desired force, as 20:N; that of the gains if left out, or 15 N."
     speed: Annotated[str, SIGNED] = "30:mm/s"
+    "Along the surface, as 30:mm/s."
     shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
+    """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
+    mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
     surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
+    "K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck)."
     path: str = "circle"
+    "line, back, raster or circle."
     length: Annotated[str, SIGNED] = "40:mm"
+    "Of a line or a pass, radius of a circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
+    "Duration of the slide."
     normal: Annotated[str | None, SIGNED] = None
+    """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
+    0,0,-1."""
     mu_max: Annotated[float, SIGNED] = 0.9
+    "Largest friction coefficient that there may be."
     tilt: Annotated[float, SIGNED] = 7.0
+    "Standard deviation of --normal in degrees."
     step: Annotated[str, SIGNED] = "0:mm"
+    "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
     touches: Annotated[str, SIGNED] = "10:mm"
+    "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
     gains: Path | None = None
+    "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
+    "own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms)."
     seed: Annotated[int, WHOLE, _SIMULATED] = 0
+    "Of the sensor's noise."
 
     def ground(self, ways: Array, speed: float, rate: float) -> Ground:
         """The surface under a path."""

@@ -15,20 +15,14 @@ DRAWN = Group("Figures", sort_key=4)
 @Parameter(name="*", group=DRAWN)
 @dataclass(frozen=True, kw_only=True)
 class FigureOptions:
-    """How figures are written.
-
-    Parameters
-    ----------
-    figures
-        Formats: png, svg, pdf, one or more.
-    dpi
-        Of a PNG; 110 if not given.
-    """
+    """How figures are written."""
 
     figures: Annotated[
         tuple[str, ...], Parameter(negative=(), show_default=", ".join, consume_multiple=True)
     ] = ("png",)
+    "Formats: png, svg, pdf, one or more."
     dpi: int | None = None
+    "Of a PNG; 110 if not given."
 
     @property
     def endings(self) -> tuple[str, ...]:

@@ -17,16 +17,11 @@ from palpate.cli.options.flags import FLAG
 @Parameter(name="*", group=Group("Your own code", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class PluginOptions:
-    """Consent to run code.
-
-    Parameters
-    ----------
-    plugins
-        Import and run the code that the file names, kind = "module:Class", with your rights. Without it, a question
-        is asked at a terminal; elsewhere such a file is refused.
-    """
+    """Consent to run code."""
 
     plugins: Annotated[bool, FLAG] = False
+    """Import and run the code that the file names, kind = "module:Class", with your rights. Without it, a
+    question is asked at a terminal; elsewhere such a file is refused."""
 
     @contextmanager
     def consent(self, given: str = "") -> Iterator[None]:

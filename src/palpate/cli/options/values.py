@@ -108,38 +108,25 @@ def _numbers(words: list[str]) -> list[float] | None:
 @Parameter(name="*", group=Group("Known names", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class KnownOptions:
-    """List or print, without a run.
-
-    Parameters
-    ----------
-    list_
-        List the known names and stop.
-    print_
-        Print the named file, to copy and edit, and stop.
-    """
+    """List or print, without a run."""
 
     list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
+    "List the known names and stop."
     print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
+    "Print the named file, to copy and edit, and stop."
 
 
 @Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class FolderOptions:
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Folder for results; when left out, one in runs/ with the name of the run.
-    replace
-        Replace existing results.
-    json
-        Print the summary as JSON and nothing else.
-    """
+    """The folder of results."""
 
     out: Path | None = None
+    "Folder for results; when left out, one in runs/ with the name of the run."
     replace: Annotated[bool, FLAG] = False
+    "Replace existing results."
     json: Annotated[bool, FLAG] = False
+    "Print the summary as JSON and nothing else."
 
 
 def print_names(files: TomlFiles, title: Callable[[str], str]) -> None:

@@ -17,29 +17,19 @@ WRITTEN = Group("Output", sort_key=6)
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class JsonOption:
-    """An answer for programs.
-
-    Parameters
-    ----------
-    json
-        Print one JSON object and nothing else.
-    """
+    """An answer for programs."""
 
     json: Annotated[bool, FLAG] = False
+    "Print one JSON object and nothing else."
 
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ReportOption:
-    """A page.
-
-    Parameters
-    ----------
-    report
-        Where to write a page with all results, an HTML file.
-    """
+    """A page with all results."""
 
     report: Path | None = None
+    "Where to write a page with all results, an HTML file."
 
     def page(self) -> Path | None:
         """Path of the page, checked before any work is done."""
@@ -51,18 +41,12 @@ class ReportOption:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class FileOptions(JsonOption):
-    """A file of results.
-
-    Parameters
-    ----------
-    out
-        Where to write the result.
-    replace
-        Replace the file at --out.
-    """
+    """A file of results."""
 
     out: Path | None = None
+    "Where to write the result."
     replace: Annotated[bool, FLAG] = False
+    "Replace the file at --out."
 
     def check_new(self, path: Path | None, option: str = "--out", ending: str = "") -> None:
         """Check a path before any work is done; an existing file is refused unless it is to be replaced.
@@ -80,19 +64,13 @@ class FileOptions(JsonOption):
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class PictureOptions(ReportOption, JsonOption):
-    """A figure, a page, an answer for programs.
-
-    Parameters
-    ----------
-    no_figure
-        Write no figure.
-    json
-        Print one JSON object and nothing else; a figure is written only if --figure is given.
-    """
+    """A figure, a page, an answer for programs."""
 
     figure: Path | None = None
     no_figure: Annotated[bool, FLAG] = False
+    "Write no figure."
     json: Annotated[bool, FLAG] = False
+    "Print one JSON object and nothing else; a figure is written only if --figure is given."
 
     def picture(self, default: str, endings: tuple[str, ...] = (".png",)) -> Path | None:
         """Path of the figure, checked before any work is done."""
