@@ -1,6 +1,6 @@
 """Slides along surfaces that nobody has measured: how well the force is held, and whether the intervals hold.
 
-    python benchmarks/force/sliding.py slides|joints|rivals|leaderboard|faults [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
+    python benchmarks/force/sliding.py PART [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
 
 The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N,
 noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along circles, there and back, 4 s
@@ -8,7 +8,8 @@ each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (stan
 `touches` it is as far off, and three touches 10 mm apart measure it first. `obeys`: after
 0.5 s the true normal force is within 3 % rms and 10 %, contact kept. `domain`: the slides that the closed form of
 palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along paths of at most 60 mm. `rivals` begin
-where the force is first held, with the same K_u; `leaderboard` has a row for each, by rms. `faults`: steps of 1 mm over 2 mm, up or down, with and without
+where the force is first held, with the same K_u; `leaderboard` has a row for each.
+`faults`: steps of 1 mm over 2 mm, up or down, with and without
 `step` in the gains, and friction that is 1.5 times as high at rest, from the near start.
 """
 
