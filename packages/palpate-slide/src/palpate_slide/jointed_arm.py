@@ -180,6 +180,7 @@ class JointedArm:
         return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
 
     def check_range(self, q: Array, time: float) -> None:
+        """Refuses joints at the end of their range, shape (n,), at a time [s]."""
         beyond = np.flatnonzero(~((q >= self.arm.lower) & (q <= self.arm.upper)))
         if len(beyond):
             raise InputError(
