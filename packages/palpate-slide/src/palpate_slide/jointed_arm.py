@@ -164,7 +164,7 @@ class JointedArm:
         Raises:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
-        run = RunningSlide(self, gains, ground, into, seed)
+        run = JointedSlide(self, gains, ground, into, seed)
         rows = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS)))
         for k, row in enumerate(rows):
             if run.ticks >= len(ways):
@@ -188,7 +188,7 @@ class JointedArm:
             )
 
 
-class RunningSlide:
+class JointedSlide:
     """A slide that goes on tick by tick.
 
     Args:

@@ -30,7 +30,7 @@ from palpate_live.view import (
 )
 from palpate_live.view import COLUMNS as SHOWN
 from palpate_slide.ground import Ground
-from palpate_slide.jointed_arm import JointedArm, RunningSlide
+from palpate_slide.jointed_arm import JointedArm, JointedSlide
 from palpate_slide.world import COLUMNS
 
 PLACE = {name: i for i, name in enumerate(COLUMNS)}
@@ -94,7 +94,7 @@ class WatchedSlide:
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
-        self._run = RunningSlide(self._at, self._gains, self._surface, self._into, self.state.seed or 0)
+        self._run = JointedSlide(self._at, self._gains, self._surface, self._into, self.state.seed or 0)
         self._run.loop.desired = self.state.values["force"]
         self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))
 
