@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.distance import cdist
+from scipy.spatial.distance import cdist, pdist
 
 from palpate.maps.gaussian_process import Conditioned, Hyperparameters, fit, loss
 
@@ -20,7 +20,7 @@ def prior_covariance(p, places, others):
 
 def test_the_gradient_is_that_of_the_likelihood():
     theta = np.log([0.4, 0.05, 0.2, 0.01, 0.02])
-    distance, step = cdist(PLACES, PLACES), 1e-5
+    distance, step = pdist(PLACES), 1e-5
     numeric = [
         (
             loss(theta + step * e, distance, VALUES, NOISE)[0]
@@ -84,3 +84,13 @@ def test_presses_beyond_one_block_are_fitted_too():
     mean, _ = process.predict(at)
     assert np.sqrt(np.mean((mean - np.sin(60.0 * at[:, 0])) ** 2)) < 0.05
     assert process.repeat == pytest.approx(np.sqrt(0.05**2 - 0.02**2), rel=0.25)
+
+
+def test_intervals_are_wider_than_normal_ones_where_the_field_jumps():
+    places = RNG.uniform(0.0, 0.1, (80, 2))
+    noise = np.full(80, 0.03)
+    plain = fit(places, 5.0 * places[:, 0] + noise * RNG.normal(size=80), noise)
+    jump = fit(places, (np.hypot(*(places - 0.05).T) < 0.015) + noise * RNG.normal(size=80), noise)
+    assert plain.z95 == pytest.approx(1.96, abs=0.15)
+    assert jump.z95 > 2.2
+    assert np.mean(np.abs(jump.likeliest.leave_one_out()) < jump.z95) >= 0.94

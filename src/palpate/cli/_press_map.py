@@ -30,11 +30,13 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
     from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.maps.phantom import load_phantom, palpate_phantom
     from palpate.report import map as page
+    from palpate.report.numbers import plain
 
     assert phantom.map is not None
     if phantom.page is not None:
         check_place(phantom.page, "--page", ending=".html")
-    surface, title = load_phantom(phantom.map), f"Phantom {phantom.map.name}"
+    surface = load_phantom(phantom.map)
+    title = f"Phantom {phantom.map.stem}, {' × '.join(plain(1e3 * side, 3) for side in surface.size)} mm"
     request = MapOptions(stiffer_than=phantom.stiffer_than).request()
     question = simulated.question(asked, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
     folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"

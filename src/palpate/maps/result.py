@@ -132,7 +132,8 @@ class MapResult:
         for k in map(int, counts):
             first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
             mean, variance = first.reduction.predict(distance[:k])
-            frames.append((k, Prediction(mean, np.sqrt(variance), np.sqrt(variance), self.request.common)))
+            std, common = np.sqrt(variance), self.request.common
+            frames.append((k, Prediction(mean, std, std, common, z95=self.map.process.z95)))
         return frames
 
     @cached_property

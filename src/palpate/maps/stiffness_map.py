@@ -11,12 +11,10 @@ from scipy.stats import norm
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.maps.gaussian_process import GaussianProcess, fit
+from palpate.maps.gaussian_process import Z95, GaussianProcess, fit
 from palpate.maps.next_press import Goal, NextPresses, choose, importance, travel
 from palpate.maps.surface import Grid, Surface
 
-Z95 = float(norm.ppf(0.975))
-"""Half-width of a normal distribution's central 95 % over its standard deviation."""
 CANDIDATES = 600
 """Places among which the next press is chosen: in a plane 25 by 25, as fine as hundreds of presses are apart."""
 MOST_PRESSES = 1000
@@ -33,6 +31,7 @@ class Prediction:
         next_std: of the value that a next press would state, alike (n,).
         common: standard deviation of the error that all presses share, alike.
         logarithmic: whether the four are of the logarithm.
+        z95: half-width of the 95 % intervals over the standard deviation.
     """
 
     mean: Array
@@ -40,6 +39,7 @@ class Prediction:
     next_std: Array
     common: float
     logarithmic: bool = True
+    z95: float = Z95
 
     @property
     def value(self) -> Array:
@@ -50,6 +50,11 @@ class Prediction:
     def stiffness(self) -> Array:
         """The median of the stiffness (n,) [N/m]."""
         return self.value
+
+    @property
+    def relative_half(self) -> Array:
+        """Half-width of the 95 % interval over the surface's own value (n,), of a logarithmic field."""
+        return np.expm1(self.z95 * np.hypot(self.std, self.common))
 
     @property
     def ci95(self) -> Array:
@@ -67,7 +72,7 @@ class Prediction:
         return np.asarray(norm.sf(level, self.mean, np.hypot(self.std, self.common)))
 
     def _interval(self, std: Array) -> Array:
-        ends = self.mean[:, None] + Z95 * np.outer(std, [-1.0, 1.0])
+        ends = self.mean[:, None] + self.z95 * np.outer(std, [-1.0, 1.0])
         return np.exp(ends) if self.logarithmic else ends
 
 
@@ -179,7 +184,8 @@ class FieldMap:
             )
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
-        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic)
+        z95 = self.process.z95
+        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, z95)
 
     def next(
         self,
@@ -219,7 +225,8 @@ class FieldMap:
         std = np.sqrt(
             left[chosen] + np.maximum(variance - np.diag(covariance), 0.0)[chosen] + self._common**2
         )
-        half = np.exp(mean[chosen]) * np.sinh(Z95 * std) if self.logarithmic else Z95 * std
+        half = self.process.z95 * std
+        half = np.exp(mean[chosen]) * np.sinh(half) if self.logarithmic else half
         return NextPresses(among[chosen], half)
 
     def presses_until(self, half: float) -> int | None:
@@ -234,7 +241,7 @@ class FieldMap:
         """
         if not half > 0.0:
             raise InputError(f"the half-width must be above 0, got {half:g}")
-        asked = ((np.log1p(half) if self.logarithmic else half) / Z95) ** 2 - self._common**2
+        asked = ((np.log1p(half) if self.logarithmic else half) / self.process.z95) ** 2 - self._common**2
         covariance, noise = self.process.likeliest.covariance(self._candidates()), self._noise
         presses = choose(covariance, np.ones(len(covariance)), noise)
         variances = chain([np.diag(covariance)], (variance for _, variance in presses))

@@ -67,6 +67,7 @@ class Asked:
                 "position": {"lag_s": 0.0},
             },
             "notes": list(self.notes),
+            "place_m": self.place.point.tolist(),
             **self.between,
         }
 
