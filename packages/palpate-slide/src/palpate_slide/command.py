@@ -18,7 +18,7 @@ from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, onl
 from palpate.cli.options.values import vector
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
-from palpate.files import fresh_folder, with_author, write_json
+from palpate.files import fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -30,7 +30,14 @@ if TYPE_CHECKING:
 SHORTEST = 0.003
 """Path that is one [m]."""
 _OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
-_SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
+_SURFACE = {
+    "K": "stiffness",
+    "B": "damping",
+    "mu": "friction",
+    "mus": "sticking",
+    "creep": "creep",
+    "grade": "grade",
+}
 
 
 _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
@@ -51,7 +58,8 @@ class SlideOptions:
     """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
     mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
     surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
-    "K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck)."
+    """K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck); grade for the
+    relative change of K along x per metre."""
     path: str = "circle"
     "line, back, raster or circle."
     length: Annotated[str, SIGNED] = "40:mm"
@@ -69,6 +77,9 @@ class SlideOptions:
     "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
     touches: Annotated[str, SIGNED] = "10:mm"
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
+    dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
+    """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv, which
+    palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
@@ -144,9 +155,13 @@ class SlideOptions:
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
         if self.physics == "own":
+            from palpate_slide.dither import dither_frequency
             from palpate_slide.world import simulate
 
-            return simulate(gains, ground, ways, into=self.into, seed=self.seed)
+            share = (self.dither, dither_frequency(gains))
+            return simulate(gains, ground, ways, into=self.into, seed=self.seed, dither=share)
+        if self.dither:
+            raise InputError("--dither needs --physics own; leave out --physics mujoco")
         return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
 
     def tuned(self) -> Gains:
@@ -204,6 +219,7 @@ def slide(
     """
     from palpate.force.sliding.paths import directions
     from palpate.force.sliding.slide_domain import numbers_of
+    from palpate_slide.dither import check_share, dither_frequency, stiffness_along
     from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
@@ -211,6 +227,7 @@ def slide(
         return _slide_over(asked, wire, limits, json)
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
+    check_share(asked.dither)
     gains = asked.tuned()
     slide_numbers = numbers_of(gains)
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
@@ -224,6 +241,10 @@ def slide(
         summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
+        if asked.dither:
+            along = stiffness_along(rows, gains.arm, dither_frequency(gains))
+            write_text(fresh / "places.csv", along.to_csv())
+            summary["along"] = along.to_json()
         write_report(rows, gains, ground, summary, fresh)
         write_json(fresh / "summary.json", summary)
     if json:

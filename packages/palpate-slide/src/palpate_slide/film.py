@@ -37,13 +37,12 @@ STICKS = 9
 """Normals that stay along the path."""
 
 
-def slide_film(rows: Array, tick: float, desired: float, ground: Ground, half: str = "") -> str:
+def slide_film(rows: Array, tick: float, ground: Ground, half: str = "") -> str:
     """The film of a slide as SVG.
 
     Args:
-        rows: as of `world.simulate`, shape (n, 20).
+        rows: as of `world.simulate`, shape (n, 21).
         tick: between two rows [s].
-        desired: F_d [N].
         ground: the surface.
         half: `surface` or `force` for that half alone, which is legible on a telephone; both if empty.
     """
@@ -59,7 +58,7 @@ def slide_film(rows: Array, tick: float, desired: float, ground: Ground, half: s
     if half != "surface":
         seconds, on = float(t[-1] - t[0]), c["sliding"] > 0.0
         words = f"force, up to {c['normal_force'].max():.3g} N in {seconds:.3g} s; dashed: desired"
-        parts += trace_panel(t, c["normal_force"], np.full(len(t), desired), FORCE, words)
+        parts += trace_panel(t, c["normal_force"], c["desired"], FORCE, words)
         mu = np.where(on, c["mu"], 0.0)
         words = (
             f"friction, {mu[-1]:.2f} at the end; dashed: truth"

@@ -152,7 +152,7 @@ class JointedArm:
     def slide(
         self, gains: Gains, ground: Ground, ways: Array, *, into: ArrayLike = DOWN, seed: int = 0
     ) -> Array:
-        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 20).
+        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 21).
 
         Args:
             gains: with a table `slide`.
@@ -224,6 +224,7 @@ class JointedSlide:
         after = self.engine.slid
         v, f = _three(velocity), _three(reading)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
+        row[20] = loop.desired
         row[13] = (1.0 if loop.sliding else 2.0) * min(self.ticks, 1)
 
 

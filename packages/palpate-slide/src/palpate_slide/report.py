@@ -26,7 +26,9 @@ from palpate_slide.world import COLUMNS, SETTLED, figures_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_UNITS = dict.fromkeys(("normal_force", "fx", "fy", "fz"), "N") | dict.fromkeys(("x", "y", "z"), "m")
+_UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
+    ("x", "y", "z"), "m"
+)
 _UNITS |= {"normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 
 
@@ -103,9 +105,7 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     if summary["end"] != "held":
         alerts.insert(0, {"tone": "fail", "title": "", "text": f"The force: {summary['end']}."})
     caption = "Along the path. Grey: 95 % interval; dashed: desired, or the truth of the simulation."
-    films = {
-        half: slide_film(rows, gains.arm.tick, gains.force, ground, half) for half in ("", "surface", "force")
-    }
+    films = {half: slide_film(rows, gains.arm.tick, ground, half) for half in ("", "surface", "force")}
     write_text(folder / "film.svg", films[""])
     told = {"surface": "The path over the surface, in real time.", "force": "Force and friction."}
     pairs = [
@@ -116,7 +116,7 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",
-        alerts=alerts, cards={"": _cards(summary)}, pairs=pairs,
+        alerts=alerts, cards={"": _cards(summary)}, pairs=pairs, folds=_along(summary),
         figures=[{"panels": panels[:4], "caption": caption}, {"panels": panels[4:], "caption": caption}],
         source=("The gains", gains.to_toml()),
     )  # fmt: skip
@@ -142,6 +142,15 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     ]
 
 
+def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
+    """The stiffness along the path of a dithered slide, folded."""
+    rows = [
+        [f"x {1e3 * p['x']:.3g}, y {1e3 * p['y']:.3g} mm", quantity(p["stiffness"], "N/m", p["half"])]
+        for p in summary.get("along", [])
+    ]
+    return [("Stiffness along the path", f"{len(rows)} places, for palpate map --table places.csv", rows)]
+
+
 def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
     """Force error, speed, normal, friction and stiffness against the path; stretches where the slide was slower."""
     on = rows[:, COLUMNS.index("sliding")] > 0.0
@@ -157,7 +166,7 @@ def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
         np.degrees(CHI2_95 * c["cone"]),
     )
     for panel, label, value, ends, known, color in (
-        (axes[0], "force error [N]", c["normal_force"] - gains.force, (), (-within, within), style.F),
+        (axes[0], "force error [N]", c["normal_force"] - c["desired"], (), (-within, within), style.F),
         (axes[1], "speed [mm/s]", 1e3 * c["speed"], (), (asked,), style.INK),
         (axes[2], "normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), style.INK),
         (axes[3], "friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), style.INK),

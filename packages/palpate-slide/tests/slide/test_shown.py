@@ -42,7 +42,7 @@ def test_the_height_of_a_surface_is_on_it(shape: str) -> None:
 
 def test_a_film_moves_along_the_path(slid) -> None:
     rows, gains, ground = slid
-    film = ElementTree.fromstring(slide_film(rows, gains.arm.tick, gains.force, ground))
+    film = ElementTree.fromstring(slide_film(rows, gains.arm.tick, ground))
     moving = [one for one in film.iter() if one.tag.endswith("animate")]
     assert len(moving) == 10
     frames = [one.get("values").split(";") for one in moving]
@@ -60,7 +60,7 @@ def test_a_film_of_a_surface_that_was_never_touched_is_one(slid) -> None:
     rows, gains, ground = slid
     before = rows[:50]
     assert not before[:, COLUMNS.index("normal_force")].any()
-    assert "did not slide" in slide_film(before, gains.arm.tick, gains.force, ground)
+    assert "did not slide" in slide_film(before, gains.arm.tick, ground)
     summary = summarise(before, gains, ground)
     assert summary["end"] == "no contact"
     assert "never touched" in sentence(summary)
