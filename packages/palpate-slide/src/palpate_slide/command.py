@@ -78,8 +78,8 @@ class SlideOptions:
     touches: Annotated[str, SIGNED] = "10:mm"
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
-    """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv, which
-    palpate map --table reads; 0 for none."""
+    """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
+    which palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"

@@ -8,6 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.files import MADE
 from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.guard import FINE
@@ -68,7 +69,7 @@ class PathStiffness:
     def to_csv(self) -> str:
         """As `palpate map --table` reads it."""
         rows = np.column_stack([self.places, self.stiffness, self.half])
-        return "x_m,y_m,z_m,stiffness,half\n" + "".join(
+        return f"{MADE} slide.\nx_m,y_m,z_m,stiffness,half\n" + "".join(
             ",".join(f"{value:.6g}" for value in row) + "\n" for row in rows
         )
 
