@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.analysis.others_controllers import HALF, PERIOD, STIFFEST, certify_controller
 from palpate.arrays import Array
+from palpate_certify.controller_file import HALF, PERIOD, STIFFEST, certify_controller
 
 KINDS = ("ros2-admittance", "fzi", "crisp", "franka")
 STEPS, TURNS = 200, 600
@@ -111,7 +111,7 @@ def edges(kind: str, count: int, rng: np.random.Generator) -> None:
         for own in drawn:
             path.write_text(text(kind, own), encoding="utf-8")
             begin = perf_counter()
-            told, out = certify_controller(path, kind, own["T"], own.get("mass"))
+            told, out, *_ = certify_controller(path, kind, own["T"], own.get("mass"))
             seconds.append(perf_counter() - begin)
             exact.append(told["exact"]["stiffness"][1])
             share.append((told["proved"]["stiffness"] or [0, 0])[1] / exact[-1])

@@ -83,6 +83,8 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "title": arm.title,
         "normal": list(task.direction),
         "desired_N": task.force,
+        "hold_s": task.hold,
+        "probe": task.probe,
         **({} if tool is None else tool.meta),
     }
 

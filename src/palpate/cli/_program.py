@@ -46,7 +46,7 @@ GROUPS = {
     Group("From a log", sort_key=1): ("identify", "payload", "topics", "excite", "map"),
     Group("Force loop", sort_key=2): ("tune", "certify", "press", "slide"),
     Group("Simulate", sort_key=3): ("export", "run", "live", "study", "checks"),
-    Group("Thesis and references", sort_key=4): ("laboratory", "references", "thesis"),
+    Group("Thesis and references", sort_key=4): ("benchmark", "laboratory", "references", "thesis"),
     _PROGRAM: ("speed", "completion"),
 }
 """Commands by what a user begins with, in the order of the help."""
@@ -58,6 +58,7 @@ COMPANIONS = {
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",
     "references": "palpate-references",
+    "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",
 }
 ENTRY_POINTS = "palpate.commands"

@@ -12,6 +12,7 @@ from palpate.cli._answer import print_answer
 from palpate.cli._terminal import console, print_lines
 from palpate.cli.options.flags import FLAG, SIGNED
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
+from palpate.cli.options.written import ReportOption
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -75,16 +76,44 @@ class ProofOptions:
 
 @Parameter(name="*", group=Group("Another controller", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
-class OthersOptions:
-    """A controller of others, by its parameter file."""
+class OthersOptions(ReportOption):
+    """A controller of others, by its parameter file.
+
+    Parameters
+    ----------
+    controller
+        ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the corrected
+        numbers are for, --damping-time their damping, --out a file with these numbers.
+    delay
+        Everything that is late between contact and motion, such as 24:ms.
+    mass
+        Mass of the tip along the normal, for crisp and franka, such as 3:kg.
+    report
+        Where to write a page about that controller, an HTML file.
+    """
 
     controller: str | None = None
-    """ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the
-    corrected numbers are for, --out a file with these."""
     delay: str | None = None
-    "Everything that is late between contact and motion, such as 24:ms."
     mass: str | None = None
-    "Mass of the tip along the normal, for crisp and franka, such as 3:kg."
+    report: Path | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Everything late between contact and motion [s]."""
+        from palpate.cli.options.quantities import quantity
+
+        if self.delay is None:
+            raise InputError(
+                "--controller needs --delay, everything late between contact and motion, such as 24:ms"
+            )
+        return quantity("--delay", self.delay, "time")
+
+    @property
+    def kilograms(self) -> float | None:
+        """Mass of the tip along the normal [kg]."""
+        from palpate.cli.options.quantities import quantity
+
+        return None if self.mass is None else quantity("--mass", self.mass, "mass")
 
 
 def certify(
@@ -105,7 +134,7 @@ def certify(
 
     palpate certify force_loop/palpate_force.h --check certificate.json
 
-    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml
+    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml --report page.html
 
     A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
     has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
@@ -125,6 +154,8 @@ def certify(
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     if others is not None and others.controller is not None:
         return _others(gains, others, proof, output)
+    if others is not None and others.report is not None:
+        raise InputError("--report is of --controller; palpate tune writes a page about gains")
     output.check_new(output.out, ending=".json")
     proof.check()
     return _prove(gains, proof, columns or ColumnOptions(), output)
@@ -161,29 +192,13 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
 
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
-    from palpate.analysis.others_controllers import STIFFEST, certify_controller
-    from palpate.cli.options.quantities import quantity
-    from palpate.files import MADE, write_text
+    """The answer of the distribution that reads parameter files of others."""
+    from importlib.metadata import entry_points
 
-    output.check_new(output.out, ending=".yaml")
-    if others.delay is None:
-        raise InputError(
-            "--controller needs --delay, everything late between contact and motion, such as 24:ms"
-        )
-    mass = None if others.mass is None else quantity("--mass", others.mass, "mass")
-    delay = quantity("--delay", others.delay, "time")
-    stiffest = STIFFEST if asked.surfaces is None else asked.surfaces[1]
-    answer, text = certify_controller(path, str(others.controller), delay, mass, stiffest)
-    if output.out is not None and answer["corrected"] is not None:
-        write_text(output.out, text if text.startswith(MADE) else f"{MADE} certify.\n{text}")
-    if output.json:
-        print_answer(answer)
-    else:
-        from palpate.report.tuning.table import controller_lines
-
-        print_lines(*controller_lines(answer, output.out))
-    return (
-        0 if answer["proved"]["stiffness"] is not None and answer["proved"]["stiffness"][1] >= stiffest else 1
+    for entry in entry_points(group="palpate.certifiers", name="controller"):
+        return int(entry.load()(path, others, asked, output))
+    raise InputError(
+        "--controller is of palpate-certify, which is not installed: pip install palpate[certify]"
     )
 
 

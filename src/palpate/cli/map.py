@@ -43,7 +43,8 @@ class PlaceOptions:
 
     table: Path | None = None
     """A table with a row a press instead of logs: columns x, y (and z), stiffness and half, the half-width of
-    its 95 % interval; a name such as x_mm carries its unit."""
+    its 95 % interval; a name such as x_mm carries its unit. A column line numbers the slide or session of a press,
+    whose presses share an error."""
     columns: str | None = None
     "Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm."
     place: str | None = None

@@ -211,10 +211,16 @@ def _into_tool(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Arra
         return rotations.transpose(0, 2, 1)
     if wrench_frame == "tool":
         return np.broadcast_to(np.eye(3), rotations.shape)
+    assert frame.sensor_rpy is not None
+    return np.broadcast_to(turn_of(frame.sensor_rpy), rotations.shape)
+
+
+def turn_of(sensor_rpy: Vector) -> Array:
+    """Rotation from the axes of a sensor into the tool's, shape (3, 3), of roll, pitch and yaw [rad]."""
     from scipy.spatial.transform import Rotation
 
-    turn: Array = Rotation.from_euler("xyz", frame.sensor_rpy).as_matrix()
-    return np.broadcast_to(turn, rotations.shape)
+    turn: Array = Rotation.from_euler("xyz", sensor_rpy).as_matrix()
+    return turn
 
 
 def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:

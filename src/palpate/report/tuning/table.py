@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -165,24 +165,6 @@ def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None
 
 
 _CLAIMS = {"held": "constant gain", "one-sided": "contact lost and found", "adapting": "adapting gain"}
-
-
-def controller_lines(answer: dict[str, Any], written: Path | None = None) -> Iterator[str]:
-    """Answer about a controller of others, a line each."""
-    first, proved, better = answer["first_unstable"], answer["proved"]["stiffness"], answer["corrected"]
-    delay = quantity(answer["delay_s"], "s")
-    if first is None:
-        yield f"Stable on every surface, with a delay of {delay}."
-    else:
-        yield f"Unstable from {quantity(first['stiffness'], 'N/m')} ({first['axis']}), with a delay of {delay}."
-    yield f"Proved stable: {_span(*proved)}." if proved else "Nothing could be proved."
-    if better is None:
-        yield "No numbers of this controller were found that are stable on the surfaces asked for."
-    else:
-        place = f"   written: {written}" if written else "; --out writes them"
-        most = "any stiffness" if better["exact"][1] is None else quantity(better["exact"][1], "N/m")
-        what = "none is needed" if not better["changed"] else f"{', '.join(better['changed'])}{place}"
-        yield f"Corrected for {_span(*better['stiffness'])} (unstable from {most}): {what}"
 
 
 def show_all(told: Tuning, console: Console) -> None:

@@ -7,7 +7,7 @@ K is the surface's stiffness. A root on the imaginary axis makes -A(jw)/C(jw) re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import polynomial as poly
@@ -51,6 +51,15 @@ class DelayedContact:
             for a, b in ((self.plain, self.late), (self.surface, self.late_surface))
         )
         return A, C
+
+    def on_damped(self, time: float) -> DelayedContact:
+        """The same on a surface whose damping is this time times its stiffness: B = K time [s]."""
+        if time == 0.0:
+            return self
+        surface, late = (
+            tuple(poly.polymul((1.0, time), c).tolist()) for c in (self.surface, self.late_surface)
+        )
+        return replace(self, surface=surface, late_surface=late)
 
     @property
     def frequencies(self) -> Array:

@@ -16,11 +16,13 @@ from dataclasses import dataclass
 from io import StringIO
 from math import inf, sqrt
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from palpate.analysis.delayed_contact import LEAST, DelayedContact
+import numpy as np
+
 from palpate.errors import InputError, unknown
-from palpate.files import read_text
+from palpate.files import read_yaml
+from palpate_certify.delayed_contact import LEAST, DelayedContact
 
 ALPHA = 0.42
 """K T/D, with the lag of M/D in T, of corrected numbers: 3 % over with a pure delay (benchmarks/force/others.py)."""
@@ -35,6 +37,32 @@ REFUSED = {
     "ur": "force_mode's law is not published: damping and gain_scaling have no units in its manual; log a press, and "
     "use palpate identify and palpate tune",
 }
+
+
+TIMES = 9
+"""Damping times B/K of the surface that are looked at, from 0 to the longest."""
+UNCOVERED = (
+    "sampling and filters, but for what the delay holds of them",
+    "a surface's mass, and damping times B/K beyond those given (none without --damping-time)",
+    "couplings between axes, link masses, and turning axes",
+    "loss of contact, and limits of speed and torque",
+)
+
+
+class ControllerVerdict(NamedTuple):
+    """Answer of `palpate certify --controller`, the corrected file, and the loop of the worst axis before and after.
+
+    Args:
+        answer: as JSON has it.
+        text: of the file with corrected numbers.
+        before: loop of the axis that is unstable first.
+        after: the same loop with its corrected numbers; None if there are none.
+    """
+
+    answer: dict[str, Any]
+    text: str
+    before: DelayedContact
+    after: DelayedContact | None
 
 
 @dataclass(frozen=True)
@@ -65,9 +93,15 @@ class ControlledAxis:
     correct: Callable[[float], tuple[DelayedContact | None, Edits]]
 
 
+# More than seven arguments: each is an option of the command.
 def certify_controller(
-    path: Path, controller: str, delay: float, mass: float | None = None, stiffest: float = STIFFEST
-) -> tuple[dict[str, Any], str]:
+    path: Path,
+    controller: str,
+    delay: float,
+    mass: float | None = None,
+    stiffest: float = STIFFEST,
+    damping_time: float = 0.0,
+) -> ControllerVerdict:
     """Stable surfaces of a controller's parameter file, and the file with corrected numbers.
 
     Args:
@@ -76,6 +110,7 @@ def certify_controller(
         delay: everything that is late between contact and motion [s].
         mass: of the tip, for crisp and franka [kg].
         stiffest: surface that the corrected numbers are for [N/m].
+        damping_time: longest B/K of the surface [s]; `TIMES` of them are looked at, from 0 on.
 
     Raises:
         InputError: another controller, or a file without its numbers.
@@ -86,31 +121,50 @@ def certify_controller(
         raise unknown("controller", controller, [*READERS, *REFUSED])
     if not 0.0 < delay < 10.0 or not 0.0 < stiffest < inf or not (mass is None or 0.0 < mass < inf):
         raise InputError("the delay must be above 0 and below 10 s, stiffness and mass above 0")
-    file, parser = _load(path)
+    if not 0.0 <= damping_time <= 10.0:
+        raise InputError(f"the damping time must be from 0 to 10 s, got {damping_time:g}")
+    file, parser = read_yaml(path, "a parameter file")
     setting = ControllerFile(file, delay, mass)
     axes = [axis for name, own in _nodes(file) for axis in READERS[controller](name, own, setting)]
     if not axes:
         raise InputError(f"{path}: no settings of {controller}; {WANTED[controller]}")
-    ends = [axis.loop.first_unstable() for axis in axes]
+    times = np.linspace(0.0, damping_time, TIMES).tolist() if damping_time else [0.0]
+    ends = [_edge(axis.loop, times) for axis in axes]
     first = min(ends)
+    worst = axes[ends.index(first)]
     high = SHARE * min(first, 1e9)
-    proved = high > 0.0 and all(axis.loop.proves(LEAST * high, high) for axis in axes)
-    corrected = _correction(axes, ends, stiffest)
+    proved = high > 0.0 and all(_proves(axis.loop, times, high) for axis in axes)
+    corrected = _correction(axes, ends, stiffest, times)
     out = StringIO()
     parser.dump(file, out)
     answer = {
         "controller": controller,
         "delay_s": delay,
+        "damping_times_s": times,
+        "asked": stiffest,
         "proved": {"stiffness": [LEAST * high, high] if proved else None},
         "exact": {"stiffness": [0.0, _finite(first)]},
-        "first_unstable": {"stiffness": first, "axis": axes[ends.index(first)].name} if first < inf else None,
+        "first_unstable": {"stiffness": first, "axis": worst.name} if first < inf else None,
         "axes": {axis.name: _finite(end) for axis, end in zip(axes, ends, strict=True)},
         "corrected": corrected,
     }
-    return answer, out.getvalue()
+    after = worst.correct(stiffest)[0] if corrected else None
+    return ControllerVerdict(answer, out.getvalue(), worst.loop, after)
 
 
-def _correction(axes: list[ControlledAxis], ends: list[float], stiffest: float) -> dict[str, Any] | None:
+def _edge(loop: DelayedContact, times: list[float]) -> float:
+    """Lowest first unstable stiffness over surfaces of these damping times [N/m]."""
+    return min(loop.on_damped(time).first_unstable() for time in times)
+
+
+def _proves(loop: DelayedContact, times: list[float], high: float) -> bool:
+    """Whether a loop is proved up to a stiffness on surfaces of each of these damping times."""
+    return all(loop.on_damped(time).proves(LEAST * high, high) for time in times)
+
+
+def _correction(
+    axes: list[ControlledAxis], ends: list[float], stiffest: float, times: list[float]
+) -> dict[str, Any] | None:
     """Numbers with which all axes are proved up to a stiffness, entered into the file; None if there are none."""
     loops, edits, changed = [], [], []
     for axis, end in zip(axes, ends, strict=True):
@@ -122,34 +176,16 @@ def _correction(axes: list[ControlledAxis], ends: list[float], stiffest: float) 
             changed.append(axis.name)
             edits += own
         loops.append(loop)
-    if not all(loop.proves(LEAST * stiffest, stiffest) for loop in loops):
+    if not all(_proves(loop, times, stiffest) for loop in loops):
         return None
     for place, key, value in edits:
         place[key] = value
-    after = min(loop.first_unstable() for loop in loops)
+    after = min(_edge(loop, times) for loop in loops)
     return {"stiffness": [LEAST * stiffest, stiffest], "exact": [0.0, _finite(after)], "changed": changed}
 
 
 def _finite(value: float) -> float | None:
     return value if value < inf else None
-
-
-def _load(path: Path) -> tuple[Any, Any]:
-    """The file, and the parser that writes it again as it was, comments included."""
-    try:
-        from ruamel.yaml import YAML
-        from ruamel.yaml.error import YAMLError
-    except ImportError:
-        raise InputError("a parameter file needs the extra 'bags': pip install palpate[bags]") from None
-    parser = YAML()
-    parser.width, parser.preserve_quotes = 4096, True
-    try:
-        file = parser.load(read_text(path, "a parameter file"))
-    except (YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
-    if not isinstance(file, dict):
-        raise InputError(f"{path} is no parameter file: it has no names at its top")
-    return file, parser
 
 
 def _nodes(file: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from math import atan, cos, pi, sin
+from math import atan, cos, pi, sin, sqrt
 
 import pytest
 
-from palpate.analysis.delayed_contact import DelayedContact
-from palpate.analysis.others_controllers import certify_controller
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate_certify import DelayedContact, certify_controller
 
 ADMITTANCE = """\
 test_admittance_controller:
@@ -40,7 +39,7 @@ CRISP = "a: {ros__parameters: {task: {k_pos_x: 500.0, d_pos_x: 60.0}}}\n"
 def certify(folder, text, *words, **numbers):
     path = folder / "a.yaml"
     path.write_text(text)
-    return certify_controller(path, *words, **numbers)
+    return certify_controller(path, *words, **numbers)[:2]
 
 
 @pytest.mark.parametrize(("delay", "edge"), [(0.010, 20.5e3), (0.024, 9.1e3), (0.036, 6.3e3)])
@@ -82,6 +81,19 @@ def test_an_impedance_ends_where_its_delayed_torque_pushes_with_the_motion(tmp_p
     told, _ = certify(tmp_path, CRISP.replace("60.0", "1.0"), "crisp", 0.01, 3.0)
     assert told["proved"]["stiffness"] is None  # its damping leads by d/k = 2 ms, less than the delay
     assert told["exact"]["stiffness"] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("time", [0.002, 0.01])
+def test_a_damped_surface_leads_until_its_damping_alone_is_too_much(time):
+    """v = g e and K + B s behind a delay: wT - atan(w time) = pi/2, and never beyond K B = 1/g."""
+    T, g = 0.02, 1e-3
+    loop = DelayedContact(T, (0.0, 1.0), late_surface=(g,)).on_damped(time)
+    w = pi / 2 / T
+    for _ in range(200):
+        w = (pi / 2 + atan(w * time)) / T
+    edge = min(w / g / sqrt(1.0 + (w * time) ** 2), 1.0 / g / time)
+    assert loop.first_unstable() == pytest.approx(edge, rel=1e-6)
+    assert loop.proves(1e-4 * edge, 0.99 * edge)
 
 
 def test_what_is_not_stable_is_not_proved():
@@ -139,3 +151,12 @@ def test_as_a_user_types_it(tmp_path, capsys, monkeypatch):
     assert '"first_unstable"' in capsys.readouterr().out
     assert main(["certify", "a.yaml", "--controller", "ros2-admittance"]) == 2
     assert "--delay" in capsys.readouterr().err
+    assert main([*words, "--damping-time", "0:0.01", "--report", "page.html"]) == 1
+    assert "written: page.html" in capsys.readouterr().out
+    page = (tmp_path / "page.html").read_text()
+    assert (
+        page.index("Unstable from 6306 N/m") < page.index("Where it is stable") < page.index("damping_ratio:")
+    )
+    assert "B/K of 0 to 10 ms, in 9 steps" in page
+    assert main(["certify", "a.yaml", "--report", "other.html"]) == 2
+    assert "--report is of --controller" in capsys.readouterr().err
