@@ -11,8 +11,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _streams
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.errors import InputError
