@@ -11,10 +11,9 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _streams
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import print_lines, say
-from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.common import PluginOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.errors import InputError
 
@@ -86,6 +85,8 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "title": arm.title,
         "normal": list(task.direction),
         "desired_N": task.force,
+        "hold_s": task.hold,
+        "probe": task.probe,
         **({} if tool is None else tool.meta),
     }
 

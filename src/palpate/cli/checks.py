@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, show_table
-from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.written import JsonOption
+from palpate.cli.options.common import JsonOption, PluginOptions
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ import msgspec
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.contact_frame.free_motion import Vector
 from palpate.contact_frame.load import load_payload
 from palpate.contact_frame.signals_in_base import turn_of
 from palpate.contact_frame.tool_payload import Weighed
-from palpate.contact_frame.vectors import Vector
 from palpate.errors import InputError
 from palpate.files import MADE, WRITTEN, as_json, read_text, read_yaml
 from palpate.units import GRAVITY

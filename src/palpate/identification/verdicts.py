@@ -175,15 +175,15 @@ def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] 
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
-    """Of a press at constant speed K is its tangent, unless a model alone knows it; such a motion shows no more."""
+    """Of a press at constant speed K is its tangent, unless a model knows it better; such a motion shows no more."""
     shown = {
         name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
         if p.verdict is Verdict.REJECTED
     }
-    K, tangent = parameters["K"], point.stiffness
-    kept = K.verdict is Verdict.IDENTIFIED and tangent.verdict is not Verdict.IDENTIFIED
-    return parameters | shown | {"K": K if kept else tangent}
+    both = [p for p in (point.stiffness, parameters["K"]) if p.verdict is Verdict.IDENTIFIED]
+    K = min(both, key=lambda p: p.std or np.inf, default=point.stiffness)
+    return parameters | shown | {"K": K}
 
 
 _STEADY = "the log does not show it: the probe moves at constant speed"

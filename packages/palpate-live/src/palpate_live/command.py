@@ -12,10 +12,9 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
+from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Experiment, SerialArm
-from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 

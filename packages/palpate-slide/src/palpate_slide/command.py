@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.common import QUIET, LoopArm, Physics
 from palpate.cli.options.force import with_slide
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
-from palpate.cli.options.values import vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD, fresh_folder, with_author, write_json

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.names import QUIET, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.values import vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

@@ -34,6 +34,7 @@ class AfterTouch(NamedTuple):
         return speed, (1.0, inner)
 
     def stiffness_bound(self, state):
+        """None is known of it."""
         return 0.0
 
 
@@ -51,7 +52,7 @@ class Integral(NamedTuple):
 
 
 @part
-class Impedance(NamedTuple):
+class FixedAdmittance(NamedTuple):
     """M vdot + D v = e: admittance of a mass and a damper (Hogan)."""
 
     mass: float
@@ -168,7 +169,7 @@ class LearnedImpedance(NamedTuple):
 
 
 @part
-class SelfTuning(NamedTuple):
+class DescendingGain(NamedTuple):
     """The gain goes down the squared error within 0 and twice its middle (after Fukuda's indirect scheme)."""
 
     middle: float
@@ -235,13 +236,13 @@ class Ekf(NamedTuple):
 
 
 @law
-def hidden(w, inputs):
+def sigmoid(w, inputs):
     """A neuron with its threshold."""
     return 2.0 / (1.0 + exp(-max(min(w @ inputs, 30.0), -30.0))) - 1.0
 
 
 @part
-class Network(NamedTuple):
+class TaughtNeurons(NamedTuple):
     """Three sigmoid neurons of error, speed and force, taught by back-propagation of the force error.
 
     With `feedback` it adds to a fixed gain (the thesis' scheme), without it is the controller (Yabuta and Yamada).
@@ -262,7 +263,7 @@ class Network(NamedTuple):
         a, b, c, out, sum_, last = state
         error = desired - force
         inputs = Vec3(error / self.scale, force / self.scale, 1.0)
-        h = Vec3(hidden(a, inputs), hidden(b, inputs), hidden(c, inputs))
+        h = Vec3(sigmoid(a, inputs), sigmoid(b, inputs), sigmoid(c, inputs))
         push = self.gain * self.scale * (out @ h)
         delta = self.rate * error / self.scale
         a += (delta * out.x * 0.5 * (1.0 - h.x * h.x)) * inputs
@@ -288,17 +289,17 @@ def rivals(gains: Any, rng: Any) -> dict[str, Any]:
     first = {
         "fixed integral, 7 kN/m": Integral(g),
         "fixed integral, stiffest": Integral(stiff),
-        "impedance": Impedance(mass, damping, tick),
+        "impedance": FixedAdmittance(mass, damping, tick),
         "filtered force derivative": FilteredDerivative(g, theta, 0.01, tick),
         "estimated force rate": EstimatedRate(g, theta, NOMINAL, tick),
         "fuzzy compensation": Fuzzy(g, 0.5 * gains.force, gains.force / theta, tick),
         "feedback-error learning": FeedbackErrorLearning(g, 2.0, tick),
         "learned impedance": LearnedImpedance(mass, damping, 0.5, tick),
-        "self-tuning": SelfTuning(g, 20.0, tick),
+        "self-tuning": DescendingGain(g, 20.0, tick),
         "stability observer": Observer(g, 6.0 * theta, tick),
         "EKF gain scheduling": Ekf(unit, sigma, 1e4, NOMINAL, tick),
-        "network beside a fixed gain": Network(g, 1.0, 0.01, gains.force, draw(), draw(), draw()),
-        "network alone": Network(g, 0.0, 0.01, gains.force, draw(), draw(), draw()),
+        "network beside a fixed gain": TaughtNeurons(g, 1.0, 0.01, gains.force, draw(), draw(), draw()),
+        "network alone": TaughtNeurons(g, 0.0, 0.01, gains.force, draw(), draw(), draw()),
     }
     cautious = gains.cautious()
     own = {
