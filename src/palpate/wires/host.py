@@ -17,7 +17,7 @@ from contextlib import suppress
 from palpate.errors import InputError
 from palpate.plugins import permit, plugin, reason
 from palpate.wires import realtime
-from palpate.wires.protocol import SILENCE, Hosted, LostError, SilentError
+from palpate.wires.protocol import SILENCE, LostError, SilentError, Wire
 
 _WAIT = 0.1
 """Between two looks of the reading thread at whether it is to end [s]."""
@@ -32,7 +32,7 @@ class Host:
         theirs: socket to the loop's process.
     """
 
-    def __init__(self, wire: Hosted, theirs: socket.socket):
+    def __init__(self, wire: Wire, theirs: socket.socket):
         self._wire, self._link = wire, theirs
         self._silence, self._moving = SILENCE, False
 
@@ -136,11 +136,11 @@ def prepare() -> None:
         os.dup2(2, 1)
 
 
-def open_hosted(kind: str, where: str) -> Hosted:
+def open_hosted(kind: str, where: str) -> Wire:
     """The wire of an address, in this process; a kind `module:Class` was permitted in the loop's process."""
     if ":" in kind:
         permit(kind)
-        wire: Hosted = plugin(kind).value()(where)
+        wire: Wire = plugin(kind).value()(where)
         return wire
     if kind == "rtde":
         from palpate.wires.ur import RtdeWire
