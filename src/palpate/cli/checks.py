@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
 
 from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, show_table
@@ -63,10 +64,9 @@ def _checks_of(name: str, code: str) -> dict[str, list[Check]]:
     from palpate.checks.of_plugin import checks_of
     from palpate.plugins import is_plugin, plugin
 
-    if is_plugin(code) and not code.endswith(".toml"):
-        from palpate.wires.conformance import is_wire, wire_checks
-
-        part = plugin(code).value()
-        if isinstance(part, type) and is_wire(part):
-            return {f"wire {name}": wire_checks(lambda: part(name.partition("?")[2]))}
-    return checks_of(name)
+    part: Any = plugin(code).value() if is_plugin(code) and not code.endswith(".toml") else None
+    if not all(hasattr(part, method) for method in ("read", "begin", "write", "stop")):
+        return checks_of(name)
+    for entry in entry_points(group="palpate.checks", name="wire"):
+        return {f"wire {name}": entry.load()(lambda: part(name.partition("?")[2]))}
+    raise InputError("the laws of a wire are those of palpate-rehearsal: pip install palpate[rehearsal]")

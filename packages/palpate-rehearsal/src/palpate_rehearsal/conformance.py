@@ -21,12 +21,6 @@ _STILL = 1e-4
 """Way of an arm that was commanded to rest [m]."""
 _PROMPT = 0.5
 """Within which a read ends that may not wait [s]."""
-_METHODS = ("read", "tare", "begin", "write", "stop", "close")
-
-
-def is_wire(part: Any) -> bool:
-    """Whether a class has the methods of a wire."""
-    return all(callable(getattr(part, name, None)) for name in _METHODS)
 
 
 def wire_checks(make: Callable[[], Any]) -> list[Check]:
