@@ -190,7 +190,11 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
     wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
     missing = wanted - kinds
     if kinds and missing and not output.json:
-        names = {"adapting": "the adapting gain", "held": "the constant gain", "one-sided": "contact lost and found"}
+        names = {
+            "adapting": "the adapting gain",
+            "held": "the constant gain",
+            "one-sided": "contact lost and found",
+        }
         why = "; no proof covers that of a servo" if gains.arm.kind == "servo" else ""
         print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}{why}.")
     return 1 if missing else 0
