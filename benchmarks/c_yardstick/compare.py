@@ -128,7 +128,16 @@ def laid_out(loop: Loop, q) -> tuple[Array, Array]:
     assert len(schedule.wave) == 0
     sequence = loop.sequence
     parts = (
-        (loop.start, plant.arm, plant.friction, alone_surface(plant.surface), plant.side, plant.wall),
+        (
+            loop.start,
+            plant.arm,
+            plant.friction,
+            alone_surface(plant.surface),
+            plant.side,
+            plant.wall,
+            plant.mode,
+            plant.beyond,
+        ),
         loop.encoder,
         loop.force,
         loop.output,
