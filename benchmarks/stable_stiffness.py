@@ -11,9 +11,9 @@ from __future__ import annotations
 import argparse
 from itertools import product
 
-from palpate.analysis import stable_stiffness
 from palpate.bench import load
 from palpate.bench.tables import Experiment, changed
+from palpate_studies.analysis import stable_stiffness
 
 AT, LOW, HIGH = 0.469, 1e3, 3e6  # m, N/m
 DAMPING, GAINS = (60.0, 480.0), ((1.0, 0.003), (0.25, 0.0015))

@@ -108,8 +108,8 @@ def install(fault: Fault, trace) -> None:
     arm = rehearsal.ToolAxisArm
     tick, reading = arm.tick, arm.reading
 
-    def traced(self, speed):
-        tick(self, speed)
+    def traced(self, velocity):
+        tick(self, velocity)
         trace.write(ROW.pack(time.monotonic(), self.command, self.body.x, self.body.force))
         fault.asked = self
         if fault.on and fault.since is None:
@@ -129,7 +129,7 @@ def stamped(module: str, fault: Fault) -> None:
         state = sim.state
         sim.state = lambda number, now, values: state(number, fault.stamp(now), values)
     if module == "rtde_arm":
-        from palpate_rehearsal.rtde_arm import Controller
+        from palpate_rehearsal.rtde_controller import Controller
 
         value = Controller.value
 

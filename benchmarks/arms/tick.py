@@ -28,8 +28,8 @@ from palpate.robots.serial.serial_arm import mjcf, scene_of
 STEPS, WANTED = 1000, 3.0
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")
 HEAD = (
-    "| | own step, touching [us] | `mj_step`, touching [us] | times (90 % of the turns) | `mj_step`, in the air [us] |"
-    " times |"
+    "| | own step, touching [us] | `mj_step`, touching [us] | times (90 % of the turns) | `mj_step`, in free motion"
+    " [us] | times |"
 )
 
 

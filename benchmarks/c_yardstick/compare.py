@@ -23,13 +23,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.analysis.linear_loop import vector
-from palpate.analysis.linear_model import exact
 from palpate.bench import build, load, start_at
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers import alone
 from palpate.environments.surface import alone as alone_surface
+from palpate_studies.analysis.linear_loop import vector
+from palpate_studies.analysis.linear_model import exact
 
 HERE = Path(__file__).parent
 FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -fPIC"

@@ -1,4 +1,4 @@
-"""How often the law takes noise in the air for a contact, and what it makes of it.
+"""How often the law takes noise in free motion for a contact, and what it makes of it.
 
     python benchmarks/force/false_alarms.py [--hours 100] [--arms ur5e fr3] [--seed 0]
 
@@ -16,7 +16,7 @@ from rich.progress import track
 from touches import Rig
 
 from palpate._jit import kernel, law
-from palpate.force.contact_evidence import AIR
+from palpate.force.contact_evidence import FREE_MOTION
 
 PART = 10
 """Length of an approach [s]."""
@@ -26,16 +26,16 @@ FORCE, NOISE = 20.0, 0.1
 @law
 def alarms(control, noise, every, counts):
     """Contacts begun by an edge, by a line, and those with K_u below half of the cap."""
-    state, due, reading, k, before, believed = control.start(), 0.0, 0.0, 0, AIR, 0.0
+    state, due, reading, k, before, believed = control.start(), 0.0, 0.0, 0, FREE_MOTION, 0.0
     for tick in range(int(len(noise) * every) - 1):
         if tick >= due:
             reading, due, k = noise[k], due + every, k + 1
         _, state = control.step(state, FORCE, reading, control.approach * control.tick * tick)
         phase = state.stage.phase
-        if before == AIR and phase != AIR:
-            counts[int(state.known.shown)] += 1.0
+        if before == FREE_MOTION and phase != FREE_MOTION:
+            counts[int(state.estimate.shown)] += 1.0
             believed = 0.0
-        if phase != AIR and believed == 0.0 and state.bound.used < 0.5 * control.cap:
+        if phase != FREE_MOTION and believed == 0.0 and state.bound.used < 0.5 * control.cap:
             counts[2] += 1.0
             believed = 1.0
         before = phase

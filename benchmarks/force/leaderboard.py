@@ -15,8 +15,9 @@ import time
 from pathlib import Path
 
 import numpy as np
-from rivals import rivals
 from touches import Draw, Key, Rig, resumed
+
+from palpate_benchmark.rivals import rivals
 
 SECONDS = 6.0
 OVER = 0.1

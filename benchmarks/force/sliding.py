@@ -23,10 +23,11 @@ from sliding_rivals import RIVALS
 from palpate.force.arm import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate.force.sliding.ground import ground_of
+from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import obeys, slide_terms
-from palpate.force.sliding.slide_world import directions, figures_of, simulate
-from palpate.press.sliding import jointed_arm
+from palpate_slide.ground import ground_of
+from palpate_slide.jointed_arm import jointed_arm
+from palpate_slide.world import figures_of, simulate
 
 SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)

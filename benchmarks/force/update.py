@@ -39,7 +39,7 @@ def main() -> None:
     for name in ("ur5e", "fr3"):
         loop = ForceLoop(Rig(name).gains(20.0, 0.1))
         rng = np.random.default_rng(0)
-        for what, level, slope in (("in the air", 0.0, 0.0), ("learning", 5.0, 2e4)):
+        for what, level, slope in (("in free motion", 0.0, 0.0), ("learning", 5.0, 2e4)):
             positions = (1e-6 * np.arange(TICKS) % 3e-4).tolist()
             forces = (level + slope * np.array(positions) + 0.1 * rng.standard_normal(TICKS)).tolist()
             best, plain = a_call(loop, forces, positions), a_call(Nothing(), forces, positions)

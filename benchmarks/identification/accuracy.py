@@ -15,7 +15,6 @@ import argparse
 import json
 import os
 import sys
-import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -134,14 +133,13 @@ def main() -> None:
     figures = {}
     with ProcessPoolExecutor(asked.workers, mp_context=get_context("spawn")) as pool:
         for name in asked.conditions:
-            begin = time.perf_counter()
             trials = list(pool.map(trial, [CONDITIONS[name]] * len(seeds), seeds, chunksize=4))
-            figures[name] = _show(name, trials, time.perf_counter() - begin)
+            figures[name] = _show(name, trials)
     if asked.json:
         asked.json.write_text(json.dumps(figures, indent=1))
 
 
-def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
+def _show(name: str, trials: list[Trial]) -> dict[str, object]:
     condition = CONDITIONS[name]
     parameters = ["K", "B", *(["M"] if condition.mass == "free" else [])]
     parameters += [] if condition.lag_known else ["lag"]
@@ -158,7 +156,7 @@ def _show(name: str, trials: list[Trial], seconds: float) -> dict[str, object]:
             + (f"  rms {row.error * 1e3:.3f} ms" if row.parameter == "lag" else "")
         )
     confounded = float(np.mean(["lag-damping-confounded" in t.codes for t in trials]))
-    print(f"{'':36}lag-damping-confounded {confounded:.1%}, {seconds:.0f} s")
+    print(f"{'':36}lag-damping-confounded {confounded:.1%}")
     return {"lines": [vars(row) for row in lines], "confounded": confounded}
 
 

@@ -32,7 +32,6 @@ import json
 import math
 import os
 import sys
-import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -338,10 +337,8 @@ def main() -> None:
     figures = {}
     with ProcessPoolExecutor(asked.workers, mp_context=get_context("spawn")) as pool:
         for name in asked.presses:
-            begin = time.perf_counter()
             found = list(pool.map(trials, [CONDITIONS[name]] * len(seeds), seeds, skipped))
             figures[name] = _show(name, found)
-            print(f"{'':44}{time.perf_counter() - begin:.0f} s", flush=True)
     if asked.json:
         asked.json.write_text(json.dumps(figures, indent=1))
 

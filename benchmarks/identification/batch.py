@@ -38,7 +38,7 @@ from palpate.signals.low_pass import LowPass
 RATE = 1000
 MEAN, AMPLITUDE = 15.0, 5.0  # of the force [N]
 LOW, HIGH, PERIOD = 0.5, 40.0, 20.0  # of the sweep [Hz], [s]
-LEAD = 0.5  # in the air and down into the surface [s]
+LEAD = 0.5  # in free motion and down into the surface [s]
 MODEL = "kelvin-voigt-mass"
 
 

@@ -55,7 +55,7 @@ class PoorLog:
         log: time, position, force.
         truth: by parameter.
         low_pass, lag: of the force sensor; the lag of a fresh reading, low-pass included [s].
-        bound: Cramer-Rao bound of the deviation over the truth, by parameter that it lacks; infinite in the air.
+        bound: Cramer-Rao bound of the deviation over the truth, by parameter that it lacks; infinite in free motion.
     """
 
     log: Record

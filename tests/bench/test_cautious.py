@@ -7,7 +7,7 @@ import pytest
 
 from palpate._vector import Mat3, Vec3
 from palpate.bench.build import build
-from palpate.bench.metrics.window import summarise
+from palpate.bench.summary import summarise
 from palpate.bench.tables import changed, load
 from palpate.controllers.cautious_press import without_last_joint
 from palpate.report.run.table import alerts

@@ -75,7 +75,7 @@ def numbers(state):
 
 
 @pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
-@pytest.mark.parametrize("where", ["in the air", "in contact"])
+@pytest.mark.parametrize("where", ["in free motion", "in contact"])
 def test_the_integrator_is_of_first_order(surface, where):
     """Each halving of the step halves the distance to a solution with steps 64 times finer."""
     plant = plant_with(surface)

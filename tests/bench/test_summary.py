@@ -9,7 +9,7 @@ import pytest
 from bench.quick import quick
 from palpate.bench import build, summarise
 from palpate.bench.force_input import COLUMNS
-from palpate.bench.metrics.window import settling_time
+from palpate.bench.summary import settling_time
 from palpate.records import Record
 
 TICKS = 4000

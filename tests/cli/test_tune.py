@@ -329,7 +329,7 @@ def arm_text(root, *change):
         (("delay = 0.01", ""), "no lag to tune for"),
         (("bandwidth = 10 ", "# "), "--loop-from"),
         (("stiffness = 5e4", "# "), "something rigid"),
-        (("noise = 0.1", "# "), "in the air"),
+        (("noise = 0.1", "# "), "in free motion"),
         (("sampling = 480", "sampling = 50"), "faster sensor"),
         (("bandwidth = 10 ", "bandwidth = 1e-5 "), "run the force loop slower"),
         (("rate = 500", "rate = 500\nsurface = 1"), "surface"),

@@ -70,7 +70,7 @@ def log_of(world: World, rng: np.random.Generator, n: int = 4000, **press: Any) 
     """Wrench and pose of a press in that world; the surface's own numbers are those of `pressed`."""
     flat = pressed(n=n - 1000 if world.turns else n, noise=0.0, **press)
     depth, force = flat["position"], flat["force"]
-    if world.turns:  # a second of turning in the air comes first
+    if world.turns:  # a second of turning in free motion comes first
         depth = np.r_[np.full(1000, depth[0]), depth]
         force = np.r_[np.zeros(1000), force]
     time = np.arange(len(depth)) / 1000

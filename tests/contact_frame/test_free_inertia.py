@@ -1,4 +1,4 @@
-"""The mass by which a force follows the acceleration in the air, and what a wrong sign of it takes from an answer."""
+"""The mass by which a force follows the acceleration in free motion, and what a wrong sign takes from an answer."""
 
 from __future__ import annotations
 

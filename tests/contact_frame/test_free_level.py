@@ -1,4 +1,4 @@
-"""A force is flat over the position in the air, and nowhere else."""
+"""A force is flat over the position in free motion, and nowhere else."""
 
 from __future__ import annotations
 

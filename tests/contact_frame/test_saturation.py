@@ -33,7 +33,7 @@ def test_a_tool_that_rests_is_not_at_its_limit():
 
 
 def test_the_air_is_no_limit():
-    """A simulated force is exactly constant in the air."""
+    """A simulated force is exactly constant in free motion."""
     quiet = np.maximum(force(), 2.0)
     assert saturated_rows(quiet, PLACE, ALL).any()
     assert not saturated_rows(quiet, PLACE, quiet[:, 1] > 2.0).any()

@@ -1,4 +1,4 @@
-"""A tool weighed by turning it in the air: right, with intervals that hold, and refused where the poses do not tell."""
+"""A tool weighed by turning it: right, with intervals that hold, and refused where the poses do not tell."""
 
 from __future__ import annotations
 

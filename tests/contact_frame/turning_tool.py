@@ -1,4 +1,4 @@
-"""Logs of a tool on a force sensor that is turned in the air, rests, and is shaken at the end."""
+"""Logs of a tool on a force sensor that is turned in free motion, rests, and is shaken at the end."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def bias_torque(q, qd):
 
 
 def torque(q, qd, qdd):
-    """Joint torques of a motion in the air."""
+    """Joint torques of a motion in free motion."""
     return mass_matrix(q) @ qdd + bias_torque(q, qd)
 
 

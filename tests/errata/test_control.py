@@ -230,7 +230,7 @@ def test_E32_twice_the_friction_of_motor_1():
 
 
 def noise_through_the_filter(seconds, runs):
-    """What the controller sees of a force sensor at rest in the air [N], shape (runs, ticks)."""
+    """What the controller sees of a force sensor at rest in free motion [N], shape (runs, ticks)."""
     from scipy.signal import lfilter
 
     sensor, smooth, ticks = force_sensor(), butterworth2(120.0, 1000.0), round(1000 * seconds)

@@ -229,7 +229,7 @@ def test_contact_lost_and_found_makes_nothing_grow(proof):
         rest = force / K
         x = np.zeros(loop.size)
         p, first = len(loop.rates(1.0, 0.0)[1]), len(loop.rates(1.0, 0.0)[1]) + loop.lines[0] + 1
-        x[0], x[first:] = -rest - 1e-3, -rest - 1e-3  # 1 mm in the air
+        x[0], x[first:] = -rest - 1e-3, -rest - 1e-3  # 1 mm in free motion
         x[2 : first - 1] = -force / loop.force_unit
         if p > 3:
             x[3:p] = 0.0

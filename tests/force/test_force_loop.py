@@ -33,7 +33,7 @@ def press(loop, ticks=1500, K=2e4, start=-2e-4, seed=0):
 
 def test_it_presses_with_the_force_asked_for(loop):
     assert loop.estimate is None
-    assert loop.phase == "air"
+    assert loop.phase == "free motion"
     _, force = press(loop)
     assert force == pytest.approx(20.0, rel=0.02)
     assert loop.phase == "locked"
@@ -62,7 +62,7 @@ def test_readings_gone_for_longer_than_the_lag_start_it_anew(loop):
     for _ in range(100):
         loop.update(math.nan, math.nan)
     loop.update(0.01, 0.0)
-    assert loop.phase == "air"
+    assert loop.phase == "free motion"
     assert loop.state[BOUND] == loop.gains.seen_cap
     assert loop.noise == noise
 
@@ -72,7 +72,7 @@ def test_missed_ticks(loop):
     loop.update(19.9, 1e-3, 2)
     assert "missed" in loop.trouble
     loop.update(0.02, 1e-3, 1000)
-    assert loop.phase == "air"
+    assert loop.phase == "free motion"
 
 
 def test_a_stale_force_holds_the_tip(loop):
@@ -110,7 +110,7 @@ def test_a_lost_contact_is_approached_anew(loop):
     press(loop, 1500)
     rng = np.random.default_rng(5)
     speeds = [loop.update(0.1 * float(rng.normal()), 1e-3) for _ in range(200)]
-    assert loop.phase == "air"
+    assert loop.phase == "free motion"
     assert max(speeds[-50:]) <= loop.gains.approach
 
 

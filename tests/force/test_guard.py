@@ -7,7 +7,7 @@ import pytest
 
 from force.gained import gains_of
 from palpate.force import ForceLoop
-from palpate.force.contact_evidence import AIR
+from palpate.force.contact_evidence import FREE_MOTION
 from palpate.force.flat import state_in
 from palpate.force.guard import BEYOND, BLIND, BOUNCED, DRIFTS, SWINGS, TROUBLES, UNTARED, Guarded
 from palpate.force.simulated_press import pressed, surface, world_of
@@ -105,7 +105,7 @@ def test_a_bias_that_does_not_follow_the_tip_is_taken_out_and_a_drift_is_said():
     assert loop.bias == pytest.approx(0.6 + 0.05 * t, abs=0.15)
     assert loop.drift == pytest.approx(0.05, abs=0.03)
     assert TROUBLES[DRIFTS] in said
-    assert loop.phase == "air"
+    assert loop.phase == "free motion"
 
 
 def test_an_offset_beyond_the_bias_holds_the_tip():
@@ -196,7 +196,7 @@ def test_bounces_that_do_not_end_stop_the_tip():
     for k in range(2000):
         force = 60.0 if k % 100 < 20 and k > 100 else 0.0
         x += gains.arm.tick * loop.update(force + 0.1 * rng.standard_normal(), x)
-    assert state_in(np.array(loop.state)).stage.phase == AIR
+    assert state_in(np.array(loop.state)).stage.phase == FREE_MOTION
     assert loop.trouble == TROUBLES[BOUNCED]
     loop.reset()
     assert loop.update(0.0, x) == pytest.approx(gains.approach)

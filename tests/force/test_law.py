@@ -11,7 +11,7 @@ from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
 from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_through, without_offset
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.stage import LOCKED, Stage
-from palpate.force.stiffness_bound import Bound, bounded
+from palpate.force.stiffness_bound import Bound, next_bound
 from palpate.force.touching import touch
 
 
@@ -112,7 +112,7 @@ def test_evidence_of_a_contact_is_rare_in_the_air_whatever_the_noise():
 
 
 def test_a_rise_as_slow_as_noise_is_found_before_the_force_asked_for():
-    # 0.45 N in a second: the mean in the air follows it, and what it does not follow counts as noise.
+    # 0.45 N in a second: the mean in free motion follows it, and what it does not follow counts as noise.
     gains = gains_of("ur5e", noise=0.15)
     slow = gains.cautious()._replace(approach=0.0015)
     rows = pressed(world_of(gains.arm, noise=0.15), surface(300.0), slow, 1e-3, np.full(6000, 20.0), 1)
@@ -149,7 +149,7 @@ def test_a_step_after_it_was_locked_is_followed():
 
 def evident(law, stiffness, std):
     """What the last theta alone shows: a stiffness with its standard deviation, in caps, and no damping."""
-    start = law.start().known
+    start = law.start().estimate
     N = Mat3(Vec3(1.0 / std**2, 0.0, 0.0), Vec3(0.0, 1e12, 0.0), Vec3(0.0, 0.0, 1e12))
     return start._replace(fast=Fit(N, Vec3(stiffness / std**2, 0.0, 0.0)), since=1e3)
 
@@ -160,14 +160,14 @@ def test_a_rise_on_suspicion_is_taken_back_and_one_on_evidence_stays():
     start = law.start()
     watch, follow = start.watch, start.follow
     held = Bound(known, known, law.cap, 0.0, 1e3, start.bound.sure)
-    suspected = bounded(law, held, locked, evident(law, 0.05, 0.01), watch, follow)  # by 3.7 deviations
+    suspected = next_bound(law, held, locked, evident(law, 0.05, 0.01), watch, follow)  # by 3.7 deviations
     assert suspected.used > 0.05 * law.cap
     assert suspected.held == known
     later = suspected
     for _ in range(round(3.0 * law.theta / law.tick) + 1):
-        later = bounded(law, later, locked, evident(law, 0.01, 0.01), watch, follow)
+        later = next_bound(law, later, locked, evident(law, 0.01, 0.01), watch, follow)
     assert later.used == later.held == known
-    shown = bounded(law, held, locked, evident(law, 0.05, 0.005), watch, follow)  # by 7.4
+    shown = next_bound(law, held, locked, evident(law, 0.05, 0.005), watch, follow)  # by 7.4
     assert shown.used == shown.held > 0.05 * law.cap
 
 
@@ -193,10 +193,10 @@ def test_the_fit_is_least_squares_with_its_prior():
     force = phi @ [0.4, 0.1, 2.0] + 0.01 * rng.normal(size=200)
     fit = fit_through(0.0, 1.0, 10.0)
     for row, f in zip(phi, force, strict=True):
-        fit = fit.taking(Vec3(*row), f, 1e4, 1.0)
+        fit = fit.with_reading(Vec3(*row), f, 1e4, 1.0)
     N = 1e4 * phi.T @ phi + np.array(PRIOR) + np.diag([0.0, 0.0, 0.01])
     r = 1e4 * phi.T @ force + np.array([0.0, 0.0, 0.01])
-    np.testing.assert_allclose(fit.solved(), np.linalg.solve(N, r), rtol=1e-9)
+    np.testing.assert_allclose(fit.solution(), np.linalg.solve(N, r), rtol=1e-9)
     assert fit.std(AXIS_K) == pytest.approx(np.sqrt(np.linalg.inv(N)[0, 0]))
 
 
@@ -205,19 +205,21 @@ def test_dropping_the_offset_keeps_what_is_known_of_the_slopes():
     fit = fit_through(0.0, 0.0, 100.0)
     for _ in range(50):
         phi = rng.normal(size=3)
-        fit = fit.taking(Vec3(*phi), float(phi @ [0.5, 0.2, 3.0]), 1e6, 1.0)
+        fit = fit.with_reading(Vec3(*phi), float(phi @ [0.5, 0.2, 3.0]), 1e6, 1.0)
     kept = without_offset(fit, 1.0)
     assert kept.std(AXIS_K) == pytest.approx(fit.std(AXIS_K), rel=1e-3)  # the prior is added once more
-    assert kept.solved().x == pytest.approx(0.5, rel=1e-4)
+    assert kept.solution().x == pytest.approx(0.5, rel=1e-4)
     assert without_offset(fit, 0.25).std(AXIS_K) == pytest.approx(2.0 * fit.std(AXIS_K), rel=1e-3)
 
 
 def test_no_information_is_no_certainty():
     even = Fit(PRIOR, Vec3(0.0, 0.0, 0.0))
     for _ in range(20_000):
-        even = even.taking(Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999)  # the tip moves evenly in the air
+        even = even.with_reading(
+            Vec3(0.0, 8.0, 1.0), 0.3, 100.0, 0.999
+        )  # the tip moves evenly in free motion
     assert even.std(Vec3(1.0, 0.0, 0.0)) > 0.9
-    assert np.isfinite(list(even.solved())).all()
+    assert np.isfinite(list(even.solution())).all()
 
 
 @pytest.mark.parametrize("name", ["ur5e", "fr3"])

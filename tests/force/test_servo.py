@@ -17,7 +17,7 @@ from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.guard import Guarded
 from palpate.force.inner_loop import identify_inner_loop
-from palpate.force.law import leading
+from palpate.force.law import lead_speed
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
@@ -56,7 +56,7 @@ def test_the_matrix_and_the_law_have_the_same_lead(gains):
     z = np.random.default_rng(1).normal(size=loop.size) * 1e-3
     pace, command = loop.state.index("u"), loop.state.index("c0")
     speed = -1e-4 * loop.force_unit * z[pace - 1]
-    sent, after = leading(numbers, z[pace], speed, K, np.inf)
+    sent, after = lead_speed(numbers, z[pace], speed, K, np.inf)
     assert (Phi @ z)[command] == pytest.approx(z[command] + gains.arm.tick * sent, rel=1e-9)
     assert (Phi @ z)[pace] == pytest.approx(after, rel=1e-9)
 
@@ -161,7 +161,7 @@ def test_wrong_numbers_keep_the_approach_and_end_in_a_press(gains, theta, lag):
 
 
 def test_other_arms_have_no_lead(gains):
-    assert leading(gains.cautious()._replace(lead=0.0), 0.3, 0.1, 1e3, 0.05) == (0.1, 0.1)
+    assert lead_speed(gains.cautious()._replace(lead=0.0), 0.3, 0.1, 1e3, 0.05) == (0.1, 0.1)
 
 
 def test_it_is_read_from_a_file(gains):

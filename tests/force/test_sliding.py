@@ -16,11 +16,12 @@ from palpate.force import Gains, SlidingLoop, load_arm, load_gains
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_state as places
-from palpate.force.sliding.ground import ground_of
+from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from, stiffness_in
-from palpate.force.sliding.slide_world import directions, figures_of, simulate
 from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Observation, begin, correct, predict
+from palpate_slide.ground import ground_of
+from palpate_slide.world import figures_of, simulate
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "force"))
 from sliding_rivals import RIVALS

@@ -82,3 +82,39 @@ def test_a_lag_that_is_calibrated_narrows_the_damping():
     assert calibrated.budget.get("lag", 0.0) == 0.0
     assert open_.budget["lag"] > 0
     assert calibrated.ci95[0] < 100 < calibrated.ci95[1]
+
+
+def shaken(lag, seed=0, stiffness=5200.0, damping=20.0):
+    """Ten seconds of six tones about a depth, never in free motion; noise of .02 N and 100 nm."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(10_000) / 1000
+    tones = 2 * np.pi * np.geomspace(0.3, 12, 6)
+    phases = rng.uniform(0, 2 * np.pi, 6)
+    turned = phases + tones * (time[:, None] - lag)
+    depth = 1.5e-3 + 2e-4 * np.sin(turned).sum(axis=1)
+    force = stiffness * depth + damping * 2e-4 * (np.cos(turned) @ tones)
+    position = 1.5e-3 + 2e-4 * np.sin(phases + tones * time[:, None]).sum(axis=1)
+    return record(time, position + 1e-7 * rng.normal(size=10_000), force + 0.02 * rng.normal(size=10_000))
+
+
+@pytest.mark.parametrize("lag", [0.0, 4e-3])
+def test_noise_of_the_position_does_not_tell_a_lag_from_a_damping(lag):
+    """Both have one column: K is as sharp as if the lag were known, and B as wide as the lag's prior."""
+    found = identify(shaken(lag))
+    low, high = found.K.ci95
+    assert low < 5200 < high
+    assert high - low < 0.005 * 5200
+    low, high = found.B.ci95
+    assert low < 20 < high
+    assert high - low < 1.25 * 2 * 1.96 * found.lag.std * 5200
+
+
+def test_what_only_noise_tells_apart_the_prior_bounds():
+    """One tone tells K - omega^2 M alone; the acceleration's noise told them apart, and K had no bound at all."""
+    time = np.arange(6000) / 1000
+    depth = 1e-3 + 6e-4 * np.sin(2 * np.pi * 2 * time)
+    noise = np.random.default_rng(1).normal(size=(2, 6000))
+    found = identify(record(time, depth + 3e-6 * noise[0], 2000 * depth + 0.05 * noise[1]), lag=0.0)
+    low, high = found.K.ci95
+    assert low < 2000 < high
+    assert high - low < 2000

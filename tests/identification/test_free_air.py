@@ -1,4 +1,4 @@
-"""Where the probe is in the air is found by position; a force that moves there is taken out."""
+"""Where the probe is in free motion is found by position; a force that moves there is taken out."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_a_force_that_drifts_in_the_air_is_level_again():
 
 @pytest.mark.long
 def test_many_presses_are_as_many_contacts():
-    """In contact for more than half of the time, and in the air for half a second at a time."""
+    """In contact for more than half of the time, and in free motion for half a second at a time."""
     t = np.arange(int(60 * 1.6 * 125)) / 125
     x = np.interp(t % 1.6, [0, 0.2, 0.45, 1.15, 1.4, 1.6], [-1e-3, -1e-3, 3e-3, 3e-3, -1e-3, -1e-3])
     force = force_of(x, lambda d, v: 2000 * d + 8 * v, 1 / 125)

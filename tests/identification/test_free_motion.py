@@ -1,4 +1,4 @@
-"""A log in which nothing is touched says so, whatever the sensor shows in the air; and gives no number."""
+"""A log in which nothing is touched says so, whatever the sensor shows in free motion; and gives no number."""
 
 from __future__ import annotations
 

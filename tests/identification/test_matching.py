@@ -127,7 +127,7 @@ def test_least_squares_are_as_sure_as_the_bound():
     bound = 0.6 * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     # The level of the noise is known to 2 % from 1200 samples, its colour adds some.
     for name, own in zip(("K", "B", "M"), bound, strict=False):
-        assert fitted.std(name, lag_known=True) == pytest.approx(own, rel=0.15)
+        assert fitted.std(name) == pytest.approx(own, rel=0.15)
         assert abs(fitted[name] - TRUTH[name]) < 4 * own
 
 

@@ -1,4 +1,4 @@
-"""A mass that the force shows in the air is named and taken out, whichever way it was compensated."""
+"""A mass that the force shows in free motion is named and taken out, whichever way it was compensated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RNG = np.random.default_rng
 
 
 def shaken(payload: float, seed: int = 0):
-    """Sines in the air and into the surface; the force has the inertia of what moves beyond the sensor."""
+    """Sines in free motion and into the surface; the force has the inertia of what moves beyond the sensor."""
     lines = np.array([0.7, 1.9, 3.1])
     omega, phase = 2 * np.pi * lines[:, None], np.array([0.0, 1.0, 2.0])[:, None]
     waves = 3e-3 * np.sin(omega * TIME + phase) * np.array([1.0, 0.5, 0.3])[:, None]

@@ -12,7 +12,7 @@ TIME = np.arange(120 * 20) / 20
 
 
 def ramps(t):
-    """Ten millimetres in and out in sixteen seconds, from a millimetre in the air."""
+    """Ten millimetres in and out in sixteen seconds, from a millimetre in free motion."""
     return np.interp(t % 24, [0, 4, 12, 20, 24], [-1e-3, -1e-3, 9e-3, -1e-3, -1e-3])
 
 

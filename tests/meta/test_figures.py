@@ -14,10 +14,7 @@ FIGURES = figures.figures()
 PAGES = sorted(path.relative_to(ROOT).as_posix() for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")])
 OWN_MARKS = {"docs/laboratory.md", "docs/reliability.md"}
 """Pages of campaigns that put their own result there, with its day: no digest tells when an attack is of the past."""
-UNMARKED = {
-    "docs/force.md": 7,
-    "docs/identify.md": 2,
-}
+UNMARKED: dict[str, int] = {}
 """Tables with measured numbers outside of marks, by page: copied by hand from what a command printed. They may only
 become fewer."""
 
@@ -38,6 +35,41 @@ def test_a_figure_is_of_today_s_sources(name):
     assert figures.body_of(figure).strip(), f"{name} has never been made"
     assert figures.kept(figure), f"the small run of {name} has never been kept"
     assert figures.is_fresh(figure), f"its sources have changed: python benchmarks/figures.py --only {name}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_number_of_a_sentence_is_in_the_figure_that_the_sentence_is_from(page):
+    """A paragraph under `<!-- from NAME ... -->` has no number but of those figures or of their commands."""
+    for names, paragraph in re.findall(
+        r"<!-- from ([\w -]+?) -->\n(.+?)(?:\n\n|\Z)", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL
+    ):
+        known = " ".join(
+            re.sub(r"sources \w+, [\d-]+", "", figures.body_of(FIGURES[name])) for name in names.split()
+        )
+        strange = [text for text in numbers(paragraph) if not stands_in(text, known)]
+        assert not strange, f"{page}: {', '.join(strange)} is not in {names}: {paragraph[:60]}"
+
+
+def numbers(paragraph):
+    """Numbers of a sentence, without code, the targets of links, powers and names such as p95."""
+    text = re.sub(r"`[^`]*`|\]\([^)]*\)", " ", paragraph)
+    return [
+        found.replace(" ", "")
+        for found in re.findall(r"(?<![\w.^*-])\d+(?: \d{3})*(?:\.\d+)?(?![\w.]*[a-z]\w*\d)", text)
+    ]
+
+
+def stands_in(text, known):
+    """Whether a number, rounded as it is written, is among those of a text."""
+    digits = len(text.partition(".")[2])
+    return any(f"{float(own):.{digits}f}" == text for own in re.findall(r"\d+(?:\.\d+)?", known))
+
+
+def test_a_sentence_with_a_number_that_its_figure_has_not_is_found():
+    sentence = "Of 1 000 presses p95 is 0.23 s, 5.3 % over ([`f 9`](page.md#a-7)), on the UR5e and p^1.5."
+    assert numbers(sentence) == ["1000", "0.23", "5.3"]
+    known = "presses 1000  0.228  over 5.2 %"
+    assert [stands_in(text, known) for text in numbers(sentence)] == [True, True, False]
 
 
 @pytest.mark.parametrize("page", PAGES)

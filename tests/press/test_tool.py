@@ -34,7 +34,7 @@ def pressing(tool=TOOL, **changes):
 
 
 def simulated(tool, physics="own", arm="ur5e", **changes):
-    """An arm in the air whose sensor has no noise."""
+    """An arm in free motion whose sensor has no noise."""
     asked = pressing(tool, arm=arm, physics=physics, **changes).asked
     cell = cell_of(asked.arm, asked.place, asked.surface, asked.gains.arm, held_tool(tool))
     cell = cell._replace(place=cell.place + 1.0, sensor=cell.sensor._replace(noise=0.0))

@@ -11,7 +11,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import Limits, LostError, Rows, Sense, Task, checked, press
-from palpate_rehearsal.rehearsal import ToolAxisArm
+from palpate_rehearsal.rehearsal import REST, ToolAxisArm
 from wires.slow_cell import cell
 
 
@@ -28,10 +28,10 @@ class FakeWire:
 
     def __init__(self, arm, lie=lambda sense, first: sense, since=math.inf):
         self.arm, self.lie, self.since, self.first = arm, lie, since, None
-        self.speed, self.did, self.sent = 0.0, [], []
+        self.velocity, self.did, self.sent = REST, [], []
 
     def read(self, timeout):
-        self.arm.tick(self.speed)
+        self.arm.tick(self.velocity)
         v = self.arm.reading()
         sense = Sense(1000.0 + self.arm.time, self.arm.time, v[0:3], v[3:6], v[6:9], v[9:13])
         if self.arm.time < self.since:
@@ -46,11 +46,11 @@ class FakeWire:
         self.did.append("begin")
 
     def write(self, command):
-        self.speed = -command.velocity[2]
+        self.velocity = command.velocity
         self.sent.append(command)
 
     def stop(self):
-        self.speed = 0.0
+        self.velocity = REST
         self.did.append("stop")
 
 

@@ -41,14 +41,6 @@ def folder(tmp_path_factory):
     return made
 
 
-class SlidingWire(FakeWire):
-    """The same arm, which is moved along the surface too."""
-
-    def write(self, command):
-        super().write(command)
-        self.arm.aside = command.velocity[:2]
-
-
 def order_of(folder, path=PATH, **limits):
     numbers = {"force": 25.0, "speed": 0.05, "travel": 0.03, "seconds": 30.0, **limits}
     task = Task(10.0, (0.0, 0.0, -1.0), 6.0, 0.001, path=path)
@@ -57,7 +49,7 @@ def order_of(folder, path=PATH, **limits):
 
 def sliding(folder, lie=lambda sense, first: sense, since=4.0):
     tip = ToolAxisArm(load_arm(str(folder / "arm.toml")), surface(4000.0, 20.0), 0.002, (1.0, -0.5, 2.0), 0)
-    wire, order = SlidingWire(tip, lie, since), order_of(folder)
+    wire, order = FakeWire(tip, lie, since), order_of(folder)
     rows = Rows(None, order.most, {})
     outcome = press(wire, order, rows, lambda: None)
     assert wire.did[-1] == "stop"

@@ -122,7 +122,7 @@ def kelvin_voigt(k: float, b: float, **elements: float) -> Surface:
 
 
 def sine(base: float, size: float, frequency: float, start: float = 1.0, air: float = -1e-3) -> Shape:
-    """Rest in the air, a second of approach to a base depth, then a sine about it."""
+    """Rest in free motion, a second of approach to a base depth, then a sine about it."""
 
     def shape(t: Array) -> Array:
         ramp = np.interp(t, [0, start, start + 1], [air, air, base])
@@ -140,7 +140,7 @@ def trapezoids(top: float, rise: float, hold: float, free: float, bottom: float 
 
 
 def broadband(base: float, size: float, highest: float = 12.0, start: float = 1.0) -> Shape:
-    """Rest in the air, approach, then sines up to a frequency."""
+    """Rest in free motion, approach, then sines up to a frequency."""
     lines = np.geomspace(0.4, highest, 7)
 
     def shape(t: Array) -> Array:
@@ -253,7 +253,7 @@ def cut_from_motion(data: Path | None) -> Iterator[Trial]:
 
 
 def inertia_of_a_tool(data: Path | None) -> Iterator[Trial]:
-    """The inertia of a tool turns the force negative in the air."""
+    """The inertia of a tool turns the force negative in free motion."""
     for seed, payload in enumerate((0.5, 1.0, 2.0)):
         shape = lambda t: 6e-3 * np.sin(2 * np.pi * 2.0 * t) - 2e-3  # noqa: E731 - a shape in one line
         recording = Recording(500.0, 0.02, payload=payload, position_noise=2e-6)
@@ -448,7 +448,7 @@ CASES = (
     Case("6", "step made while in contact", step_in_contact),
     Case("7a", "never leaves a curved surface", never_leaves),
     Case("7b", "cut out of the motion of a relaxing surface", cut_from_motion),
-    Case("7c", "a tool's inertia in the air", inertia_of_a_tool),
+    Case("7c", "a tool's inertia in free motion", inertia_of_a_tool),
     Case("8", "no mass behind a force filter", no_mass_behind_a_filter),
     Case("9a", "held force", held_force),
     Case("9b", "held force at constant speed", held_at_constant_speed),

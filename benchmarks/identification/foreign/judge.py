@@ -8,8 +8,9 @@ A cell is a surface, a nuisance and a motion (any: drawn). "id hold wrong": how 
 the share of their 95 % intervals that hold the truth, how many are confidently wrong (more than 25 % off, or more than
 three half-widths and 2 %). "apparent" is what a linear model says of a surface that has no such number: it holds if the
 interval meets the range of what the surface does over the depths touched. "K known" is how often K is identified of the
-logs in which an estimator that knows model, lag, low-pass and noise has it to 5 %. "width" is the median half-width of
-K over that bound, "lag" the lags invented where there is none, "none" logs without a contact found or refused.
+logs in which an estimator that knows model, lag, low-pass and noise has it to 5 %, "sharp" how often to three times
+that bound or 1 %. "width" is the median half-width of K over that bound, "lag" the lags invented where there is none,
+"none" logs without a contact found or refused.
 """
 
 from __future__ import annotations

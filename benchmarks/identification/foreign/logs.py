@@ -46,7 +46,7 @@ class Plan:
         told: what `identify` is told.
         largest: force that a depth of one stands for [N].
         starts: air, rest or midst.
-        leaves: whether the log goes on until the probe is in the air again.
+        leaves: whether the log goes on until the probe is in free motion again.
         moving: how far the surface's height wanders, over the depth.
         repeats: by how much the force of one stretch differs from the next's, relative.
     """

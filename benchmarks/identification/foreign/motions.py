@@ -1,6 +1,6 @@
 """How the probe is moved: a command in depths, followed by a robot of its own bandwidth.
 
-A course is rest in the air, approach to a base depth, rest there, the motion itself, rest, retreat and rest in the air.
+A course is rest in free motion, approach to a base depth, rest there, the motion itself, rest, retreat and again rest.
 Depths are in units of the depth that the largest force belongs to.
 """
 

@@ -49,6 +49,11 @@ class Answer:
     wrong: bool
     bound: float | None
 
+    @property
+    def half(self) -> float:
+        """Half of the interval's width."""
+        return (self.high - self.low) / 2
+
 
 @dataclass(frozen=True)
 class Score:

@@ -228,7 +228,7 @@ def press(
     Args:
         surface: what is pressed on.
         wanted: force asked for [N], shape (n,).
-        start: where the probe begins [m], below 0 in the air.
+        start: where the probe begins [m], below 0 in free motion.
         gain: speed that one newton of missing force asks for [m/s/N].
         dt: step [s].
 

@@ -33,6 +33,7 @@ def row(name: str, scores: list[Score]) -> dict[str, Any]:
     figures[WORKING_POINT] = counts([a for a in answers if a.name == WORKING_POINT])
     figures["K known"] = len(known)
     figures["K known and given"] = sum(any(a.name == "K" for a in s.answers) for s in known)
+    figures["K sharp"] = sum(any(_sharp(a) for a in s.answers) for s in known)
     figures["lag given"] = sum(s.lag_given for s in scores)
     figures["lag false"] = sum(s.lag_false for s in scores)
     figures["lag invented"] = sum(s.lag_invented for s in scores)
@@ -46,10 +47,18 @@ def row(name: str, scores: list[Score]) -> dict[str, Any]:
     return figures
 
 
+_SHARP, _FINE = 3.0, 0.01
+
+
+def _sharp(a: Answer) -> bool:
+    """Whether K is as narrow as this many times the knowing estimator's interval, or to this share of its value."""
+    return a.name == "K" and a.bound is not None and a.half <= max(_SHARP * a.bound, _FINE * abs(a.value))
+
+
 def counts(answers: list[Answer]) -> dict[str, Any]:
     """How many answers, how many hold, are wrong, hold if the model does, and their width over the bound."""
     by_model = [a.holds_model for a in answers if a.holds_model is not None]
-    widths = [(a.high - a.low) / 2 / a.bound for a in answers if a.bound]
+    widths = [a.half / a.bound for a in answers if a.bound]
     return {
         "answers": len(answers),
         "hold": sum(a.holds for a in answers),
@@ -78,8 +87,8 @@ def tables(scores: list[Score]) -> dict[str, list[dict[str, Any]]]:
 
 HEAD = (
     f"{'':28}{'logs':>5} {'K id hold wrong':>17} {'B id hold wrong':>17} {'M id hold wrong':>17} "
-    f"{'all id hold wrong':>19} {'apparent':>15} {'working point':>17} {'K known':>9} {'width':>6} {'lag':>5} "
-    f"{'none':>5} {'err':>4} {'s':>6}"
+    f"{'all id hold wrong':>19} {'apparent':>15} {'working point':>17} {'K known':>9} {'sharp':>6} {'width':>6} "
+    f"{'lag':>5} {'none':>5} {'err':>4} {'s':>6}"
 )
 
 
@@ -87,12 +96,14 @@ def line(figures: dict[str, Any]) -> str:
     """One row of a table, in plain text."""
     known = figures["K known"]
     given = f"{figures['K known and given'] / known:.0%}" if known else "-"
+    sharp = f"{figures['K sharp'] / known:.0%}" if known else "-"
     width = figures["K"]["width"]
     seconds = figures["seconds"]
     return (
         f"{figures['name']:28.28}{figures['logs']:5} {_three(figures['K']):>17} {_three(figures['B']):>17} "
         f"{_three(figures['M']):>17} {_three(figures['all']):>19} {_three(figures['apparent']):>15} "
-        f"{_three(figures['working point']):>17} {given + f' of {known}':>9} {_short(width):>6} "
+        f"{_three(figures['working point']):>17} {given + f' of {known}':>9} {sharp:>6} "
+        f"{_short(width):>6} "
         f"{figures['lag invented']:>5} {figures['no contact'] + figures['refused']:5} {figures['crashed']:4} "
         f"{_short(seconds):>6}{'  < 88 %' if figures['flag'] else ''}"
     )
@@ -138,6 +149,11 @@ def summary(scores: list[Score]) -> list[str]:
         _share(
             "K given where a knowing estimator has it to 5 %", total["K known and given"], total["K known"]
         ),
+        _share("K sharp where a knowing estimator has it to 5 %", total["K sharp"], total["K known"]),
+        *(
+            f"{f'{n}: half-width over a knowing estimator, median':55}{_short(total[n]['width']):>6}"
+            for n in NAMES
+        ),
         _share("ci95_if_model_holds holds", every["hold by model"], every["by model"]),
         _share("lags false by their own bound, of those given", total["lag false"], total["lag given"]),
         f"{'lags invented where there is none':55}{total['lag invented']:6}",
@@ -177,8 +193,8 @@ def markdown(scores: list[Score]) -> str:
 def _markdown(name: str, rows: list[dict[str, Any]]) -> str:
     columns = ("K", "B", "M", "all", "apparent", WORKING_POINT)
     lines = [
-        f"| {name} | logs | {' | '.join(columns)} | K known and given | lags invented |",
-        "|---" * 10 + "|",
+        f"| {name} | logs | {' | '.join(columns)} | K known and given | K sharp | K width | lags invented |",
+        "|---" * 12 + "|",
     ]
     for figures in rows:
         known = figures["K known"]
@@ -187,6 +203,8 @@ def _markdown(name: str, rows: list[dict[str, Any]]) -> str:
             str(figures["logs"]),
             *(_three(figures[c]) for c in columns),
             given,
+            f"{figures['K sharp']} of {known}" if known else "-",
+            _short(figures["K"]["width"]),
             str(figures["lag invented"]),
         ]
         lines.append(f"| {figures['name']} | {' | '.join(cells)} |")

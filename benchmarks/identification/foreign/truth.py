@@ -111,10 +111,11 @@ ABOUT = 0.05
 
 
 def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) -> Range | None:
-    """Lowest and highest slope of force over depth on the ways in [N/m]: about a force, or from 40 to 95 % of theirs.
+    """Lowest and highest slope of force over depth of the loadings [N/m]: about a force, or from 40 to 95 % of theirs.
 
-    A way in is a contact's first advance to its peak force. Two slopes are as true as each other: of the force as it
-    was, and of the force without what is no spring (damper, mass, friction), on the same way.
+    A loading is a contact's first advance to its peak force; a log without one has the slope of its unloading. Two
+    slopes are as true as each other: of the force as it was, and of the force without what is no spring (damper, mass,
+    friction), on the same way.
     """
     short, low, high = dense.thinned(1000.0), 0.4, 0.95
     if force is not None:
@@ -124,17 +125,32 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
     slow = surface.scaled(B=0.0, D=0.0, M=0.0, Fc=0.0)
     calm = touch(slow, short.depth, v, np.gradient(v, short.dt), short.dt).force
     edges = np.flatnonzero(np.diff(np.concatenate([[0], short.contact.view(np.int8), [0]])))
-    slopes = [_slope_in(short, force, edges, low, high) for force in (short.force, calm)]
-    told = [slope for slope in slopes if slope is not None]
+    forces = short.force, calm
+    told = [s for force in forces if (s := _slope_in(short.depth, force, edges, low, high)) is not None]
+    if not told:
+        back = len(short.depth) - edges[::-1]
+        told = [
+            s for f in forces if (s := _slope_in(short.depth[::-1], f[::-1], back, low, high)) is not None
+        ]
     return (min(told), max(told)) if told else None
 
 
-def _slope_in(dense: Dense, force: Array, edges: NDArray[np.intp], low: float, high: float) -> float | None:
-    """Of one force over the depth, a level for each way in that goes half as deep as the deepest."""
+def _slope_in(depth: Array, force: Array, edges: NDArray[np.intp], low: float, high: float) -> float | None:
+    """Of one force over the depth, a level for each loading that goes half as deep as the deepest.
+
+    Args:
+        depth: shape (n,) [m].
+        force: shape (n,) [N].
+        edges: first row, and past the last, of one contact after the other, shape (2 c,).
+        low: share of a loading's largest force at which it begins.
+        high: the same of its end.
+    """
     xx = xf = 0.0
-    deepest = float(np.ptp(dense.depth[dense.contact])) if dense.contact.any() else 0.0
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        x, f = dense.depth[begin:end], force[begin:end]
+    spans = list(zip(edges[::2], edges[1::2], strict=True))
+    inside = np.concatenate([depth[a:b] for a, b in spans]) if spans else np.zeros(1)
+    deepest = float(np.ptp(inside))
+    for begin, end in spans:
+        x, f = depth[begin:end], force[begin:end]
         if np.ptp(x) < 0.5 * deepest:
             continue
         top = int(np.argmax(f >= high * f.max())) + 1

@@ -7,9 +7,9 @@ import pytest
 
 from palpate.bench import changed
 from palpate.bench.force_input import COLUMNS, CONTACT, LOST
-from palpate.bench.metrics.following import LIMIT
-from palpate.bench.metrics.window import SETTLE
 from palpate.records import Record
+from palpate_studies.metrics.following import LIMIT
+from palpate_studies.metrics.window import SETTLE
 from palpate_thesis.conditions import move_wall, rougher, stops_holding
 from palpate_thesis.explanations import e2_integrator, e3_divergence
 from palpate_thesis.figure import study

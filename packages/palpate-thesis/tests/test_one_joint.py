@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from palpate.controllers.direct_neural import DirectIntegral, direct_neural
 from palpate.environments import KelvinVoigt, join
 from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.references import ForceSchedule
+from palpate_thesis.direct_neural import DirectIntegral, direct_neural
 from palpate_thesis.one_joint import COLUMNS, JOINT_FRICTION, Joint, Link, one_joint
 
 FOAM, RUBBER = KelvinVoigt(5200, 200, 0.10), KelvinVoigt(34500, 480, 0.05)

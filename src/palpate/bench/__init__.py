@@ -11,8 +11,8 @@ from palpate._vector import Vec3
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
 from palpate.bench.given_motion import GivenMotion, given_motion
-from palpate.bench.metrics.window import summarise
 from palpate.bench.plant import Loop, march, start_at
+from palpate.bench.summary import summarise
 from palpate.bench.tables import Experiment, ForceSensor, changed, load, names, source
 
 __all__ = [

@@ -15,7 +15,7 @@ import sys
 from fractions import Fraction
 from functools import reduce
 from itertools import pairwise, product
-from math import ceil, floor, isqrt
+from math import ceil, factorial, floor, isqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -397,6 +397,42 @@ def check(data: bytes | str) -> int:
     if not count:
         raise RefusedError("it claims nothing")
     return count
+
+
+def check_slide(data: bytes | str, low: float, high: float) -> None:
+    """That a slide on K from low to high is proved, its normal off by up to 10 degrees, friction up to mu_max.
+
+    For each K one cell without damping holds all of m K, with cos phi (cos phi - mu sin phi) <= m <= cos phi (cos phi +
+    mu sin phi); the last is largest at tan 2 phi = mu, and there (1 + sqrt(1 + mu^2))/2.
+
+    Args:
+        data: the file of a certificate that holds.
+        low: of K as the measured position feels it, from [N/m].
+        high: to [N/m].
+
+    Raises:
+        RefusedError: some K is not proved.
+    """
+    file = json.loads(data)
+    mu, x = Fraction(file["gains"]["slide"]["mu_max"]), PI / 18
+    sine = (
+        sum(((-1) ** k * x ** (2 * k + 1) / factorial(2 * k + 1) for k in range(8)), Fraction(0)) + SMALL**2
+    )
+    cosine = sum(((-1) ** k * x ** (2 * k) / factorial(2 * k) for k in range(8)), Fraction(0))
+    least = (cosine - SMALL**2) * (cosine - SMALL**2 - mu * sine)
+    most = (cosine + SMALL**2) * (cosine + SMALL**2 + mu * sine)
+    if mu * (cosine**2 - sine**2) < 2 * sine * cosine:
+        most = (1 + Fraction(isqrt(ceil((1 + mu**2) * ONE**2)) + 1, ONE)) / 2
+    cells = [
+        c for claim in file["claims"] if claim["kind"] != "adapting" for c in claim["cells"] if not c["least"]
+    ]
+    ends = sorted((Fraction(c["low"]) / least, Fraction(c["high"]) / most) for c in cells)
+    reached = Fraction(low)
+    for start, end in ends:
+        if start <= reached:
+            reached = max(reached, end)
+    if reached < Fraction(high) or least <= 0:
+        raise RefusedError(f"a slide is not proved on surfaces above {float(reached):.6g} N/m")
 
 
 if __name__ == "__main__":

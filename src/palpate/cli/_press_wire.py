@@ -11,8 +11,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _streams
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import print_lines, say
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.errors import InputError
@@ -83,6 +82,8 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "title": arm.title,
         "normal": list(task.direction),
         "desired_N": task.force,
+        "hold_s": task.hold,
+        "probe": task.probe,
         **({} if tool is None else tool.meta),
     }
 
@@ -142,7 +143,7 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     path = task.path
     along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
     does = (
-        f"rests 0.5 s in the air and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
+        f"rests 0.5 s in free motion and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
         f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}{along},"
         f" goes back {1e3 * task.retreat:g} mm, rests"
     )

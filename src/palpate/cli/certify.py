@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, print_lines
-from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,31 +23,22 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ProofOptions:
-    """Surfaces, gains and delays of the proof.
-
-    Parameters
-    ----------
-    stiffness
-        Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability limit if
-        not given.
-    damping_time
-        Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0).
-    jitter
-        Ticks by which a reading may be older than the sensor's period while the law adapts.
-    margin
-        Factor by which the gains may grow.
-    held_only
-        Leave out the proof of the adapting law.
-    loop_from
-        A log of commanded and measured position in free motion: the proof uses the inner loop identified from it.
-    """
+    """Surfaces, gains and delays of the proof."""
 
     stiffness: Annotated[str | None, SIGNED] = None
+    """Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability
+    limit if not given."""
     damping_time: Annotated[str | None, SIGNED] = None
+    "Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0)."
     jitter: Annotated[int, SIGNED] = 1
+    "Ticks by which a reading may be older than the sensor's period while the law adapts."
     margin: Annotated[float, SIGNED] = 1.0
+    "Factor by which the gains may grow."
     held_only: Annotated[bool, FLAG] = False
+    "Leave out the proof of the adapting law."
     loop_from: Path | None = None
+    """A log of commanded and measured position in free motion: the proof uses the inner loop identified from
+    it."""
 
     def check(self) -> None:
         """Finds numbers out of range."""
@@ -58,7 +50,7 @@ class ProofOptions:
     @property
     def surfaces(self) -> tuple[float, float] | None:
         """K + B/theta [N/m]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.stiffness is None:
             return None
@@ -72,7 +64,7 @@ class ProofOptions:
     @property
     def longest(self) -> float | None:
         """Longest damping time B/K [s]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.damping_time is None:
             return None
@@ -84,23 +76,44 @@ class ProofOptions:
 
 @Parameter(name="*", group=Group("Another controller", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
-class OthersOptions:
+class OthersOptions(ReportOption):
     """A controller of others, by its parameter file.
 
     Parameters
     ----------
     controller
         ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the corrected
-        numbers are for, --out a file with these.
+        numbers are for, --damping-time their damping, --out a file with these numbers.
     delay
         Everything that is late between contact and motion, such as 24:ms.
     mass
         Mass of the tip along the normal, for crisp and franka, such as 3:kg.
+    report
+        Where to write a page about that controller, an HTML file.
     """
 
     controller: str | None = None
     delay: str | None = None
     mass: str | None = None
+    report: Path | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Everything late between contact and motion [s]."""
+        from palpate.cli.options.values import quantity
+
+        if self.delay is None:
+            raise InputError(
+                "--controller needs --delay, everything late between contact and motion, such as 24:ms"
+            )
+        return quantity("--delay", self.delay, "time")
+
+    @property
+    def kilograms(self) -> float | None:
+        """Mass of the tip along the normal [kg]."""
+        from palpate.cli.options.values import quantity
+
+        return None if self.mass is None else quantity("--mass", self.mass, "mass")
 
 
 def certify(
@@ -121,7 +134,7 @@ def certify(
 
     palpate certify force_loop/palpate_force.h --check certificate.json
 
-    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml
+    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml --report page.html
 
     A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
     has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
@@ -141,6 +154,8 @@ def certify(
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     if others is not None and others.controller is not None:
         return _others(gains, others, proof, output)
+    if others is not None and others.report is not None:
+        raise InputError("--report is of --controller; palpate tune writes a page about gains")
     output.check_new(output.out, ending=".json")
     proof.check()
     return _prove(gains, proof, columns or ColumnOptions(), output)
@@ -177,29 +192,13 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
 
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
-    from palpate.analysis.others_controllers import STIFFEST, certify_controller
-    from palpate.cli.options.quantities import quantity
-    from palpate.files import MADE, write_text
+    """The answer of the distribution that reads parameter files of others."""
+    from importlib.metadata import entry_points
 
-    output.check_new(output.out, ending=".yaml")
-    if others.delay is None:
-        raise InputError(
-            "--controller needs --delay, everything late between contact and motion, such as 24:ms"
-        )
-    mass = None if others.mass is None else quantity("--mass", others.mass, "mass")
-    delay = quantity("--delay", others.delay, "time")
-    stiffest = STIFFEST if asked.surfaces is None else asked.surfaces[1]
-    answer, text = certify_controller(path, str(others.controller), delay, mass, stiffest)
-    if output.out is not None and answer["corrected"] is not None:
-        write_text(output.out, text if text.startswith(MADE) else f"{MADE} certify.\n{text}")
-    if output.json:
-        print_answer(answer)
-    else:
-        from palpate.report.tuning.table import controller_lines
-
-        print_lines(*controller_lines(answer, output.out))
-    return (
-        0 if answer["proved"]["stiffness"] is not None and answer["proved"]["stiffness"][1] >= stiffest else 1
+    for entry in entry_points(group="palpate.certifiers", name="controller"):
+        return int(entry.load()(path, others, asked, output))
+    raise InputError(
+        "--controller is of palpate-certify, which is not installed: pip install palpate[certify]"
     )
 
 
@@ -214,17 +213,21 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     elif gains is not None:
         certificate.check_of(load_gains(gains))
     with console(stderr=True).status("checking"):
-        verdict = confirm(path, certificate.check())
+        verdict = confirm(path, certificate)
     _print(certificate, verdict, output)
     return 0 if verdict.holds else 1
 
 
-def confirm(path: Path, verdict: Verdict) -> Verdict:
+def confirm(path: Path, certificate: Certificate) -> Verdict:
     """The verdict, if the independent check has the same."""
-    from palpate.checks.force_certificate import RefusedError, check
+    from palpate.checks.force_certificate import RefusedError, check, check_slide
+    from palpate.force.sliding.slide_proof import slide_proof
 
+    verdict, slide = certificate.check(), slide_proof(certificate)
     try:
         check(path.read_bytes())
+        if slide is not None and slide["felt_stiffness"] is not None:
+            check_slide(path.read_bytes(), *slide["felt_stiffness"])
     except RefusedError as error:
         return replace(verdict, holds=False, why=verdict.why or f"by the independent check, {error}")
     return verdict
@@ -244,6 +247,6 @@ def _print(
         print_lines(*lines(certificate, verdict))
         return
     from palpate.report.terminal import print_hanging
-    from palpate.report.tuning.table import proof_lines
+    from palpate.report.tuning import proof_lines
 
     print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())

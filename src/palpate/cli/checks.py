@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, show_table
-from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.written import JsonOption
+from palpate.cli.options.common import JsonOption, PluginOptions
 from palpate.errors import InputError
 
 

@@ -10,110 +10,78 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.written import WRITTEN, FileOptions
+from palpate.cli.options.common import WRITTEN, FileOptions
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 
 @Parameter(name="*", group=Group("The scene", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SceneOptions:
-    """The scene and its contact.
-
-    Parameters
-    ----------
-    to
-        mujoco, drake, newton, mjcf-spring: a plate on a slide joint; or c: a law, with the gains of palpate tune.
-    model
-        The scene: MJCF for mujoco, SDF or URDF for drake.
-    geom
-        The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, its name.
-    probe
-        The probe, likewise; every geom that can touch the surface if not given.
-    """
+    """The scene and its contact."""
 
     to: Literal["mujoco", "drake", "newton", "mjcf-spring", "c"]
+    """mujoco, drake, newton, mjcf-spring: a plate on a slide joint; or c: a law, with the gains of palpate
+    tune."""
     model: Path | None = None
+    "The scene: MJCF for mujoco, SDF or URDF for drake."
     geom: str | None = None
+    "The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, its name."
     probe: str | None = None
+    "The probe, likewise; every geom that can touch the surface if not given."
 
 
 @Parameter(name="*", group=Group("Given parameters", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class GivenOptions:
-    """Numbers in place of identified ones.
-
-    Parameters
-    ----------
-    damping
-        B in N s/m, if it was not identified, or to override it; 0 for a pure spring.
-    mass
-        M in kg of the plate of mjcf-spring, likewise.
-    working_point
-        Use the stiffness at the working point instead of the model's K, for a surface that no linear model explains.
-    """
+    """Numbers in place of identified ones."""
 
     damping: Annotated[float | None, SIGNED] = None
+    "B in N s/m, if it was not identified, or to override it; 0 for a pure spring."
     mass: Annotated[float | None, SIGNED] = None
+    "M in kg of the plate of mjcf-spring, likewise."
     working_point: Annotated[bool, FLAG] = False
+    """Use the stiffness at the working point instead of the model's K, for a surface that no linear model
+    explains."""
 
 
 @Parameter(name="*", group=Group("The law, of C", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class LawOptions:
-    """A law and its numbers.
-
-    Parameters
-    ----------
-    law
-        force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; contact-identifier; or
-        recursive-least-squares.
-    into
-        Of sliding-loop: direction into the surface, x,y,z in the base's axes.
-    parameters
-        Of recursive-least-squares, 3 or 4.
-    forgetting
-        Of recursive-least-squares: its forgetting factor.
-    low_pass
-        Of contact-identifier: the force sensor's low-pass.
-    rate
-        Of contact-identifier: ticks a second in Hz.
-    lag
-        Of contact-identifier: how late the force is, its low-pass included, in s.
-    sampling
-        Of contact-identifier: samples of the force sensor a second in Hz, if not one a tick.
-    """
+    """A law and its numbers."""
 
     law: str = "force-loop"
+    """force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; contact-identifier; or
+    recursive-least-squares."""
     into: Annotated[str, SIGNED] = "0,0,-1"
+    "Of sliding-loop: direction into the surface, x,y,z in the base's axes."
     parameters: Annotated[int, SIGNED] = 3
+    "Of recursive-least-squares, 3 or 4."
     forgetting: Annotated[float, SIGNED] = 1.0
+    "Of recursive-least-squares: its forgetting factor."
     low_pass: str = "butterworth3:120"  # noqa: S105 - a filter
+    "Of contact-identifier: the force sensor's low-pass."
     rate: Annotated[float, SIGNED] = 1000.0
+    "Of contact-identifier: ticks a second in Hz."
     lag: Annotated[float, SIGNED] = 0.003
+    "Of contact-identifier: how late the force is, its low-pass included, in s."
     sampling: Annotated[float | None, SIGNED] = None
+    "Of contact-identifier: samples of the force sensor a second in Hz, if not one a tick."
 
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ExportOutput(FileOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list intervals
-        and assumptions. Of C the folder.
-    replace
-        Replace an earlier export.
-    check
-        Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %. Of C:
-        compile it here, and repeat a million ticks of Python's; exit code 1 if one differs in a bit.
-    """
+    """Where the scene or the law is written."""
 
     out: Path | None = None
+    """The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list
+    intervals and assumptions. Of C the folder."""
     replace: Annotated[bool, FLAG] = False
+    "Replace an earlier export."
     check: Annotated[bool, FLAG] = False
+    """Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
+    Of C: compile it here, and repeat a million ticks of Python's; exit code 1 if one differs in a bit."""
 
 
 def export(

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import KINDS, console
 from palpate.cli.one_log import OneLog, has_number
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.common import QUIET, WRITTEN, Model, PictureOptions
 from palpate.cli.options.force import IndenterOptions
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Model
-from palpate.cli.options.values import lag_of, with_std
-from palpate.cli.options.written import WRITTEN, PictureOptions
+from palpate.cli.options.values import FLAG, SIGNED, lag_of, with_std
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 
@@ -30,37 +28,26 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The model", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """The model, the lag, and the priors.
-
-    Parameters
-    ----------
-    model
-        kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic; chosen if
-        not given.
-    lag
-        Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard deviation).
-    force_filter
-        Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none.
-    mass
-        Prior of the mass, in kg, VALUE or VALUE:STD.
-    tolerance
-        Largest half-width of an identified parameter's 95 % interval, as a share of its value.
-    calibration
-        Relative standard deviation of the scales of force and position together, as 0.01.
-    bonded
-        Whether the probe is fixed to the surface; detected if not given.
-    cutoff
-        Cut-off of the filters of all channels, in Hz; chosen if not given.
-    """
+    """The model, the lag, and the priors."""
 
     model: Annotated[Model | None, QUIET] = None
+    """kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
+    chosen if not given."""
     lag: Annotated[str | None, SIGNED] = None
+    """Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard
+    deviation)."""
     force_filter: str | None = None
+    "Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none."
     mass: str | None = None
+    "Prior of the mass, in kg, VALUE or VALUE:STD."
     tolerance: float = 0.25
+    "Largest half-width of an identified parameter's 95 % interval, as a share of its value."
     calibration: float = 0.0
+    "Relative standard deviation of the scales of force and position together, as 0.01."
     bonded: bool | None = None
+    "Whether the probe is fixed to the surface; detected if not given."
     cutoff: float | None = None
+    "Cut-off of the filters of all channels, in Hz; chosen if not given."
 
     def known(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
@@ -78,34 +65,26 @@ class ModelOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(PictureOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    figure
-        Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if not given
-        (of many logs, pooled.identify.png).
-    dpi
-        Of a PNG; 110 if not given.
-    table
-        Where to write a table for a paper, as CSV, Markdown or LaTeX by its ending (.csv, .md, .tex): value and 95 %
-        of each log; of several, n, mean, next press and deviation, too.
-    verbose
-        Print all evidence: each reason, each warning, both intervals, the slopes of the press.
-    budget
-        Print the uncertainty budget of each number, too: sources, sensitivities, degrees of freedom, coverage factor.
-    """
+class IdentifyOutput(PictureOptions):
+    """Files of an identification, and how much is printed."""
 
     figure: Path | None = None
+    """Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if
+    not given (of many logs, pooled.identify.png)."""
     dpi: int | None = None
+    "Of a PNG; 110 if not given."
     table: Path | None = None
+    """Where to write a table for a paper, as CSV, Markdown or LaTeX by its ending (.csv, .md, .tex): value and
+    95 % of each log; of several, n, mean, next press and deviation, too."""
     verbose: Annotated[bool, FLAG] = False
+    "Print all evidence: each reason, each warning, both intervals, the slopes of the press."
     budget: Annotated[bool, FLAG] = False
+    """Print the uncertainty budget of each number, too: sources, sensitivities, degrees of freedom, coverage
+    factor."""
 
     def paper_table(self) -> Path | None:
         """Path of the table, checked before any work is done."""
-        from palpate.report.many.paper_table import ENDINGS
+        from palpate.report.many.table import ENDINGS
 
         if self.table is not None:
             ending = self.table.suffix.lower()
@@ -127,7 +106,7 @@ def identify(
     arm: ArmOptions | None = None,
     fitted: ModelOptions | None = None,
     pressed_by: IndenterOptions | None = None,
-    output: OutputOptions | None = None,
+    output: IdentifyOutput | None = None,
     cell: CellOptions | None = None,
 ) -> int:
     """Identify the touched surface from a log: stiffness, damping, mass.
@@ -162,7 +141,7 @@ def identify(
     """
     from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
-    output, cell = output or OutputOptions(), cell or CellOptions()
+    output, cell = output or IdentifyOutput(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
     pressed_by.check()
@@ -184,7 +163,7 @@ def identify(
     return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
 
 
-def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
+def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
     figure, page, table = output.png(log.stem), output.page(), output.paper_table()
     found, origin = asked.identification(log)
     if found.traces is None:
@@ -198,15 +177,14 @@ def _one(log: Path, asked: OneLog, output: OutputOptions) -> int:
 
         write_text(page, page_of(found, origin))
     if table is not None:
-        from palpate.report.many.paper_table import write_table
-        from palpate.report.many.table import LogRow
+        from palpate.report.many.table import LogRow, write_table
 
         write_table([LogRow(origin, found)], None, table)
     _print(found, origin, [path for path in (figure, page, table) if path is not None], output)
     return 0 if has_number(found) else 1
 
 
-def _print(found: Identification, origin: Source, written: list[Path], output: OutputOptions) -> None:
+def _print(found: Identification, origin: Source, written: list[Path], output: IdentifyOutput) -> None:
     if output.json:
         from palpate.report.identification.words import as_json
 

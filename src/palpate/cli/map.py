@@ -11,18 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG
+from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET
-from palpate.cli.options.written import WRITTEN, JsonOption, ReportOption
+from palpate.cli.options.values import FLAG
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 from palpate.units import split_spec, unit
@@ -39,65 +37,46 @@ POLL = 0.5
 @Parameter(name="*", group=MAP)
 @dataclass(frozen=True, kw_only=True)
 class PlaceOptions:
-    """Where the presses are.
-
-    Parameters
-    ----------
-    table
-        A table with a row a press instead of logs: columns x, y (and z), stiffness and half, the half-width of its 95 %
-        interval; a name such as x_mm carries its unit.
-    columns
-        Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm.
-    place
-        Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given.
-    fields
-        Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss and
-        depth are mapped where presses show them.
-    each_contact
-        Each contact of a log is a press of its own, at its own place; else a log is one press.
-    """
+    """Where the presses are."""
 
     table: Path | None = None
+    """A table with a row a press instead of logs: columns x, y (and z), stiffness and half, the half-width of
+    its 95 % interval; a name such as x_mm carries its unit. A column line numbers the slide or session of a press,
+    whose presses share an error."""
     columns: str | None = None
+    "Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm."
     place: str | None = None
+    "Columns of a log that hold its place, as x:mm,y:mm or x,y,z; the pose's position if not given."
     fields: str | None = None
+    """Columns of a table that are mapped beside the stiffness, as loss,depth_mm:mm; of logs, relaxation, loss
+    and depth are mapped where presses show them."""
     each_contact: Annotated[bool, FLAG] = False
+    "Each contact of a log is a press of its own, at its own place; else a log is one press."
 
 
 @Parameter(name="*", group=MAP)
 @dataclass(frozen=True, kw_only=True)
 class MapOptions:
-    """Options of the map itself.
-
-    Parameters
-    ----------
-    next
-        How many next presses to choose.
-    goal
-        What they are for: the interval everywhere, the edge of what is stiffer, or the maximum; edge if --stiffer-than
-        is given, else interval.
-    stiffer_than
-        A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place.
-    until
-        A half-width of the interval in per cent: how many more presses bring it under that.
-    common
-        Standard deviation of an error that all presses share, such as the sensor's scale, in per cent.
-    start
-        Where the robot stands, as 10,20:mm; with --way a next press costs the way to it.
-    way
-        That the robot travels in the time of one press, as 50:mm.
-    live
-        Wait for more presses, and map them as they come, until Ctrl-C; a page that is written loads itself again.
-    """
+    """Options of the map itself."""
 
     next: int = 5
+    "How many next presses to choose."
     goal: Annotated[Literal["interval", "edge", "maximum"] | None, QUIET] = None
+    """Purpose: the interval everywhere, the edge of what is stiffer, or the maximum; edge if
+    --stiffer-than is given, else interval."""
     stiffer_than: str | None = None
+    "A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place."
     until: float | None = None
+    "A half-width of the interval in per cent: how many more presses bring it under that."
     common: float = 0.0
+    "Standard deviation of an error that all presses share, such as the sensor's scale, in per cent."
     start: str | None = None
+    "Where the robot stands, as 10,20:mm; with --way a next press costs the way to it."
     way: str | None = None
+    "That the robot travels in the time of one press, as 50:mm."
     live: Annotated[bool, FLAG] = False
+    """Wait for more presses, and map them as they come, until Ctrl-C; a page that is written loads itself
+    again."""
 
     def request(self) -> MapRequest:
         """The same for the library."""
@@ -128,24 +107,16 @@ class MapOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(ReportOption, JsonOption):
-    """Files to write.
-
-    Parameters
-    ----------
-    figure
-        Where to write a picture of the map, PNG, SVG or PDF by its ending.
-    csv
-        Where to write the map as a table: place, stiffness, both intervals.
-    ply
-        Where to write the map as coloured points, for a viewer of point clouds.
-    mcap
-        Where to write the map as it grew, for Foxglove and Lichtblick.
-    """
+    """Files of a map, and their formats."""
 
     figure: Path | None = None
+    "Where to write a picture of the map, PNG, SVG or PDF by its ending."
     csv: Path | None = None
+    "Where to write the map as a table: place, stiffness, both intervals."
     ply: Path | None = None
+    "Where to write the map as coloured points, for a viewer of point clouds."
     mcap: Path | None = None
+    "Where to write the map as it grew, for Foxglove and Lichtblick."
 
     def check(self) -> None:
         """Check every path before any work is done."""

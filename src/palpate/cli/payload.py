@@ -1,38 +1,50 @@
-"""`palpate payload`: mass and centre of the tool on the force sensor, and the sensor's bias and drift."""
+"""`palpate payload`: mass and centre of the tool on the force sensor, the sensor's bias and drift, and load files."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import place, show_answer
 from palpate.cli.options.arm import FrameOptions
+from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.written import WRITTEN, FileOptions, ReportOption
+from palpate.cli.options.values import SIGNED, vector
 from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Weighed
+    from palpate.contact_frame.load_files import NumberOfLoad
+
+
+_ENDINGS = (".toml", ".script", ".json", ".yaml")
 
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class PayloadOutput(ReportOption, FileOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Where to write the payload, a TOML file for --payload.
-    """
+    """Where the payload is written, and a load file that is compared with it."""
 
     out: Path | None = None
+    """Where to write the payload: a .toml for --payload, or the load file of a controller: .script (UR), .json
+    (Franka), .yaml (ROS 2)."""
+    check: Path | None = None
+    "A controller's load file, to be compared with the log. With --gravity-compensated the controller had it."
+    flange: Annotated[str | None, SIGNED] = None
+    """The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z in
+    m, or with :mm. In a .yaml the sensor."""
+
+    def origin(self, torque_at: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The flange from the point that the torque is about, which is given from the pose's origin [m]."""
+        x, y, z = vector("flange", self.flange, "length") or (0.0, 0.0, 0.0)
+        a, b, c = torque_at
+        return x - a, y - b, z - c
 
 
 def payload(
@@ -54,8 +66,10 @@ def payload(
 
     palpate identify press.mcap --wrench-frame tool --payload tool.toml
 
+    palpate payload turning.mcap --wrench-frame tool --check endeffector-config.json
+
     Shake the tool at the end of the log: this shows whether the driver subtracts the tool's inertia. Exit code 1: the
-    poses do not determine the mass; the output says how to move.
+    poses do not determine the mass, and the output says how to move; or the checked file does not agree with the log.
 
     Parameters
     ----------
@@ -66,39 +80,57 @@ def payload(
     """
     cell, output = cell or CellOptions(), output or PayloadOutput()
     cell.check()
-    output.check_new(output.out, ending=".toml")
+    ending = _ENDINGS[0] if output.out is None else output.out.suffix
+    output.check_new(output.out, ending=ending if ending in _ENDINGS else _ENDINGS[0])
     report = output.page()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
-    from palpate.contact_frame import ContactFrame, weigh
+    from palpate.contact_frame import ContactFrame, compare, load_text, read_load, weigh
 
+    load = None if output.check is None else read_load(output.check)
     cell.save((source or LogOptions(), frame or FrameOptions()))
     record = (source or LogOptions()).read(log)
     if "force_x" not in record.columns:
         raise InputError(
             f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"
         )
-    found = weigh(record, (frame or FrameOptions()).frame() or ContactFrame(), tolerance)
+    contact = (frame or FrameOptions()).frame() or ContactFrame()
+    found = weigh(record, contact, tolerance)
+    start = output.origin(contact.wrench_at)
     written = []
     if output.out is not None and found.payload is not None:
-        found.payload.save(output.out)
+        write_text(output.out, load_text(found, ending, start))
         written.append(output.out)
     if report is not None:
         from palpate.report.payload import page
 
         write_text(report, page(found, log.name))
         written.append(report)
-    _print(found, log, written, output.json)
-    return 0 if found.payload is not None else 1
+    rows = []
+    if load is not None and found.payload is not None:
+        rows = compare(found, load, start, compensated=contact.gravity_compensated)
+    _print(found, log, rows, written, output)
+    return 0 if found.payload is not None and all(row.agrees for row in rows) else 1
 
 
-def _print(found: Weighed, log: Path, written: list[Path], json: bool) -> None:
-    if json:
-        print_answer(found.to_json())
+def _print(
+    found: Weighed, log: Path, rows: list[NumberOfLoad], written: list[Path], output: PayloadOutput
+) -> None:
+    check = output.check
+    if output.json:
+        answer = found.to_json()
+        if check is not None:
+            numbers = [row._asdict() | {"agrees": row.agrees} for row in rows]
+            agrees = bool(rows) and all(row.agrees for row in rows)
+            answer["check"] = {"file": str(check), "agrees": agrees, "numbers": numbers}
+        print_answer(answer)
         return
-    from palpate.report.payload import sentence, table
+    from palpate.report.payload import check_sentence, check_table, sentence, table
 
     notes = [f"{note['code']}: {note['text']}" for note in found.notes]
-    screen = show_answer(log.name, f": {sentence(found)}", [table(found)], notes)
+    said, tables = sentence(found), [table(found)]
+    if check is not None and rows:
+        said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
+    screen = show_answer(log.name, f": {said}", tables, notes)
     for path in written:
         place(screen, "written:", path)

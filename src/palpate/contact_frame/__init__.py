@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from palpate.contact_frame.arm import describe, robot_stiffness, with_arm
 from palpate.contact_frame.load import Payload, load_payload
+from palpate.contact_frame.load_files import compare, load_text, read_load
 from palpate.contact_frame.projecting import identify_contact, project
 from palpate.contact_frame.signals_in_base import Arm, ContactFrame
 from palpate.contact_frame.tool_payload import Weighed, weigh
@@ -18,10 +19,13 @@ __all__ = [
     "ContactFrame",
     "Payload",
     "Weighed",
+    "compare",
     "describe",
     "identify_contact",
     "load_payload",
+    "load_text",
     "project",
+    "read_load",
     "robot_stiffness",
     "weigh",
     "with_arm",

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_motion import contact_rows, rows_between
+from palpate.contact_frame.free_motion import Vector, contact_rows, matrices, read_rows, rows_between
 from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
-from palpate.contact_frame.vectors import Vector, matrices, read_rows
 from palpate.errors import InputError
 from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
@@ -211,10 +210,16 @@ def _into_tool(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Arra
         return rotations.transpose(0, 2, 1)
     if wrench_frame == "tool":
         return np.broadcast_to(np.eye(3), rotations.shape)
+    assert frame.sensor_rpy is not None
+    return np.broadcast_to(turn_of(frame.sensor_rpy), rotations.shape)
+
+
+def turn_of(sensor_rpy: Vector) -> Array:
+    """Rotation from the axes of a sensor into the tool's, shape (3, 3), of roll, pitch and yaw [rad]."""
     from scipy.spatial.transform import Rotation
 
-    turn: Array = Rotation.from_euler("xyz", frame.sensor_rpy).as_matrix()
-    return np.broadcast_to(turn, rotations.shape)
+    turn: Array = Rotation.from_euler("xyz", sensor_rpy).as_matrix()
+    return turn
 
 
 def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:

@@ -21,7 +21,7 @@ FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
 _KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file", ".csv": "CSV file",
-          ".ply": "PLY file", ".mcap": "MCAP file"}  # fmt: skip
+          ".ply": "PLY file", ".mcap": "MCAP file", ".yaml": "YAML file"}  # fmt: skip
 _HEAD, _FOOT, _TAIL = 4096, 1 << 20, 8
 """Bytes that are looked at; the last ones of a Parquet file say how long what stands before them is."""
 _FEET = {

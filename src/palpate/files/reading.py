@@ -103,6 +103,32 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     return tables
 
 
+def read_yaml(path: Path, what: str = "a file") -> tuple[dict[str, Any], Any]:
+    """The names of a YAML file, and the parser that writes it again as it was, comments included.
+
+    Args:
+        path: of the file.
+        what: of an error message.
+
+    Raises:
+        InputError: it is no YAML with names at its top; the extra that reads it is missing.
+    """
+    try:
+        from ruamel.yaml import YAML
+        from ruamel.yaml.error import YAMLError
+    except ImportError:
+        raise InputError(f"{what} in YAML needs ruamel.yaml: pip install palpate[bags]") from None
+    parser = YAML()
+    parser.width, parser.preserve_quotes = 4096, True
+    try:
+        file = parser.load(read_text(path, what))
+    except (YAMLError, ValueError, RecursionError) as error:
+        raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
+    if not isinstance(file, dict):
+        raise InputError(f"{path} is no {what.removeprefix('a ')}: it has no names at its top")
+    return file, parser
+
+
 def read_table(
     text: str, where: str, kind: type[T], remedy: Callable[[str], str] = lambda _: "", *, finite: bool = True
 ) -> T:

@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from palpate.errors import InputError, unknown
 from palpate.files import read_table, read_text
-from palpate.results import Readable
+from palpate.records import Readable
 from palpate.signals.low_pass import LowPass
 
 Positive = Annotated[float, Meta(gt=0)]
@@ -24,7 +24,7 @@ _REMEDIES = {
     "delay": "measure it with palpate tune --loop-from LOG; without it there is no lag to tune for",
     "stiffness": "press the tip on something rigid and run palpate identify on it: that is the arm's own",
     "mass": "take the tip's, 1/(n^T J M^-1 J^T n), from the arm's model",
-    "noise": "record the sensor in the air: it is the readings' standard deviation",
+    "noise": "record the sensor in free motion: it is the readings' standard deviation",
 }
 
 
@@ -86,7 +86,7 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
 
     @property
     def swing(self) -> float:
-        """Natural period of the tip's mass on the arm's own stiffness, in the air [s]; 0 of a tip without mass."""
+        """Natural period of the tip's mass on the arm's own stiffness, in free motion [s]; 0 of a tip without mass."""
         return 0.0 if self.mass is None else 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
 
 
@@ -193,7 +193,7 @@ class Arm(Table):
 
     @property
     def low_pass(self) -> LowPass:
-        """Of the sensor."""
+        """Low-pass of the force sensor."""
         return LowPass.parse(self.sensor.low_pass)
 
     @property

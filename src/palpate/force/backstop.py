@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import sqrt
-from palpate.force.contact_evidence import AIR
+from palpate.force.contact_evidence import FREE_MOTION
 from palpate.force.stage import LOCKED, STEP
 
 MOST = 3.0
@@ -30,7 +30,7 @@ class Backstop(NamedTuple):
 
 
 @law
-def guarded(law, b, was, stage, w, desired, before):
+def next_backstop(law, b, was, stage, w, desired, before):
     """The backstop of this tick: it sees contacts that end, then swings.
 
     Args:
@@ -45,9 +45,9 @@ def guarded(law, b, was, stage, w, desired, before):
     if law.backing == 0.0:
         return b
     care, felt = min(b.care * (1.0 + law.tick / RECOVERY), 1.0), w.mean - w.rest
-    if stage.phase == AIR:
-        if was.phase not in (AIR, LOCKED) and b.top > law.bias:
-            return bounced(law, b)
+    if stage.phase == FREE_MOTION:
+        if was.phase not in (FREE_MOTION, LOCKED) and b.top > law.bias:
+            return after_bounce(law, b)
         return Backstop(care, 0.0, 0.0, 0.0, 0.0, 0.0, b.bounces)
     top, bounces = max(b.top, felt), 0.0 if stage.phase == LOCKED else b.bounces
     error, level = desired - felt, max(0.07 * abs(desired), 4.0 * sqrt(w.variance))
@@ -64,7 +64,7 @@ def guarded(law, b, was, stage, w, desired, before):
 
 
 @law
-def bounced(law, b):
+def after_bounce(law, b):
     """A contact that was lost: the loop was beyond its gain margin pi/(2 alpha), so that the gain falls by that."""
     care = max(b.care * 2.0 * law.alpha / pi, LEAST)
     return Backstop(care, 0.0, 0.0, 0.0, 0.0, 0.0, b.bounces + 1.0)

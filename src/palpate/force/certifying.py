@@ -18,6 +18,7 @@ from palpate.force.cover import Cell, Search
 from palpate.force.gains import Gains
 from palpate.force.lag import ultimate_gain
 from palpate.force.sampled_loop import SampledLoop
+from palpate.force.sliding.slide_proof import sliding_claim
 
 SOFTEST = 1e-3
 """Of the cap: as far down as a held gain is proved by default."""
@@ -87,7 +88,9 @@ def certify(
     if parts > 0:  # an inner loop known to intervals: what spans all surfaces in one norm, and no more
         wanted = [wanted[1], *(tries[1:] for tries in wanted[3:])]
         wanted = [[msgspec.structs.replace(c, parts=parts) for c in tries] for tries in wanted]
-    claims = (_first_proved(gains, tries, progress) for tries in wanted)
+    claims = [_first_proved(gains, tries, progress) for tries in wanted]
+    if gains.slide is not None and not position:  # a position arm's one-sided claim serves a slide, too
+        claims.append(sliding_claim(gains, low, high))
     proved = tuple(claim for claim in claims if claim is not None)
     return Certificate(form=FORM, gains=own_gains, claims=proved, measured=measured)
 

@@ -1,12 +1,12 @@
-"""The force's readings, their noise as the air tells it, and the evidence that there is contact."""
+"""The force's readings, their noise in free motion, and the evidence of a contact."""
 
 from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import sqrt
-from palpate.force.onset import NO_STARTS, explained, later
+from palpate.force.onset import NO_STARTS, explained_variance, later
 
-AIR = 0.0
+FREE_MOTION = 0.0
 """The phase before a touch."""
 CONTACT = 7.0
 """Evidence of a contact, a cumulative sum, that a touch begins with, and with none of which it ends."""
@@ -53,7 +53,7 @@ class Watch(NamedTuple):
     drift: float  # of the bias [N/s]
     peak: float  # largest deviation of the mean over theta from it in free motion, fading [N]
     variance: float  # of a reading [N^2]
-    tide: float  # of the mean over theta [N^2]
+    slow_variance: float  # of the mean over theta [N^2]
     evidence: float  # of a contact
     fresh: float  # readings so far
     age: float  # ticks since the last fresh reading; 0 if this one is
@@ -68,9 +68,9 @@ def is_fresh(law, w, force):
 
 
 @law
-def listened(law, state, f, force):
-    """In the air, lines through the readings from several starts back; in contact, as they were at the touch."""
-    if state.stage.phase != AIR or state.ticks < 1.0 or not is_fresh(law, state.watch, force):
+def next_starts(law, state, f, force):
+    """Lines through the readings from several starts back in free motion; in contact, those of the touch."""
+    if state.stage.phase != FREE_MOTION or state.ticks < 1.0 or not is_fresh(law, state.watch, force):
         return state.starts
     starts = NO_STARTS if state.stage.since == 0.0 else state.starts
     return later(starts, readings_of(law), f.y, force - state.watch.rest)
@@ -84,24 +84,24 @@ def readings_of(law):
 
 @law
 def behind(law, state):
-    """Readings behind the mean in the air."""
+    """Number of readings behind the mean in free motion."""
     return min(state.ticks * law.tick, MEMORY) / law.period + 1.0
 
 
 @law
-def watched(law, state, starts, force):
-    """This tick's reading, and what noise there is: in the air the force is at rest but for that."""
+def next_watch(law, state, starts, force):
+    """This tick's reading and the noise: in free motion the force differs from its bias by the noise alone."""
     w = state.watch
     if state.ticks < 1.0:
         period = law.period / law.tick
         return Watch(
-            force, force, force, w.rest, force, w.rest, w.drift, w.peak, w.variance, w.tide, 0.0, w.fresh + 1.0, 0.0,
-            period, Steepest(0.0, force, force, w.steepest.rise),
+            force, force, force, w.rest, force, w.rest, w.drift, w.peak, w.variance, w.slow_variance, 0.0,
+            w.fresh + 1.0, 0.0, period, Steepest(0.0, force, force, w.steepest.rise),
         )  # fmt: skip
     fresh, steepest = is_fresh(law, w, force), steepest_of(law, state, force)
     mean = w.mean + law.tick / (0.004 + law.tick) * (force - w.mean)
     slow = w.slow + law.tick / (law.theta + law.tick) * (force - w.slow)
-    evidence = evident(law, state, starts, mean, slow, force)
+    evidence = evidence_of(law, state, starts, mean, slow, force)
     age, gap = (0.0, w.age + 1.0) if fresh else (w.age + 1.0, w.gap)
     former, variance = w.former, w.variance
     many = w.fresh + 1.0 if fresh else w.fresh
@@ -113,25 +113,28 @@ def watched(law, state, starts, force):
             variance += (min(bend * bend / 6.0, 9.0 * variance) - variance) / (FEWEST + span / law.period)
         variance = max(variance, law.least)
         former = w.last
-    if state.stage.phase != AIR:
-        tide = max(w.tide, white(law, variance))
+    if state.stage.phase != FREE_MOTION:
+        slow_variance = max(w.slow_variance, white(law, variance))
         return Watch(
-            force, former, mean, slow, w.slower, w.rest, w.drift, w.peak, variance, tide, evidence, many, age, gap,
-            steepest,
+            force, former, mean, slow, w.slower, w.rest, w.drift, w.peak, variance, slow_variance, evidence, many,
+            age, gap, steepest,
         )  # fmt: skip
     slower = w.slower + law.tick / (SLOWER * law.theta + law.tick) * (force - w.slower)
     swing = slow - slower
-    tide = w.tide + law.tick / (1.0 + span) * (min(swing * swing, 9.0 * w.tide) - w.tide)
+    slow_variance = w.slow_variance + law.tick / (1.0 + span) * (
+        min(swing * swing, 9.0 * w.slow_variance) - w.slow_variance
+    )
     rest = w.rest
-    ramp = explained(starts, behind(law, state)) > 0.5 * EVIDENT * spread_of(law, w)
+    ramp = explained_variance(starts, behind(law, state)) > 0.5 * EVIDENT * spread_of(law, w)
     if evidence < 0.3 * CONTACT and not ramp and many > FEWEST:
         rest += law.tick / (min(state.ticks * law.tick, MEMORY) + law.period) * (force - rest)
         rest = max(min(rest, law.bias), -law.bias)
-    tide = max(tide, white(law, variance))
+    slow_variance = max(slow_variance, white(law, variance))
     drift = w.drift + law.tick / MEMORY * ((rest - w.rest) / law.tick - w.drift)
     peak = min(max((1.0 - law.tick / FADING) * w.peak, abs(slow - rest)), law.bias)
     return Watch(
-        force, former, mean, slow, slower, rest, drift, peak, variance, tide, evidence, many, age, gap, steepest,
+        force, former, mean, slow, slower, rest, drift, peak, variance, slow_variance, evidence, many, age, gap,
+        steepest,
     )  # fmt: skip
 
 
@@ -143,7 +146,7 @@ def steepest_of(law, state, force):
     with it in a quarter.
     """
     s, span = state.watch.steepest, max(0.25 * law.theta // law.tick, 1.0)
-    fading = 1.0 - law.tick / MEMORY if state.stage.phase == AIR else 1.0
+    fading = 1.0 - law.tick / MEMORY if state.stage.phase == FREE_MOTION else 1.0
     total, rise = s.total + force, fading * s.rise
     if state.ticks % span != 0.0:
         return Steepest(total, s.last, s.former, rise)
@@ -160,36 +163,36 @@ def white(law, variance):
 
 
 @law
-def retared(law, w):
+def tare(law, w):
     """The bias after a false touch: the mean over theta, which is within what a sensor may be off."""
     peak = min(max(w.peak, abs(w.slow - w.rest)), law.bias)
     drift = w.drift + (w.slow - w.rest) / MEMORY
     return Watch(
-        w.last, w.former, w.mean, w.slow, w.slow, w.slow, drift, peak, w.variance, w.tide, 0.0, w.fresh, w.age, w.gap,
-        w.steepest,
+        w.last, w.former, w.mean, w.slow, w.slow, w.slow, drift, peak, w.variance, w.slow_variance, 0.0, w.fresh,
+        w.age, w.gap, w.steepest,
     )  # fmt: skip
 
 
 @law
-def evident(law, state, starts, mean, slow, force):
-    """All of it as soon as a reading and its mean, or a line, stand out; else a cumulative sum (Page).
+def evidence_of(law, state, starts, mean, slow, force):
+    """Evidence of a contact: `CONTACT` as soon as a reading and its mean, or a line, stand out; else Page's sum.
 
-    It grows while the force is above the noise of its mean over theta, and falls below.
-    In contact what it has to be above is also a third of what it was: a loss shows within half of theta.
+    The cumulative sum (Page, Biometrika 1954) grows while the force is above the noise of its mean over theta, and
+    falls below it. In contact the threshold is also a third of the mean force: a loss shows within half of theta.
     """
-    w, unit = state.watch, sqrt(2.0 * state.watch.tide)
+    w, unit = state.watch, sqrt(2.0 * state.watch.slow_variance)
     sigma, above = sqrt(w.variance), force - w.rest
-    if state.stage.phase == AIR and w.fresh < FEWEST and abs(mean) < law.bias:
+    if state.stage.phase == FREE_MOTION and w.fresh < FEWEST and abs(mean) < law.bias:
         return 0.0  # the noise is not known yet
-    if state.stage.phase == AIR and above > EDGE * sigma and mean - w.rest > LEVEL * sigma:
+    if state.stage.phase == FREE_MOTION and above > EDGE * sigma and mean - w.rest > LEVEL * sigma:
         return CONTACT
-    asked = state.stage.phase == AIR and starts.readings > 2.0 * readings_of(law)
-    if asked and explained(starts, behind(law, state)) > EVIDENT * spread_of(law, w):
+    asked = state.stage.phase == FREE_MOTION and starts.readings > 2.0 * readings_of(law)
+    if asked and explained_variance(starts, behind(law, state)) > EVIDENT * spread_of(law, w):
         return CONTACT
-    least = unit if state.stage.phase == AIR else max(unit, 0.3 * (slow - w.rest))
+    least = unit if state.stage.phase == FREE_MOTION else max(unit, 0.3 * (slow - w.rest))
     step = max(min((above - least) / unit, 3.0 * sigma / unit), -2.0 * CONTACT)
     most = (
-        0.9 * CONTACT if state.stage.phase == AIR else CONTACT
+        0.9 * CONTACT if state.stage.phase == FREE_MOTION else CONTACT
     )  # alone it makes no contact: it knows no surface
     return max(min(w.evidence + law.tick / law.theta * step, most), 0.0)
 
@@ -197,4 +200,4 @@ def evident(law, state, starts, mean, slow, force):
 @law
 def spread_of(law, w):
     """Variance of a reading, or what white noise would have for the same tide if that is more [N^2]."""
-    return max(w.variance, 2.0 * law.theta / law.period * w.tide)
+    return max(w.variance, 2.0 * law.theta / law.period * w.slow_variance)

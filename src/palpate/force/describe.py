@@ -10,6 +10,7 @@ import numpy as np
 from palpate.force.certificate import Certificate, Verdict
 from palpate.force.claims import Claim
 from palpate.force.gains import Gains
+from palpate.force.sliding.slide_proof import slide_proof, slide_proof_sentence
 
 UNCOVERED = (
     "the backstop, the feed-forward of dF_d/dt",
@@ -88,6 +89,8 @@ def lines(certificate: Certificate, verdict: Verdict) -> list[str]:
     found = [f"proved stable, {sentence(c, gains)} ({len(c.cells)} cells)" for c in certificate.claims]
     if not found:
         found = ["nothing could be proved"]
+    if (slide := slide_proof(certificate)) is not None:
+        found.append(slide_proof_sentence(slide))
     state = "holds" if verdict.holds else f"does not hold: {verdict.why}"
     found.append(
         f"the certificate {state}; {verdict.cells} cells contract by at least {1.0 - verdict.contraction:.3g} a tick, "
@@ -115,5 +118,6 @@ def as_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
             }
             for c in certificate.claims
         ],
+        "slide": slide_proof(certificate),
         "uncovered": list(UNCOVERED),
     }

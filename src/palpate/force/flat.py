@@ -29,7 +29,7 @@ STATE = len(_PLACES)
 """Numbers of a state."""
 VARIANCE, REST, DRIFT = (_PLACES.index(("watch", name)) for name in ("variance", "rest", "drift"))
 PHASE = _PLACES.index(("stage", "phase"))
-FOUND, STD = (_PLACES.index(("known", name, "x")) for name in ("found", "std"))
+VALUE, STD = (_PLACES.index(("estimate", name, "x")) for name in ("value", "std"))
 BOUND = _PLACES.index(("bound", "used"))
 GUARD, TROUBLE = len(places(SafetyState)), STATE + places(SafetyState).index(("trouble",))
 """Numbers of a guard's state behind it, and the place of the trouble."""

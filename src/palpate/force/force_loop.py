@@ -11,17 +11,17 @@ from palpate._jit import kernel, law, part
 from palpate._vector import Vec3
 from palpate.errors import InputError
 from palpate.files import write_text
-from palpate.force.contact_evidence import AIR
+from palpate.force.contact_evidence import FREE_MOTION
 from palpate.force.flat import (
     BOUND,
     DRIFT,
-    FOUND,
     GUARD,
     PHASE,
     REST,
     STATE,
     STD,
     TROUBLE,
+    VALUE,
     VARIANCE,
     flattened,
     guard_in,
@@ -33,13 +33,13 @@ from palpate.force.flat import (
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST, TROUBLES, safe_step
 from palpate.force.stage import LEARNING, LOCKED
-from palpate.results import Readable
+from palpate.records import Readable
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate
 
 
-PHASES = {AIR: "air", LEARNING: "learning", LOCKED: "locked"}
+PHASES = {FREE_MOTION: "free motion", LEARNING: "learning", LOCKED: "locked"}
 
 
 @law
@@ -82,7 +82,7 @@ def surface_estimate(cap, theta, found, std, bound):
 
 
 class ForceLoop(Readable):
-    """Presses with the force asked for, on any surface within the gains' cap, from the air on.
+    """Presses with the force asked for, on any surface within the gains' cap, from free motion on.
 
     In the user's own loop, once a tick::
 
@@ -92,7 +92,7 @@ class ForceLoop(Readable):
 
     What it does where something is wrong is the same each time, and `trouble` names it: a reading that is no number,
     or has not changed for longer than the loop's lag: the tip is held. Readings missing for longer than the lag:
-    all but the sensor's noise is forgotten, as in the air. A saturated sensor, or a force above its limit: the tip
+    all but the sensor's noise is forgotten, as in free motion. A saturated sensor, or a force above its limit: the tip
     withdraws at least at the speed of the approach. A force that pulls: the tip is held. Contact lost: back to the
     speed of the approach.
 
@@ -131,13 +131,13 @@ class ForceLoop(Readable):
         write_text(Path(path), self.gains.to_toml())
 
     def reset(self) -> None:
-        """Back into the air, knowing nothing."""
+        """Returns to free motion and forgets the surface."""
         self._state[:] = 0.0
         self._state[:STATE] = flattened(self.gains.cautious().start())
 
     @property
     def desired(self) -> float:
-        """F_d [N]."""
+        """Desired force F_d [N]."""
         return self._desired
 
     @desired.setter
@@ -165,14 +165,14 @@ class ForceLoop(Readable):
     def estimate(self) -> SurfaceEstimate | None:
         """Estimate of the surface; None in free motion and until there is one."""
         s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
-        if s[PHASE] == AIR or s[STD] == 0.0:
+        if s[PHASE] == FREE_MOTION or s[STD] == 0.0:
             return None
-        found, std = (Vec3(*s[at : at + 3].tolist()) for at in (FOUND, STD))
+        found, std = (Vec3(*s[at : at + 3].tolist()) for at in (VALUE, STD))
         return surface_estimate(cap, theta, found, std, float(s[BOUND]))
 
     @property
     def phase(self) -> str:
-        """`air`, `learning` or `locked`."""
+        """`free motion`, `learning` or `locked`."""
         return PHASES[float(self._state[PHASE])]
 
     @property
@@ -182,7 +182,7 @@ class ForceLoop(Readable):
 
     @property
     def noise(self) -> float:
-        """Standard deviation of a force reading, as measured in the air [N]."""
+        """Standard deviation of a force reading, as measured in free motion [N]."""
         return float(np.sqrt(self._state[VARIANCE]))
 
     @property

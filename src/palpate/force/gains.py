@@ -43,9 +43,6 @@ _DIGIT = 1e-5
 _TOUCH = 0.5
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; on a surface with a damping ratio of 1
 the damping's 2 v sqrt(K m) is then F_d."""
-_LEANING = 2.0 / 3.0
-"""Share of F_d that a servo may lean on a surface with by its own damper, D v, as it touches: half as much again
-is left for the swing of its tip."""
 _BRISK = 1.15
 """Of the speed that the law itself asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
 (benchmarks/force/first_touches.py)."""
@@ -84,7 +81,7 @@ class Gains(Table):
     cap: Positive
     """Largest K + B/theta of any surface that there may be [N/m]."""
     approach: Positive
-    """Speed in the air [m/s]."""
+    """Speed in free motion [m/s]."""
     force_limit: Positive
     """Above which the tip withdraws [N]."""
     level: Positive
@@ -144,7 +141,7 @@ class Gains(Table):
 
     @property
     def floor(self) -> float:
-        """Lowest K_u [N/m]."""
+        """Lowest K_u that the law uses [N/m]."""
         return max(_SLOWEST * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
 
     @property
@@ -158,7 +155,7 @@ class Gains(Table):
         return max(DRIFT, self.arm.sensor.drift or 0.0)
 
     def cautious(self) -> Cautious:
-        """The law's numbers."""
+        """Numbers of the compiled law."""
         arm = self.arm
         low_pass = arm.low_pass
         memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
@@ -187,7 +184,7 @@ class Gains(Table):
         return hashlib.sha256(msgspec.json.encode(known)).hexdigest()
 
     def to_toml(self) -> str:
-        """The file's text."""
+        """Text of the gains file."""
         return "# Made by palpate tune; ForceLoop.load takes it.\n" + _toml(msgspec.to_builtins(self))
 
 
@@ -271,7 +268,7 @@ def _any_noise(arm: Arm) -> Arm:
 
 
 def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: float = ALPHA) -> float:
-    """Highest speed in the air [m/s]: what a touch at K_u = cap bears, and what the tip's mass allows.
+    """Highest speed in free motion [m/s]: what a touch at K_u = cap bears, and what the tip's mass allows.
 
     Args:
         arm: what moves.
@@ -283,8 +280,26 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
     speed = min(arm.limits.speed, _BRISK * alpha * force / (theta * arm.seen(cap)))
     mass = arm.inner.mass
     if isinstance(arm.inner, ServoLoop):
-        speed = min(speed, _LEANING * force / arm.inner.damping)
+        return min(speed, force / touch_peak(arm.inner, theta, cap))
     return speed if mass is None else min(speed, _TOUCH * force / float(np.sqrt(cap * mass)))
+
+
+def touch_peak(servo: ServoLoop, theta: float, stiffness: float) -> float:
+    """Largest force within theta of the touch of a servo whose command goes on, over its speed [N s/m].
+
+    m xddot = K_s (x_c - x) - D xdot - K x from x = 0, x_c = D v/K_s and the speed v of both on.
+    """
+    from scipy.linalg import expm
+
+    n, own = 200, servo.stiffness / servo.mass
+    rates = np.zeros((4, 4))  # of x, xdot, x_c and the constant speed of the command
+    rates[0, 1] = rates[2, 3] = 1.0
+    rates[1, :3] = -own - stiffness / servo.mass, -servo.damping / servo.mass, own
+    step, state, most = expm(theta / n * rates), np.array([0.0, 1.0, servo.lag, 1.0]), 0.0
+    for _ in range(n):
+        state = step @ state
+        most = max(most, stiffness * float(state[0]))
+    return most
 
 
 def followed(arm: Arm) -> tuple[Mat3, Vec3, Vec3, Vec3]:

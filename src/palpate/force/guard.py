@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate.force.backstop import MOST
-from palpate.force.contact_evidence import AIR, MEMORY, Watch
+from palpate.force.contact_estimate import ContactEstimate
+from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch
 from palpate.force.law import Cautious, CautiousState
-from palpate.force.learned import Learned
 from palpate.force.stage import LEARNING, LOCKED, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
 
@@ -25,7 +25,7 @@ TROUBLES = {
     "a motor is at its limit, or something blocks the tip: it was held",
     PULLED: "the force is negative beyond its noise: its sign is turned, or the sensor was not tared in free motion; "
     "the tip was held",
-    DRIFTS: "the sensor drifts in free motion, and its bias is followed: tare it again before the next press",
+    DRIFTS: "the sensor drifts in free motion, and its bias is next_follow: tare it again before the next press",
     UNTARED: "the sensor shows a force that does not follow the tip, beyond a tenth of the force asked for: the tip "
     "was held; tare the sensor in free motion",
     BOUNCED: "contact was lost three times before the force was held: the surface is far stiffer than the gains' cap, "
@@ -74,7 +74,7 @@ def safe_step(law, state, guard, desired, force, position, missed):
         return 0.0, state, SafetyState(silent + 1.0, unchanged, way, vain, reached, touched, losses, BLIND)
     gap = guard.silent > 0.0 or not missed <= 0.0
     if guard.silent > lag or not missed <= lag:  # too long to go on from what was known
-        state = renewed(law, state)
+        state = restart(law, state)
     elif gap:
         state = after_gap(state)
     unchanged = guard.unchanged + 1.0 if force == state.watch.last and state.ticks > 0.0 else 0.0
@@ -83,9 +83,9 @@ def safe_step(law, state, guard, desired, force, position, missed):
     way = guard.way + law.tick * abs(wanted) if unchanged > 0.0 else 0.0
     touched, losses = losses_of(law, guard, after)
     guard = SafetyState(0.0, unchanged, way, vain, reached, touched, losses, LATE if gap else FINE)
-    speed, trouble = allowed(law, guard, after, desired, force, wanted)
+    speed, trouble = allowed_speed(law, guard, after, desired, force, wanted)
     if not abs(speed) <= law.speed:  # nothing that is not finite, or too fast, leaves
-        return 0.0, renewed(law, state), SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BLIND)
+        return 0.0, restart(law, state), SafetyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, BLIND)
     return speed, after, SafetyState(0.0, unchanged, way, vain, reached, touched, losses, trouble)
 
 
@@ -117,12 +117,12 @@ class Guarded(NamedTuple):
         return speed, GuardedState(law, guard)
 
     def stiffness_bound(self, state):
-        """K_u [N/m]."""
+        """Upper bound K_u of the stiffness [N/m]."""
         return state.law.bound.used
 
 
 @law
-def allowed(law, guard, after, desired, force, speed):
+def allowed_speed(law, guard, after, desired, force, speed):
     """Speed that the readings allow [m/s], and the trouble that limits it."""
     withdrawal, felt = -after.backstop.care * law.approach, after.watch.mean - after.watch.rest
     if abs(force) >= 0.99 * law.full_scale:
@@ -135,7 +135,7 @@ def allowed(law, guard, after, desired, force, speed):
         return 0.0, STALE
     if guard.vain > FARTHEST * desired:
         return 0.0, UNREACHED
-    if after.backstop.bounces >= MOST and after.stage.phase == AIR:
+    if after.backstop.bounces >= MOST and after.stage.phase == FREE_MOTION:
         return 0.0, BOUNCED
     if follows_no_tip(law, after) and abs(after.watch.slow) >= law.bias:
         return 0.0, UNTARED
@@ -144,7 +144,10 @@ def allowed(law, guard, after, desired, force, speed):
     if guard.losses >= MOST and after.stage.phase == LEARNING and guard.trouble == FINE:
         return speed, SWINGS
     drifts = abs(after.watch.drift) > SEEN * (after.watch.variance * law.period) ** 0.5
-    return speed, DRIFTS if drifts and guard.trouble == FINE and after.stage.phase == AIR else guard.trouble
+    return (
+        speed,
+        DRIFTS if drifts and guard.trouble == FINE and after.stage.phase == FREE_MOTION else guard.trouble,
+    )
 
 
 @law
@@ -154,7 +157,7 @@ def losses_of(law, guard, after):
     A second of free motion forgets both.
     """
     stage, w = after.stage, after.watch
-    if stage.phase == LOCKED or (stage.phase == AIR and stage.since * law.tick > MEMORY):
+    if stage.phase == LOCKED or (stage.phase == FREE_MOTION and stage.since * law.tick > MEMORY):
         return 0.0, 0.0
     if guard.touched > 0.0 and stage.firm == 0.0:
         return 0.0, guard.losses + 1.0
@@ -169,38 +172,38 @@ def is_stale(law, guard, after):
     """
     if guard.unchanged <= max(law.theta, 5.0 * law.period) / law.tick:
         return False
-    return guard.way * law.cap * max(after.known.found.x, 0.0) >= 3.0 * law.resolution
+    return guard.way * law.cap * max(after.estimate.value.x, 0.0) >= 3.0 * law.resolution
 
 
 @law
 def in_vain(law, guard, after, desired, speed):
     """Force that the command should have added since the error last fell, and the force from which that counts [N]."""
-    stiffness, felt = law.cap * max(after.known.found.x, 0.0), after.watch.mean - after.watch.rest
-    low = felt < (1.0 - NEAR) * desired and after.stage.phase != AIR
+    stiffness, felt = law.cap * max(after.estimate.value.x, 0.0), after.watch.mean - after.watch.rest
+    low = felt < (1.0 - NEAR) * desired and after.stage.phase != FREE_MOTION
     if not low or abs(felt - guard.reached) > NEAR * desired:
         return 0.0, felt
     return guard.vain + law.tick * speed * stiffness / (1.0 + law.compliance * stiffness), guard.reached
 
 
 @law
-def renewed(law, state):
-    """In free motion, knowing nothing but the sensor's noise and bias."""
+def restart(law, state):
+    """Free motion, of which only the sensor's noise and bias are known."""
     s, w = law.start(), state.watch
     watch = Watch(
-        0.0, 0.0, 0.0, w.rest, w.rest, w.rest, w.drift, w.peak, w.variance, w.tide, 0.0, w.fresh, 0.0,
+        0.0, 0.0, 0.0, w.rest, w.rest, w.rest, w.drift, w.peak, w.variance, w.slow_variance, 0.0, w.fresh, 0.0,
         law.period / law.tick, w.steepest,
     )  # fmt: skip
     return CautiousState(
-        s.ticks, s.desired, watch, s.follow, s.stage, s.known, s.starts, s.bound, state.backstop, s.pace
+        s.ticks, s.desired, watch, s.follow, s.stage, s.estimate, s.starts, s.bound, state.backstop, s.pace
     )
 
 
 @law
 def after_gap(state):
     """The low-pass has to forget the gap before anything is learned."""
-    k = state.known
-    known = Learned(k.slow, k.fast, 0.0, k.origin, k.shown, k.found, k.std)
+    k = state.estimate
+    estimate = ContactEstimate(k.slow, k.fast, 0.0, k.origin, k.shown, k.value, k.std)
     return CautiousState(
-        state.ticks, state.desired, state.watch, state.follow, state.stage, known, state.starts, state.bound,
+        state.ticks, state.desired, state.watch, state.follow, state.stage, estimate, state.starts, state.bound,
         state.backstop, state.pace,
     )  # fmt: skip

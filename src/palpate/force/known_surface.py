@@ -31,7 +31,7 @@ class Assumed(NamedTuple):
     why: str
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """The surface as plain values for JSON."""
         return {"value": _finite(self.value), "unit": self.unit, "why": self.why}
 
 

@@ -4,8 +4,8 @@
     g = alpha / (theta (1 - rho (K_u + K_s/2)/(K_u + K_s)) K_eff(K_u))
     K_u = max of (1 + eps) K^ + z sd and 0.52 ((1 + eps)(K^ + B^/theta) + z sd)
 
-Damping is lead, so that a bound of the stiffness alone is enough until B/K is above 0.9 theta. In the air K_u is the
-stiffest surface that there may be, so that approach and touch follow from the same law. It is written once, in
+Damping is lead, so that a bound of the stiffness alone is enough until B/K is above 0.9 theta. In free motion K_u is
+the stiffest surface that there may be, so that approach and touch follow from the same law. It is written once, in
 operators: compiled in `ForceLoop`, in the simulator and on the bench, plain in a debugger.
 """
 
@@ -13,13 +13,22 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.backstop import MOST, Backstop, guarded
-from palpate.force.contact_evidence import AIR, Steepest, Watch, behind, listened, retared, watched, white
-from palpate.force.learned import Learned, begun, taken
+from palpate.force.backstop import MOST, Backstop, next_backstop
+from palpate.force.contact_estimate import ContactEstimate, first_estimate, next_estimate
+from palpate.force.contact_evidence import (
+    FREE_MOTION,
+    Steepest,
+    Watch,
+    behind,
+    next_starts,
+    next_watch,
+    tare,
+    white,
+)
 from palpate.force.onset import NO_STARTS, Starts
 from palpate.force.regression import NOTHING, Fit
-from palpate.force.stage import STEP, Stage, is_false, staged
-from palpate.force.stiffness_bound import Bound, Sure, bounded
+from palpate.force.stage import STEP, Stage, is_false_touch, next_stage
+from palpate.force.stiffness_bound import EARNED, Bound, Sure, next_bound
 
 SMOOTHING = 0.1
 """Of a servo's lag in free motion, by which its lead is smoothed: the usual filter of a PID controller's derivative,
@@ -98,17 +107,19 @@ class Cautious(NamedTuple):
     backing: float
 
     def start(self):
-        """In the air, knowing nothing."""
+        """Free motion, with no estimate of a surface."""
         fit, variance = Fit(NOTHING, ZERO3), max(self.noise * self.noise, self.least)
-        tide, steepest = white(self, variance), Steepest(0.0, 0.0, 0.0, 0.0)
-        watch = Watch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, tide, 0.0, 0.0, 0.0, 0.0, steepest)
+        slow_variance, steepest = white(self, variance), Steepest(0.0, 0.0, 0.0, 0.0)
+        watch = Watch(
+            0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, slow_variance, 0.0, 0.0, 0.0, 0.0, steepest
+        )
         return CautiousState(
             0.0,
             0.0,
             watch,
             Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
-            Stage(AIR, 0.0, 0.0, 0.0),
-            Learned(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
+            Stage(FREE_MOTION, 0.0, 0.0, 0.0),
+            ContactEstimate(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
             NO_STARTS,
             Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0)),
             Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -118,32 +129,35 @@ class Cautious(NamedTuple):
     def step(self, state, desired, force, position):
         """One tick: speed of the commanded position [m/s], from the forces [N] and the measured position [m]."""
         before = state.desired if state.ticks > 0.0 else desired
-        follow = followed(self, state, position)
-        starts = listened(self, state, follow, force)
-        watch = watched(self, state, starts, force)
-        false = is_false(self, state, watch)
-        stage = staged(self, state, watch, desired, before, false)
-        if false:
-            watch = retared(self, watch)
-        start = begun(self, state.known, state.stage, stage, watch, follow, starts, behind(self, state))
-        known = taken(self, start, state, stage, watch, follow, force)
-        bound = bounded(self, state.bound, stage, known, watch, follow)
-        backstop = guarded(self, state.backstop, state.stage, stage, watch, desired, before)
+        follow = next_follow(self, state, position)
+        starts = next_starts(self, state, follow, force)
+        watch = next_watch(self, state, starts, force)
+        false_touch = is_false_touch(self, state, watch)
+        stage = next_stage(self, state, watch, desired, before, false_touch)
+        if false_touch:
+            watch = tare(self, watch)
+        start = first_estimate(
+            self, state.estimate, state.stage, stage, watch, follow, starts, behind(self, state)
+        )
+        estimate = next_estimate(self, start, state, stage, watch, follow, force)
+        bound = next_bound(self, state.bound, stage, estimate, watch, follow)
+        backstop = next_backstop(self, state.backstop, state.stage, stage, watch, desired, before)
         u = backstop.care * gain(self, bound.used) * (desired - (force - watch.rest))
         forward = 0.0
-        if stage.phase != AIR and abs(desired - before) <= STEP * abs(desired):
+        if stage.phase != FREE_MOTION and abs(desired - before) <= STEP * abs(desired):
             forward = (desired - before) / self.tick * (self.compliance + 1.0 / bound.used)
         limit = bound.sure.limit
         speed = max(min(u + forward, limit), -limit)
-        if stage.phase == AIR:
+        if stage.phase == FREE_MOTION:
             speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
-        speed, pace = leading(self, state.pace, speed, bound.used, limit)
+        most = self.speed if limit > EARNED * self.approach else limit
+        speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
         return speed, CautiousState(
-            state.ticks + 1.0, desired, watch, follow, stage, known, starts, bound, backstop, pace
+            state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace
         )  # fmt: skip
 
     def stiffness_bound(self, state):
-        """K_u [N/m]."""
+        """Upper bound K_u of the stiffness [N/m]."""
         return state.bound.used
 
 
@@ -165,7 +179,7 @@ class CautiousState(NamedTuple):
     watch: Watch
     follow: Follow
     stage: Stage
-    known: Learned
+    estimate: ContactEstimate
     starts: Starts
     bound: Bound
     backstop: Backstop
@@ -173,12 +187,14 @@ class CautiousState(NamedTuple):
 
 
 @law
-def leading(law, pace, speed, bound, limit):
+def lead_speed(law, pace, speed, bound, limit):
     """Speed of the command, and the smoothed speed, both of which are the law's own speed but for a servo [m/s].
 
     A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
     m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
-    that it stays the speed that the tip can have.
+    that it stays the speed that the tip can have. The speed that a test has borne out is the tip's: the command is
+    then ahead of it by up to the arm's own limit. Before, a tip that gathers speed slowly touches gently where a sensor
+    lied: measured by benchmarks/force/free_motion.py.
     """
     if law.lead == 0.0:
         return speed, speed
@@ -192,14 +208,14 @@ def leading(law, pace, speed, bound, limit):
 
 @law
 def gain(law, bound):
-    """g [m/(s N)]."""
+    """Gain g from force error to speed [m/(s N)]."""
     felt = law.compliance * bound
     lag = law.theta * (1.0 - law.relief * (felt + 0.5) / (felt + 1.0))
     return law.alpha / lag * (law.compliance + 1.0 / bound)
 
 
 @law
-def followed(law, state, position):
+def next_follow(law, state, position):
     """This tick's position as the sensor saw it."""
     f = state.follow
     if state.ticks < 1.0:

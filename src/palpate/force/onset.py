@@ -1,9 +1,9 @@
 """Since when there is contact: lines fitted to the force from several starts back, the likeliest of which is taken.
 
-In the air the tip moves evenly, so that a touch is a step (damping, times the speed) and a ramp (stiffness) from some
-place on, and nothing before. For each of six starts, every one about twice as far back as the one before, the line
-through the force since then is fitted; the rest of the past counts as air. That is the profile likelihood of the start
-(generalised likelihood ratio), with starts so dense that at most an eighth of the evidence is lost.
+In free motion the tip moves evenly, so that a touch is a step (damping, times the speed) and a ramp (stiffness) from
+some place on, and nothing before. For each of six starts, every one about twice as far back as the one before, the
+line through the force since then is fitted; the rest of the past counts as free motion. That is the profile likelihood
+of the start (generalised likelihood ratio), with starts so dense that at most an eighth of the evidence is lost.
 """
 
 from typing import NamedTuple
@@ -22,12 +22,12 @@ class Line(NamedTuple):
     f: float
     uf: float
 
-    def taking(self, x, force):
+    def with_reading(self, x, force):
         """With one more reading."""
         u = x - self.x
         return Line(self.x, self.n + 1.0, self.u + u, self.uu + u * u, self.f + force, self.uf + u * force)
 
-    def solved(self):
+    def solution(self):
         """Slope [N/m], force at the start [N] and what both explain of the sum of squares [N^2]; neither negative."""
         spread = self.n * self.uu - self.u * self.u
         if not (spread > 1e-9 * self.n * self.uu):  # the tip stands: there is no slope
@@ -43,7 +43,7 @@ class Line(NamedTuple):
 
     def shown(self, behind):
         """Explained variance beside a rest that is the mean of so many readings, whose own error explains as much."""
-        return self.solved()[2] / (1.0 + self.n / behind)
+        return self.solution()[2] / (1.0 + self.n / behind)
 
 
 EMPTY = Line(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -82,13 +82,13 @@ def later(starts, every, x, force):
             a = new
         new = Line(x, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Starts(
-        n + 1.0, new.taking(x, force), a.taking(x, force), b.taking(x, force), c.taking(x, force),
-        d.taking(x, force), old.taking(x, force),
+        n + 1.0, new.with_reading(x, force), a.with_reading(x, force), b.with_reading(x, force),
+        c.with_reading(x, force), d.with_reading(x, force), old.with_reading(x, force),
     )  # fmt: skip
 
 
 @law
-def explained(starts, behind):
+def explained_variance(starts, behind):
     """Sum of squares that the likeliest line explains [N^2], see `Line.shown`."""
     _, _, a, b, c, d, old = starts
     return max(a.shown(behind), b.shown(behind), c.shown(behind), d.shown(behind), old.shown(behind))
@@ -96,7 +96,7 @@ def explained(starts, behind):
 
 @law
 def latest(starts, behind, least):
-    """The line of the latest start that explains as much as that [N^2]; an earlier one has air in it, and is flat."""
+    """The line of the latest start that explains so much [N^2]; an earlier one includes free motion, and is flat."""
     if starts.a.shown(behind) >= least:
         return starts.a
     if starts.b.shown(behind) >= least:

@@ -25,12 +25,12 @@ class Fit(NamedTuple):
     N: Mat3
     r: Vec3
 
-    def taking(self, phi, force, weight, keep):
+    def with_reading(self, phi, force, weight, keep):
         """With one more sample of that weight [1/N^2], the old ones faded by `keep`."""
         N = keep * self.N + (1.0 - keep) * PRIOR + weight * outer(phi, phi)
         return Fit(N, keep * self.r + (weight * force) * phi)
 
-    def solved(self):
+    def solution(self):
         """K, B/theta and the offset."""
         return solve(self.N, self.r)
 
@@ -52,7 +52,7 @@ def fit_of(line, unit, origin, pace, rest, variance):
         rest: force at rest [N].
         variance: of a reading [N^2].
     """
-    _, level, _ = line.solved()
+    _, level, _ = line.solution()
     d, w = line.x - origin, 1.0 / variance
     n, f = line.n, line.f + line.n * rest
     x = unit * (line.u + n * d)

@@ -30,7 +30,7 @@ class Law:
 
 
 def law_for(arm: Arm, gain: float, bound: float) -> Law:
-    """The law with a gain g [m/(s N)] at K_u = bound [N/m]: with a servo's lead, as `law.leading` has it."""
+    """The law with a gain g [m/(s N)] at K_u = bound [N/m]: with a servo's lead, as `law.lead_speed` has it."""
     inner = arm.inner
     if not isinstance(inner, ServoLoop):
         return Law(gain)

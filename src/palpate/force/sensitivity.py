@@ -41,16 +41,16 @@ def sensitivity(loop: SampledLoop, gain: float, stiffness: float, damping: float
 def relief_of(arm: Arm, theta: float, alpha: float) -> float:
     """rho: on a surface of stiffness K the lag is shorter by this share times (K + K_s/2)/(K + K_s).
 
-    Most of a torque arm's lag is its spring and damper, K_s and D, not delay, and the stiffer the surface beside the
-    spring, the shorter it is. The largest share that keeps the sensitivity below `PEAK` on every stiffness; 0 for a
-    position arm, whose tip does not feel the surface, and for a servo, whose lead takes its place.
+    Most of the lag of an arm that yields is its spring and damper, K_s and D, not delay, and the stiffer the surface
+    beside the spring, the shorter it is. The largest share that keeps the sensitivity below `PEAK` on every stiffness;
+    0 for a position arm, whose tip does not feel the surface.
 
     Args:
         arm: what moves.
         theta: [s].
         alpha: gain in units of 1/theta.
     """
-    if arm.kind != "torque":
+    if arm.kind == "position":
         return 0.0
     loop, found = SampledLoop(arm), MOST
     for K in np.geomspace(0.01 * arm.series, arm.limits.stiffness, _STIFFNESSES).tolist():

@@ -84,7 +84,7 @@ def pressed(
     waiting: Callable[[], None] | None = None,
     error: Array | None = None,
 ) -> Array:
-    """A run from the air: force on the surface (mean of each tick), K_u, position, speed and reading, shape (n, 5).
+    """A run from free motion: force on the surface (mean of each tick), K_u, position, speed and reading, shape (n, 5).
 
     Args:
         world: arm and sensor.

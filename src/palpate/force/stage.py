@@ -1,10 +1,10 @@
-"""Where in a press the loop is: in the air, learning the surface, or locked on what it knows of it."""
+"""Phase of a press: free motion, learning the surface, or locked on its estimate."""
 
 from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import sqrt
-from palpate.force.contact_evidence import AIR, CONTACT, PLAIN
+from palpate.force.contact_evidence import CONTACT, FREE_MOTION, PLAIN
 
 LEARNING, LOCKED = 1.0, 2.0
 """Phases after `AIR`."""
@@ -14,7 +14,7 @@ STEP = 0.02
 
 @part
 class Stage(NamedTuple):
-    """Where in a press the loop is."""
+    """Phase of a press, and how long it has lasted."""
 
     phase: float
     since: float  # ticks in it
@@ -23,15 +23,17 @@ class Stage(NamedTuple):
 
 
 @law
-def staged(law, state, w, desired, before, false):
-    """Where in a press this tick is, `false` if what was taken for a touch was the sensor's bias."""
+def next_stage(law, state, w, desired, before, false_touch):
+    """Phase of this tick; `false_touch` says that a suspected touch was the sensor's bias."""
     stage, felt = state.stage, w.mean - w.rest
     since = stage.since + 1.0
     firm = stage.firm + 1.0 if felt > sqrt(w.variance) else 0.0
-    if stage.phase == AIR:
-        return Stage(LEARNING, 0.0, 0.0, firm) if w.evidence >= CONTACT else Stage(AIR, since, 0.0, firm)
-    if w.evidence <= 0.0 or false:
-        return Stage(AIR, 0.0, 0.0, 0.0)
+    if stage.phase == FREE_MOTION:
+        return (
+            Stage(LEARNING, 0.0, 0.0, firm) if w.evidence >= CONTACT else Stage(FREE_MOTION, since, 0.0, firm)
+        )
+    if w.evidence <= 0.0 or false_touch:
+        return Stage(FREE_MOTION, 0.0, 0.0, 0.0)
     if stage.phase == LOCKED and abs(desired - before) > 0.2 * abs(before):
         return Stage(LEARNING, 0.0, 0.0, firm)
     quiet = stage.quiet + 1.0 if abs(desired - felt) < 0.07 * abs(desired) else 0.0
@@ -41,7 +43,7 @@ def staged(law, state, w, desired, before, false):
 
 
 @law
-def is_false(law, state, w):
+def is_false_touch(law, state, w):
     """Whether what was taken for a touch is the sensor's bias."""
     return follows_no_tip(law, state) and abs(w.slow) < law.bias
 
@@ -49,7 +51,7 @@ def is_false(law, state, w):
 @law
 def follows_no_tip(law, state):
     """Whether the force of a touch neither rises nor falls with the tip by as much as the softest surface's would."""
-    known = state.known
-    if known.std.x == 0.0 or state.stage.phase == AIR or state.bound.sure.stiffness > 0.0:
+    estimate = state.estimate
+    if estimate.std.x == 0.0 or state.stage.phase == FREE_MOTION or state.bound.sure.stiffness > 0.0:
         return False
-    return (abs(known.found.x) + PLAIN * known.std.x) * law.cap * law.approach < law.drift
+    return (abs(estimate.value.x) + PLAIN * estimate.std.x) * law.cap * law.approach < law.drift

@@ -32,7 +32,7 @@ class Step:
 
     @property
     def overshoot(self) -> float:
-        """Over F_d."""
+        """Overshoot beyond the desired force, over F_d."""
         return max(float(self.force.max()) - 1.0, 0.0)
 
     @property

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import sqrt
-from palpate.force.contact_evidence import AIR, EDGE, EVIDENT, FEWEST, PLAIN
+from palpate.force.contact_evidence import EDGE, EVIDENT, FEWEST, FREE_MOTION, PLAIN
 from palpate.force.regression import AXIS_K, BOTH
 from palpate.force.stage import LOCKED
 
@@ -54,7 +54,7 @@ class Sure(NamedTuple):
 
 @part
 class Bound(NamedTuple):
-    """K_u."""
+    """Upper bound K_u of the stiffness."""
 
     used: float  # [N/m]
     held: float  # what is evident of it: `used` but for a suspicion while it is locked [N/m]
@@ -65,32 +65,32 @@ class Bound(NamedTuple):
 
 
 @law
-def bounded(law, bound, stage, known, w, f):
+def next_bound(law, bound, stage, estimate, w, f):
     """K_u at this tick: what all since the touch allows; locked, what was known then or has become evident since.
 
     Locked, it rises at once where the last theta alone is by `z` standard deviations for a stiffer surface. Noise is so
     too, now and then: the rise is taken back unless the readings bear it out, so that it adds up to nothing.
     """
-    if stage.phase == AIR:
-        x = trailed(law, bound.sure, f)
+    if stage.phase == FREE_MOTION:
+        x = trail(law, bound.sure, f)
         return Bound(
             bound.most, bound.most, bound.most, 0.0, 0.0, Sure(0.0, x, 0.0, law.approach, 0.0, f.y - x)
         )
     if bound.sure.stiffness == 0.0:
         unsure = Sure(
-            0.0, trailed(law, bound.sure, f), 0.0, bound.sure.limit, bound.sure.refuted, bound.sure.way
+            0.0, trail(law, bound.sure, f), 0.0, bound.sure.limit, bound.sure.refuted, bound.sure.way
         )
         bound = Bound(bound.used, bound.held, bound.most, bound.least, bound.calm, unsure)
-    if known.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
+    if estimate.since * law.tick < law.blind or stage.since * law.tick < SURE * law.period:
         return bound
-    p, alone, both = known.fast.solved(), known.fast.std(AXIS_K), known.fast.std(BOTH)
+    p, alone, both = estimate.fast.solution(), estimate.fast.std(AXIS_K), estimate.fast.std(BOTH)
     most = max(bound.most, (1.0 + law.eps) * highest(law, p, -SHOWN * alone, -SHOWN * both))
     upper = min((1.0 + law.eps) * highest(law, p, law.z * alone, law.z * both), most)
     if stage.phase != LOCKED:
-        sure = borne_out(law, bound.sure, known, w, f)
+        sure = borne_out(law, bound.sure, estimate, w, f)
         if sure.stiffness == 0.0:
             return Bound(most, most, most, bound.least, 0.0, sure)
-        now = max(from_slow(law, known, most), bound.least)
+        now = max(from_slow(law, estimate, most), bound.least)
         now = upper if highest(law, p, -alone, -both) > now else now
         return Bound(now, now, most, bound.least, 0.0, sure)
     held = bound.held
@@ -105,7 +105,7 @@ def bounded(law, bound, stage, known, w, f):
 
 
 @law
-def borne_out(law, sure, known, w, f):
+def borne_out(law, sure, estimate, w, f):
     """Whether the force is surely that of a surface, and how fast the tip may be.
 
     It becomes so above the level, and above `SHOWED` times what free motion and any half of theta have shown, where the
@@ -129,28 +129,28 @@ def borne_out(law, sure, known, w, f):
         stopped
         and w.fresh > FEWEST
         and w.mean - w.rest > max(law.level, EDGE * sigma)
-        and known.found.x > 0.0
+        and estimate.value.x > 0.0
     ):
-        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
-    follows = (known.found.x - EDGE * known.std.x) * law.cap * law.approach > law.drift
+        return Sure(estimate.value.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
+    follows = (estimate.value.x - EDGE * estimate.std.x) * law.cap * law.approach > law.drift
     shown = w.mean - w.rest > level and w.slow - w.rest > SHOWED * w.peak
     if w.fresh > FEWEST and shown and follows:
-        return Sure(known.found.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
+        return Sure(estimate.value.x, f.y, w.mean, min(EARNED * law.approach, law.speed), 0.0, 0.0)
     return Sure(0.0, sure.x, 0.0, law.approach, 0.0, sure.way)
 
 
 @law
-def trailed(law, sure, f):
+def trail(law, sure, f):
     """Position of theta/2 ago, smoothed, as long as nothing is sure; where the tip is when that begins [m]."""
     return f.y if sure.stiffness > 0.0 else sure.x + 2.0 * law.tick / law.theta * (f.y - sure.x)
 
 
 @law
-def from_slow(law, known, most):
+def from_slow(law, estimate, most):
     """K_u as all since the touch allows: never below the bound, and the cap unless a surface is plain to see."""
-    p, sd = known.found, known.std
+    p, sd = estimate.value, estimate.std
     room = law.z * law.bounding / (1.0 + law.eps)
-    plain = known.shown > 0.0 or p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
+    plain = estimate.shown > 0.0 or p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
     if law.bounding > 0.0 and not plain:
         return most
     return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), most)

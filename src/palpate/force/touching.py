@@ -182,7 +182,7 @@ def moved(world, surface, body, held, t, h, noise, at, error):
 
 @law
 def touch(world, surface, control, start, desired, noise, error, line, out):
-    """A run from the air: row k of `out` is force on the surface (mean of the tick), K_u, position, speed, reading.
+    """A run from free motion: row k of `out` is force on the surface (mean of the tick), K_u, position, speed, reading.
 
     Args:
         world: arm and sensor.

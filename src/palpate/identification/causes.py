@@ -28,7 +28,7 @@ _CAUSES = {
     "lag": Cause("the uncalibrated lag of the force", "calibrate the lag and give it with --lag"),
     "other forces": Cause(
         "drift, friction or relaxation beside the model",
-        "let the log begin and end in the air, and press more often",
+        "let the log begin and end in free motion, and press more often",
     ),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
@@ -55,7 +55,7 @@ _CAUSES = {
         "move more slowly, log faster, or give --bonded",
     ),
     "tool's inertia": Cause(
-        "the tool's own inertia", "move faster in the air, or compensate the inertia beforehand"
+        "the tool's own inertia", "move faster in free motion, or compensate the inertia beforehand"
     ),
     "position noise": Cause("noise of the position", "measure the position finer, or move further"),
     "calibration": Cause("the scales of force and position", "calibrate force and position"),
@@ -66,7 +66,7 @@ _CAUSES = {
     "tangent": Cause("the slope of the press", "press more often", "A"),
     "the indenter's law": Cause("the deviation from the indenter's law", "press less deep"),
     "surface position": Cause(
-        "the position of the surface", "let the log begin in the air, and approach slowly"
+        "the position of the surface", "let the log begin in free motion, and approach slowly"
     ),
     "small strain": Cause("a strain that is not small", "press less deep"),
     "Poisson's ratio": Cause("Poisson's ratio", "give --poisson"),
@@ -128,7 +128,7 @@ class Code(Enum):
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
     LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."
-    FORCE_DRIFTS = "The force in the air changes during the log; the change is removed."
+    FORCE_DRIFTS = "The force in free motion changes during the log; the change is removed."
     FORCE_SIGN_REVERSED = "The force falls as the probe goes in; its sign was reversed."
     POSITION_SIGN_REVERSED = "The position falls as the probe goes in; its sign was reversed."
     LOW_RATE = "Rows are so rare that fast motion may be missed, and with it damping and mass."
@@ -145,10 +145,10 @@ class Code(Enum):
         "The contact's normal was estimated from the force, and its uncertainty matters for the parameters."
     )
     TOOL_INERTIA = (
-        "In the air the force follows the acceleration, as a mass beyond the sensor makes it. A negative mass is an"
+        "In free motion the force follows the acceleration, as a mass beyond the sensor makes it. A negative mass is an"
         " inertia compensated with the wrong sign, or twice. In contact a damping and a lag hide that."
     )
-    PAYLOAD_DOUBTFUL = "The sensor's readings in the air differ from the payload file's prediction."
+    PAYLOAD_DOUBTFUL = "The sensor's readings in free motion differ from the payload file's prediction."
     NEGATIVE_STIFFNESS = "The force falls as the penetration grows: no passive surface does that."
 
     @property

@@ -55,7 +55,7 @@ class Contacts:
             peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
         signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
             out of contact shows.
-        payload: mass that the force has in the air, counted into the surface; None if it has none.
+        payload: mass that the force has in free motion, counted into the surface; None if it has none.
         drift: of the force, straight lines of which were taken out; None if the log shows none.
         press: at constant speed, of a log that is little else; None of another.
     """
@@ -212,7 +212,7 @@ def _with_payload(found: Contacts, payload: Payload) -> Contacts:
 
 
 def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
-    """Where the probe is in the air; by the force without an inertia, if it shows one there and more air without it."""
+    """Where the probe is in free motion; by the force without an inertia, if that shows more of it."""
     force, position = chain(channels.force), chain(channels.position)
     ends = _ends(_calm(force, channels.dt))
     perhaps = free_motion_of(channels.force, channels.position, ends, none=False)
@@ -224,7 +224,7 @@ def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
 
 
 def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
-    """The same with the force in the air level from one stay to the next."""
+    """The same with the force in free motion level from one stay to the next."""
     rows: Array = np.arange(len(channels.force), dtype=np.float64)
     raw = channels.raw
     first = (raw.start - channels.start) / channels.dt

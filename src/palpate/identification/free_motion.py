@@ -1,4 +1,4 @@
-"""Where the probe is in the air: at one end of its range the position travels, and the force does not go with it."""
+"""Where the probe is in free motion: at one end of its range the position travels, and the force does not follow."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from palpate.signals.types import NORMAL
 Rows = Mask
 
 FLAT = 0.4
-"""Slope in the air over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 % of
-its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
+"""Slope in free motion over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 %
+of its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
 and of the constants below."""
 _SHARES = 0.5 ** (np.arange(2, 13) / 2)
-"""Of the position's range that may lie in the air, from a half to a sixty-fourth."""
+"""Of the position's range that may lie in free motion, from a half to a sixty-fourth."""
 _TWICE = 2.0
 """How much farther the position must travel at one end than at the other, if the force goes with it at neither: all of
 a log in which nothing is touched is such an end, and so is a damped oscillation's turn."""
 _FEWEST = 8
-"""Rows of a stay in the air: fewer have no slope."""
+"""Rows of a stay in free motion: fewer have no slope."""
 _MOST = 1 << 16
 """Rows that are looked at; more are averaged."""
 _SEEN = 10.0
@@ -46,7 +46,7 @@ _MIDDLE = (0.05, 0.95)
 
 
 _BENDS = 3
-"""Ways of a drift to bend between two stays in the air: the first three have five sixths of a random walk's power."""
+"""Ways of a drift to bend between stays in free motion: the first three have five sixths of a random walk's power."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Drift:
     """Drift of the force in free motion, and its uncertainty in between.
 
     Args:
-        times: of the stays in the air [s], shape (s,), two at least.
+        times: of the stays in free motion [s], shape (s,), two at least.
         levels: of the force there [N], shape (s,).
     """
 
@@ -86,7 +86,7 @@ class FreeMotion:
         way: 1 if the surface lies towards higher positions, -1 if towards lower.
         limit: position at which it may begin, at the earliest [m].
         rest: the force there [N], in the middle.
-        stays: middle row of each stay in the air, shape (s,).
+        stays: middle row of each stay in free motion, shape (s,).
         levels: middle force in each [N], shape (s,).
         drifts: they differ by more than their noise.
         noise: deviation of the force in a stay [N].
@@ -164,7 +164,7 @@ def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> flo
 
 
 def _noise(force: Array, levels: Array, stays: list[tuple[int, int]]) -> Noise:
-    """Of the force in the air."""
+    """Of the force in free motion."""
     rows, stay = _rows_of(stays)
     return noise_of(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
 
@@ -284,7 +284,7 @@ def _slope(
 _ACCELERATED = 10.0
 """Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
 _FEWEST_LEVEL = 20
-"""Rows of a stay in the air that its own level is taken from."""
+"""Rows of a stay in free motion that its own level is taken from."""
 _LEAST = 0.05
 """Of the sum of squares of the acceleration in the part that has most, what a part needs to tell the mass again."""
 _EXPLAINED = 0.5
@@ -295,7 +295,7 @@ by `benchmarks/identification/free_motion_constants.py`."""
 
 @dataclass(frozen=True)
 class Payload:
-    """A mass seen in the air [kg]: negative if more than the tool's inertia was taken out before.
+    """A mass seen in free motion [kg]: negative if more than the tool's inertia was taken out before.
 
     Args:
         mass, std: [kg].
@@ -307,7 +307,7 @@ class Payload:
     @property
     def text(self) -> str:
         """Its meaning, as a sentence."""
-        seen = f"in the air the force follows a mass of {self.mass:.3g} kg (std {self.std:.2g})"
+        seen = f"in free motion the force follows a mass of {self.mass:.3g} kg (std {self.std:.2g})"
         if self.mass > 0:
             return f"{seen}: it moves beyond the force sensor, and its inertia is removed"
         return f"{seen}: a tool's inertia was compensated with the wrong sign, or too much; it is restored"
@@ -316,7 +316,7 @@ class Payload:
 def payload_of(
     channels: Channels, chain: Chain, air: FreeMotion, lag: float, *, alone: bool = False
 ) -> Payload | None:
-    """The mass that the force in the air tells, both channels as they count in the log; None if it tells none.
+    """The mass that the force in free motion tells, both channels as they count in the log; None if it tells none.
 
     Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
 

@@ -282,7 +282,7 @@ def _leave_saturated(
 
 
 def _far_end(force: Array) -> list[float]:
-    """The ends of the range that are far from zero: near it rests a force in the air."""
+    """The ends of the range that are far from zero: near it rests a force in free motion."""
     ends = [float(force.max()), float(force.min())]
     far = max(abs(end) for end in ends)
     return [end for end in ends if abs(end) > far / 2]

@@ -87,7 +87,18 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution
     if problem.lag.std > 0 and not model.nonlinear:  # its column needs parameters that are roughly right
         exact = Linearisation.of(replace(problem, lag=replace(problem.lag, std=0.0)), model, segments, {})
         about = dict(zip(exact.names, estimate(exact.system).theta.tolist(), strict=True))
-    best = local = _start(Linearisation.of(problem, model, segments, about))
+    starts = _starts(Linearisation.of(problem, model, segments, about))
+    best, _ = min((_descent(start) for start in starts), key=lambda found: found[1])
+    return best, estimate(best.system)
+
+
+def _descent(start: Linearisation) -> tuple[Linearisation, float]:
+    """Form the columns again about what is found until it rests.
+
+    Returns:
+        The likeliest linearisation, and its misfit.
+    """
+    best = local = start
     places, least = list(local.searched), np.inf
     for _ in range(_ROUNDS if places else 0):
         here = held(local.system, local.searched)
@@ -101,37 +112,37 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution
             step = step / 2
         if np.all(np.abs(step) <= rests):
             break
-        local = Linearisation.of(problem, model, segments, best.moved(theta, step))
-    return best, estimate(best.system)
+        local = Linearisation.of(
+            start.problem, start.model, start.segments, best.moved(theta, step), best.use
+        )
+    return best, least
 
 
-def _start(local: Linearisation) -> Linearisation:
-    """The likeliest of some lags within two deviations of the prior, a radian of the fastest motion apart at most.
+def _starts(local: Linearisation) -> list[Linearisation]:
+    """Lags within two deviations of the prior that are likelier than their neighbours, a radian of the motion away.
 
     Nearer to each other no two lags fit, one by taking a mass or a damping for the other.
     """
     problem, lag = local.problem, local.problem.lag
-    if lag.std == 0:
-        return local
-    if not np.isfinite(problem.band):
-        return local
     reach = 2 * lag.std
-    count = 1 + int(np.ceil(2 * reach * 2 * np.pi * problem.band))
-    if count < 3:  # all of them are about where it starts
-        return local
-    fixed = {name: local.at[name] for name in local.at if name != LAG}
-    likeliest = local
-    least = local.misfit(held(local.system, local.searched))
+    count = 1 + int(np.ceil(4 * np.pi * reach * problem.band)) if np.isfinite(problem.band) else 0
+    if lag.std == 0 or count < 3:  # all of them are about where it starts
+        return [local]
+    fixed = {name: value for name, value in local.at.items() if name != LAG}
+    tried, misfits = [], [np.inf]
     for at in np.linspace(lag.value - reach, lag.value + reach, min(count, _STARTS)):
-        other = Linearisation.of(problem, local.model, local.segments, fixed | {LAG: float(at)})
+        about = fixed | {LAG: float(at)}
+        other = Linearisation.of(problem, local.model, local.segments, about, local.use)
         here = held(other.system, other.searched)
-        misfit = other.misfit(here)
-        if misfit < least:
-            likeliest, least = other, misfit
-            about = dict(zip(other.names, here.theta.tolist(), strict=True))
-    if likeliest is local:
-        return local
-    return Linearisation.of(problem, local.model, local.segments, about)
+        misfits.append(other.misfit(here))
+        tried.append(dict(zip(other.names, here.theta.tolist(), strict=True)))
+    return [
+        Linearisation.of(problem, local.model, local.segments, tried[i], local.use)
+        for i, (before, own, after) in enumerate(
+            zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
+        )
+        if own < before and own <= after
+    ]
 
 
 def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:

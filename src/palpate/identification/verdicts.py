@@ -175,15 +175,15 @@ def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] 
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
-    """Of a press at constant speed K is its tangent, unless a model alone knows it; such a motion shows no more."""
+    """Of a press at constant speed K is its tangent, unless a model knows it better; such a motion shows no more."""
     shown = {
         name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
         if p.verdict is Verdict.REJECTED
     }
-    K, tangent = parameters["K"], point.stiffness
-    kept = K.verdict is Verdict.IDENTIFIED and tangent.verdict is not Verdict.IDENTIFIED
-    return parameters | shown | {"K": K if kept else tangent}
+    both = [p for p in (point.stiffness, parameters["K"]) if p.verdict is Verdict.IDENTIFIED]
+    K = min(both, key=lambda p: p.std or np.inf, default=point.stiffness)
+    return parameters | shown | {"K": K}
 
 
 _STEADY = "the log does not show it: the probe moves at constant speed"
@@ -196,7 +196,7 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
 
     Args:
         parameters: as found.
-        weighed: a tool's inertia was found in the air and removed: it is not that, and K rests on the same fit.
+        weighed: a tool's inertia was found in free motion and removed: it is not that, and K rests on the same fit.
     """
     negative = [name for name, p in parameters.items() if _BELOW in p.reason]
     if "K" in negative:
@@ -210,10 +210,12 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     return parameters | {name: _reject(p, reason) for name, p in parameters.items() if name in touched}
 
 
-_UNSIGNED = "the log does not show the signs of force and position: begin it in the air, or give --force-sign"
+_UNSIGNED = (
+    "the log does not show the signs of force and position: begin it in free motion, or give --force-sign"
+)
 _UNTOUCHED = (
     "a power law needs depth and force from the touch on, and the log never leaves the surface:"
-    " let it begin in the air"
+    " let it begin in free motion"
 )
 
 

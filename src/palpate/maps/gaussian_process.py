@@ -9,16 +9,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangular
-from scipy.optimize import minimize
-from scipy.spatial.distance import cdist, pdist
+from scipy.linalg.lapack import dpotri
+from scipy.optimize import brentq, minimize
+from scipy.spatial.distance import cdist, pdist, squareform
+from scipy.stats import norm
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
 
 Posterior = Callable[[Array], tuple[float, Array]]
 """Minus the logarithm of a density, and its gradient."""
@@ -26,11 +28,17 @@ SMOOTH, ROUGH = 5.0**0.5, 3.0**0.5
 """Factors of the distance in the Matern correlations (eq. 4.17)."""
 BLOCK = 300
 """Presses of one likelihood: of more, random blocks are independent (composite likelihood), so that time is linear."""
-CHUNK = 8_000
+CHUNK = 16_000
 """Covariances of one part of a prediction: few enough for a processor's cache."""
-PRODUCT = 800_000
+PRODUCT = 500_000
 """Multiplications of one matrix product: so few that BLAS starts no threads of its own, which on a busy machine
 wait for each other a hundred times longer than they compute."""
+LEVEL = 0.05
+"""Share of values outside their intervals."""
+Z95 = float(norm.isf(LEVEL / 2.0))
+"""Half-width of a normal distribution's central 95 % over its standard deviation."""
+ROUNDING = 1e-3
+"""Share of the variance that rounding to single precision may take: a twentieth of a per cent of an interval."""
 LEAST_WEIGHT = 0.02
 """Of a set of parameters that counts; `benchmarks/maps/coverage.py` prints the same coverage without this bound."""
 
@@ -45,6 +53,7 @@ class Hyperparameters:
         rough: standard deviation of the rough process.
         short: its length scale [m].
         repeat: standard deviation from press to press at one place, beyond what each press states of itself.
+        shared: standard deviation of the error that the presses of one line have in common.
     """
 
     smooth: float
@@ -52,6 +61,7 @@ class Hyperparameters:
     rough: float
     short: float
     repeat: float
+    shared: float = 0.0
 
     def covariance(self, distance: Array) -> Array:
         """Covariance of the field at distances [m] of any shape."""
@@ -84,18 +94,22 @@ class Conditioned:
         values: (n,).
         noise: standard deviation of each value (n,).
         parameters: of the processes.
+        line: of each value, a number (n,); None where no values share an error.
     """
 
     places: Array
     values: Array
     noise: Array
     parameters: Hyperparameters
+    line: Array | None = None
 
     @cached_property
     def factor(self) -> Array:
         """Lower Cholesky factor of the values' covariance (n, n)."""
         K = self.parameters.covariance(cdist(self.places, self.places))
         K[np.diag_indices_from(K)] += self.noise**2 + self.parameters.repeat**2
+        if self.line is not None:
+            K += self.parameters.shared**2 * (self.line[:, None] == self.line)
         return cholesky(K, lower=True, check_finite=False)
 
     @cached_property
@@ -114,11 +128,16 @@ class Conditioned:
         out = _product(found.rows, parameters.covariance(cdist(self.places, places)))
         reduced, left = out[:-2], found.unknown - out[-1]
         total = np.outer(left, left) - _product(reduced.T, reduced)
-        upper = np.triu_indices(len(places), 1)
-        total[upper] += parameters.covariance(pdist(places))
-        total.T[upper] = total[upper]
+        total += squareform(parameters.covariance(pdist(places)))
         total[np.diag_indices_from(total)] += parameters.variance
         return total
+
+    def first(self, count: int) -> Conditioned:
+        """The same process, given the first values alone."""
+        line = None if self.line is None else self.line[:count]
+        return Conditioned(
+            self.places[:count], self.values[:count], self.noise[:count], self.parameters, line
+        )
 
     def leave_one_out(self) -> Array:
         """Deviation of each value from what the others foretell, by its standard deviation (n,) (section 5.4.2)."""
@@ -149,7 +168,7 @@ class Reduction:
 
     def predict(self, distance: Array) -> tuple[Array, Array]:
         """Mean and variance (..., m) of the field at distances (n, m) [m] from the values' places (eq. 2.42)."""
-        k, half = self.parameters.covariance(distance), len(distance) // 2
+        k, half = self.parameters.covariance(distance.astype(self.rows.dtype)), len(distance) // 2
         first = self.rows[..., :half, :half] @ k[..., :half, :]  # the inverse of the factor is triangular
         rest = self.rows[..., half:, :] @ k
         reduction = (np.einsum("...ij,...ij->...j", part, part) for part in (first, rest[..., :-2, :]))
@@ -168,8 +187,8 @@ class LogPrior:
     """Normal prior of the logarithms of the parameters.
 
     Args:
-        mean: of the logarithms, in the order of `Hyperparameters` (5,).
-        std: (5,).
+        mean: of the logarithms, in the order of `Hyperparameters` (d,).
+        std: (d,).
     """
 
     mean: Array
@@ -190,24 +209,42 @@ def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
 
-def loss(theta: Array, distance: Array, values: Array, noise: Array) -> tuple[float, Array]:
-    """Minus the restricted log likelihood, and its gradient (5,) by the logarithms theta (5,) (eqs. 5.8, 5.9)."""
+def loss(
+    theta: Array, distance: Array, values: Array, noise: Array, same: Mask | None = None
+) -> tuple[float, Array]:
+    """Minus the restricted log likelihood, and its gradient by the logarithms theta (eqs. 5.8, 5.9).
+
+    Args:
+        theta: logarithms of the parameters, of five or, with `same`, of all six.
+        distance: of each two places [m], as `scipy.spatial.distance.pdist` lists them.
+        values: (n,).
+        noise: standard deviation that each value states of itself (n,).
+        same: whether two values are of one line, listed as the distances.
+    """
     p = Hyperparameters(*np.exp(theta))
     s, r = SMOOTH / p.long * distance, ROUGH / p.short * distance
     fall_s, fall_r = p.smooth**2 * np.exp(-s), p.rough**2 * np.exp(-r)
     smooth, rough = (1.0 + s + s * s / 3.0) * fall_s, (1.0 + r) * fall_r
-    K = smooth + rough
-    K[np.diag_indices_from(K)] += noise**2 + p.repeat**2
+    slopes = [2.0 * smooth, s * s * (1.0 + s) / 3.0 * fall_s, 2.0 * rough, r * r * fall_r]
+    covariance = smooth + rough
+    if same is not None:
+        covariance += p.shared**2 * same
+        slopes.append(2.0 * p.shared**2 * same)
+    K = squareform(covariance)
+    K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2 + p.shared**2
     factor = cholesky(K, lower=True, check_finite=False)
-    P = cho_solve((factor, True), np.eye(len(values)), check_finite=False)
+    P, _ = dpotri(factor, lower=1)  # of 100 presses it starts no threads, nor do the sums below
+    P += np.tril(P, -1).T
     w = P.sum(axis=0)
     P -= np.outer(w, w) / w.sum()
-    a = P @ values
-    G = 0.5 * (P - np.outer(a, a))
-    slopes = (2.0 * smooth, s * s * (1.0 + s) / 3.0 * fall_s, 2.0 * rough, r * r * fall_r)
-    gradient = [np.vdot(G, slope) for slope in slopes] + [2.0 * p.repeat**2 * np.trace(G)]
+    a = np.einsum("ij,j", P, values)
+    G = P - np.outer(a, a)  # G / 2 is the derivative by the covariance; each pair stands in that twice
+    pairs, own = squareform(G, checks=False), np.trace(G)
+    gradient = [np.einsum("i,i", pairs, slope) for slope in slopes]
+    gradient.insert(4, 0.0)  # of two different values none is of the repetition
+    alone = own * np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2, p.shared**2])
     value = 0.5 * values @ a + np.log(np.diag(factor)).sum() + 0.5 * np.log(w.sum())
-    return float(value), np.array(gradient)
+    return float(value), np.array(gradient) + alone[: len(gradient)]
 
 
 @dataclass(frozen=True)
@@ -232,13 +269,43 @@ class GaussianProcess:
         """Standard deviation from press to press at one place, beyond what each press states."""
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
 
+    @property
+    def shared(self) -> float:
+        """Standard deviation of the error that the presses of one line have in common."""
+        return float(np.sqrt(self.weights @ [node.parameters.shared**2 for node in self.nodes]))
+
+    @cached_property
+    def z95(self) -> float:
+        """Half-width of the central 95 % over the standard deviation, for fields that are not normal, as beside edges.
+
+        The quantile of the deviations of values left out and of one unseen (conformal prediction; Vovk et al. 2005),
+        among which the normal distribution counts as so many values as have one outside.
+        """
+        found, normal = np.abs(self.likeliest.leave_one_out()), 1.0 / LEVEL
+        allowed = LEVEL * (normal + len(found) + 1.0) - 1.0
+
+        def excess(z: float) -> float:
+            return float(2.0 * normal * norm.sf(z) + np.sum(found > z)) - allowed
+
+        return float(brentq(excess, 0.0, max(5.0, *found)))
+
     @cached_property
     def _reduction(self) -> Reduction:
-        """Those of all nodes, one above the other."""
+        """Those of all nodes, one above the other; in single precision where rounding does not show.
+
+        Rounding is largest relative to the variance where that is least, at the values' own places.
+        """
         parts = [node.reduction for node in self.nodes]
         each = np.array([astuple(part.parameters) for part in parts]).T[:, :, None, None]
         scalars = np.array([(part.level, part.unknown, part.prior) for part in parts]).T[:, :, None]
-        return Reduction(Hyperparameters(*each), np.array([part.rows for part in parts]), *scalars)
+        exact = Reduction(Hyperparameters(*each), np.array([part.rows for part in parts]), *scalars)
+        with np.errstate(all="ignore"):  # what does not fit into single precision fails the comparison
+            rows: Any = exact.rows.astype(np.float32)
+            short = replace(exact, parameters=Hyperparameters(*each.astype(np.float32)), rows=rows)
+            places = self.likeliest.places
+            (mean, variance), (near, rounded) = (r.predict(cdist(places, places)) for r in (exact, short))
+            shift = np.maximum(np.abs(rounded - variance), (near - mean) ** 2)
+            return short if np.all(shift <= ROUNDING * variance) else exact
 
     def predict(self, places: Array) -> tuple[Array, Array]:
         """Mean (m,) and variance (m,) of the field at places (m, d): the moments of the mixture."""
@@ -257,7 +324,7 @@ class GaussianProcess:
         return mean, variance
 
 
-def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
+def fit(places: Array, values: Array, noise: Array, line: Array | None = None) -> GaussianProcess:
     """The process given values at places, with the posterior of its parameters by points about its mode.
 
     The points are those of a cubature of third degree of the normal distribution that the curvature at the mode gives;
@@ -267,22 +334,26 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
         places: (n, d) [m], at least three different ones.
         values: (n,).
         noise: standard deviation that each value states of itself (n,).
+        line: of each value, a number (n,), of which all share an error; None without lines.
     """
-    distance = cdist(places, places)
-    prior = prior_of(distance, values, noise)
+    prior = prior_of(cdist(places, places), values, noise)
+    if line is not None:  # a line errs as presses repeat
+        prior = LogPrior(np.append(prior.mean, prior.mean[-1]), np.append(prior.std, prior.std[-1]))
     noise = np.maximum(noise, 1e-4 * np.std(values))  # else rounding decides between presses at one place
     order = np.random.default_rng(0).permutation(len(values))
-    blocks = np.array_split(order, -(-len(values) // BLOCK))
+    parts = np.array_split(order, -(-len(values) // BLOCK))
+    same = [None if line is None else pdist(line[b][:, None]) == 0.0 for b in parts]
+    blocks = [(pdist(places[b]), values[b], noise[b], one) for b, one in zip(parts, same, strict=True)]
 
     def posterior(theta: Array) -> tuple[float, Array]:
         z = (theta - prior.mean) / prior.std
-        terms = [loss(theta, distance[np.ix_(b, b)], values[b], noise[b]) for b in blocks]
+        terms = [loss(theta, *block) for block in blocks]
         return float(0.5 * z @ z + sum(t[0] for t in terms)), z / prior.std + np.sum(
             [t[1] for t in terms], axis=0
         )
 
     # The short scale may stand for the whole field or for its edges: the likelihood has a mode for each.
-    edges = prior.mean + np.array([-1.0, 0.0, 0.7, 0.5, 0.0])
+    edges = prior.mean + np.array([-1.0, 0.0, 0.7, 0.5, 0.0, 0.0])[: len(prior.mean)]
     bounds = [(m - 6.0 * s, m + 6.0 * s) for m, s in zip(prior.mean, prior.std, strict=True)]
     modes = [
         minimize(posterior, start, jac=True, method="L-BFGS-B", bounds=bounds)
@@ -292,13 +363,13 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
     points, weights = _cubature(posterior, mode.x, float(mode.fun), float(prior.std.max()) ** -2)
     kept = weights >= LEAST_WEIGHT
     nodes = tuple(
-        Conditioned(places, values, noise, Hyperparameters(*np.exp(point))) for point in points[kept]
+        Conditioned(places, values, noise, Hyperparameters(*np.exp(point)), line) for point in points[kept]
     )
     return GaussianProcess(nodes, weights[kept] / weights[kept].sum())
 
 
 def _cubature(posterior: Posterior, mode: Array, least: float, flattest: float) -> tuple[Array, Array]:
-    """Points (k, 5) and weights (k,), the mode first; no curvature counts below the flattest, the prior's."""
+    """Points (k, d) and weights (k,), the mode first; no curvature counts below the flattest, the prior's."""
     d, step = len(mode), 1e-3
     rows = [(posterior(mode + step * e)[1] - posterior(mode - step * e)[1]) / (2.0 * step) for e in np.eye(d)]
     curvature, axes = eigh(0.5 * (np.array(rows) + np.array(rows).T))

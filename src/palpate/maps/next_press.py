@@ -76,15 +76,15 @@ def choose(
     Yields:
         The next candidate, and the variance at each candidate after a press there (m,).
     """
-    left, last = covariance.copy(), -1
+    left, last = covariance, -1
     while True:
         gain = np.einsum("i,ij,ij->j", weights, left, left) / (np.diag(left) + noise)
         if cost is not None:
             gain = gain / (1.0 + cost[last])
         last = int(np.argmax(gain))
-        column = left[:, last].copy()
-        left -= np.outer(column, column) / (column[last] + noise)
-        yield last, np.maximum(np.diag(left), 0.0)
+        column = left[:, last] / np.sqrt(left[last, last] + noise)
+        yield last, np.maximum(np.diag(left) - column**2, 0.0)
+        left = left - np.outer(column, column)
 
 
 def travel(candidates: Array, start: Array | None, speed: float) -> Array:

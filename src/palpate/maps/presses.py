@@ -14,10 +14,11 @@ from palpate.arrays import Array
 from palpate.errors import InputError, PalpateError
 from palpate.from_log import LogIdentifier
 from palpate.logs.kinds import kind_of
-from palpate.logs.read import read_log
-from palpate.logs.roles import POSE
+from palpate.logs.read import is_run, read_log
+from palpate.logs.roles import POSE, WRENCH
 from palpate.logs.signals import Signals
 from palpate.logs.tables import Sheet, open_table
+from palpate.logs.tables.parquet import stored_about
 from palpate.units import UNITS, split_spec, unit, unit_in_name
 
 if TYPE_CHECKING:
@@ -40,6 +41,11 @@ class Presses:
         refused: logs that give no stiffness, by name, each with the reason.
         fields: further quantities of the presses by name, each (n,), NaN where a press has none.
         units: of the fields, SI.
+        line: number of the line or log of each press, whose presses share an error (n,); None without.
+        frames: of the places, where logs name them, each with the first press in it; more than one is refused.
+
+    Raises:
+        InputError: the places are in two frames.
     """
 
     places: Array
@@ -49,6 +55,16 @@ class Presses:
     refused: dict[str, str] = field(default_factory=dict)
     fields: dict[str, Array] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    line: Array | None = None
+    frames: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if len(self.frames) > 1:
+            (one, first), (other, second), *_ = self.frames.items()
+            raise InputError(
+                f"{first} has its place in the frame {one!r}, {second} in {other!r}; a map has one frame: map them "
+                "apart, or give both poses in one frame"
+            )
 
 
 def merge_presses(parts: Sequence[Presses]) -> Presses:
@@ -58,10 +74,16 @@ def merge_presses(parts: Sequence[Presses]) -> Presses:
         name: np.concatenate([p.fields.get(name, np.full(len(p.stiffness), np.nan)) for p in parts])
         for name in fields
     }
+    line = None
+    if any(p.line is not None for p in parts):
+        own = [np.zeros(len(p.stiffness)) if p.line is None else p.line - p.line.min() for p in parts]
+        ends = np.cumsum([0.0, *(each.max() + 1.0 for each in own)])
+        line = np.concatenate([each + end for each, end in zip(own, ends[:-1], strict=True)])
     return Presses(
         np.vstack([p.places for p in parts]), np.concatenate([p.stiffness for p in parts]),
         np.concatenate([p.half for p in parts]), [name for p in parts for name in p.names],
         {name: why for p in parts for name, why in p.refused.items()}, columns, fields,
+        line, {frame: name for p in reversed(parts) for frame, name in p.frames.items()},
     )  # fmt: skip
 
 
@@ -99,7 +121,8 @@ def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] =
             raise InputError(f"--fields names {name!r}, which the map has already")
         (numbers,) = sheet.numbers([column], ())
         fields[name], units[name] = numbers * unit(symbol or "1").factor, unit(symbol or "1").si
-    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units)
+    line = sheet.numbers([sheet.resolve("line")], ())[0] if "line" in sheet.names else None
+    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units, line)
 
 
 def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
@@ -163,33 +186,38 @@ def read_logs(
         InputError: no log has a place and a stiffness.
     """
     places, numbers, names, refused, further = [], [], [], dict[str, str](), []
-    for log in track(logs):
+    frames: dict[str, str] = {}
+    lines = list[int]()
+    twice = len({log.name for log in logs}) < len(logs)
+    for number, log in enumerate(track(logs)):
+        title = f"{log.parent.name}/{log.name}" if twice else log.name
         try:
-            parts = _contacts(log, identifier) if each_contact else {log.name: identifier}
+            parts = _contacts(log, identifier, title) if each_contact else {title: identifier}
         except (PalpateError, OSError) as error:
-            parts, refused[log.name] = {}, " ".join(str(error).split())
+            parts, refused[title] = {}, " ".join(str(error).split())
         for name, part in parts.items():
             try:
-                where = _named_place(log, part, place) if place else _pose_of(log, part)
+                where, frame = (_named_place(log, part, place), "") if place else _pose_of(log, part)
                 found = part.identify(log)[0]
                 numbers.append(_stiffness(found))
             except (PalpateError, OSError) as error:
                 refused[name] = " ".join(str(error).split())
                 continue
+            frames.setdefault(frame, name)
             places.append(where)
             names.append(name)
+            lines.append(number)
             further.append([each(found) for _, each in FIELDS.values()])
     if not places:
         raise InputError(
             f"none of {len(logs)} logs gives a press with a place: {next(iter(refused.values()))}"
         )
-    if len({len(where) for where in places}) > 1:
-        raise InputError("some logs have a place of two coordinates and some of three; a map has one frame")
     stiffness, half = np.array(numbers).T
     columns = np.array(further, dtype=float).T
     fields = {name: each for name, each in zip(FIELDS, columns, strict=True) if np.isfinite(each).any()}
     units = {name: FIELDS[name][0] for name in fields}
-    return Presses(np.array(places), stiffness, half, names, refused, fields, units)
+    line = np.array(lines, dtype=float) if each_contact else None
+    return Presses(np.array(places), stiffness, half, names, refused, fields, units, line, frames)
 
 
 def _relaxation(found: Identification) -> float | None:
@@ -216,14 +244,14 @@ LEAST = 5
 """Presses with a quantity of which there is a map: the field, its two scales, its repetition and its mean."""
 
 
-def _contacts(log: Path, identifier: LogIdentifier) -> dict[str, LogIdentifier]:
+def _contacts(log: Path, identifier: LogIdentifier, title: str) -> dict[str, LogIdentifier]:
     """An identifier of each contact with half of the free motion before and after it."""
     contacts = identifier.identify(log)[0].contacts
     ends = [0.5 * (before + after) for (_, before), (after, _) in pairwise(contacts)]
     first = identifier.signals.start or 0.0
     cuts = [identifier.signals.start, *(first + end for end in ends), identifier.signals.end]
     return {
-        f"{log.name}, contact {k + 1}": replace(
+        f"{title}, contact {k + 1}": replace(
             identifier, signals=replace(identifier.signals, start=start, end=end)
         )
         for k, (start, end) in enumerate(pairwise(cuts))
@@ -258,17 +286,31 @@ def _named_place(log: Path, identifier: LogIdentifier, columns: Sequence[str]) -
     return np.array([np.nanmedian(record[role]) for role in named])
 
 
-def _pose_of(log: Path, identifier: LogIdentifier) -> Array:
-    """The median position of the pose while the force is above half of its largest."""
-    record = _completed_signals(log, identifier).read(log)
+def _pose_of(log: Path, identifier: LogIdentifier) -> tuple[Array, str]:
+    """A press' place, and its frame or "".
+
+    The place is the median position of the pose while the force is above half of its largest; of a simulated press the
+    one that it states, in the base of its arm.
+    """
+    signals = _completed_signals(log, identifier)
+    about = stored_about(log) if is_run(log) else None
+    if about is not None and "place_m" in about.meta:
+        return np.array(about.meta["place_m"], dtype=float), str(about.meta["arm"])
+    columns = (*WRENCH[:3], *POSE[:3])
+    if about is not None and {*columns} <= {*about.units}:
+        named: dict[str, Any] = {name: name for name in ("t", *columns)}
+        record = read_log(log, start=signals.start, end=signals.end, time=named.pop("t"), **named)
+    else:
+        record = signals.read(log)
     if "force_x" not in record.columns:
         raise InputError(
             f"{log} has no place: it holds one axis; name its columns with --place x,y, or give a log with a pose"
         )
-    force = np.column_stack([record[f"force_{axis}"] for axis in AXES])
+    force = np.column_stack([record[name] for name in columns[:3]])
     size = np.linalg.norm(force - np.nanmedian(force[: max(len(force) // 50, 1)], axis=0), axis=1)
     pressed = size >= 0.5 * np.nanmax(size)
-    return np.array([np.nanmedian(record[f"position_{axis}"][pressed]) for axis in AXES])
+    place = np.array([np.nanmedian(record[name][pressed]) for name in columns[3:]])
+    return place, record.meta.get("frames", {}).get(POSE[0], "")
 
 
 def _completed_signals(log: Path, identifier: LogIdentifier) -> Signals:

@@ -11,12 +11,10 @@ from scipy.stats import norm
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.maps.gaussian_process import GaussianProcess, fit
+from palpate.maps.gaussian_process import Z95, GaussianProcess, fit
 from palpate.maps.next_press import Goal, NextPresses, choose, importance, travel
 from palpate.maps.surface import Grid, Surface
 
-Z95 = float(norm.ppf(0.975))
-"""Half-width of a normal distribution's central 95 % over its standard deviation."""
 CANDIDATES = 600
 """Places among which the next press is chosen: in a plane 25 by 25, as fine as hundreds of presses are apart."""
 MOST_PRESSES = 1000
@@ -33,6 +31,7 @@ class Prediction:
         next_std: of the value that a next press would state, alike (n,).
         common: standard deviation of the error that all presses share, alike.
         logarithmic: whether the four are of the logarithm.
+        z95: half-width of the 95 % intervals over the standard deviation.
     """
 
     mean: Array
@@ -40,6 +39,7 @@ class Prediction:
     next_std: Array
     common: float
     logarithmic: bool = True
+    z95: float = Z95
 
     @property
     def value(self) -> Array:
@@ -50,6 +50,11 @@ class Prediction:
     def stiffness(self) -> Array:
         """The median of the stiffness (n,) [N/m]."""
         return self.value
+
+    @property
+    def relative_half(self) -> Array:
+        """Half-width of the 95 % interval over the surface's own value (n,), of a logarithmic field."""
+        return np.expm1(self.z95 * np.hypot(self.std, self.common))
 
     @property
     def ci95(self) -> Array:
@@ -67,7 +72,7 @@ class Prediction:
         return np.asarray(norm.sf(level, self.mean, np.hypot(self.std, self.common)))
 
     def _interval(self, std: Array) -> Array:
-        ends = self.mean[:, None] + Z95 * np.outer(std, [-1.0, 1.0])
+        ends = self.mean[:, None] + self.z95 * np.outer(std, [-1.0, 1.0])
         return np.exp(ends) if self.logarithmic else ends
 
 
@@ -88,6 +93,7 @@ class FieldMap:
             )
         self.logarithmic, self.name, self._common = logarithmic, name, common
         self._places, self._values, self._half = np.empty((0, 2)), np.empty(0), np.empty(0)
+        self._line = np.empty(0)
         self._process: GaussianProcess | None = None
         self._surface: Surface | None = None
 
@@ -119,7 +125,7 @@ class FieldMap:
             self._surface = Surface(self._places)
         return self._surface
 
-    def update(self, places: Any, values: Any, half: Any = None) -> None:
+    def update(self, places: Any, values: Any, half: Any = None, line: Any = None) -> None:
         """Add presses.
 
         Args:
@@ -127,16 +133,20 @@ class FieldMap:
             values: (n,), such as stiffness [N/m].
             half: half-width of each 95 % interval (n,), in the values' unit; None where presses state none, and the
                 presses' own scatter is all that is known of their error.
+            line: a number of each press (n,), such as that of its slide or session: presses of one number share an
+                error, which is estimated; NaN or None for presses that share none.
 
         Raises:
             InputError: shapes differ, a number is not finite or not above zero, or one place has two values.
         """
         where, value = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
         width = np.zeros(len(value)) if half is None and value.ndim else np.asarray(half, dtype=float)
-        if where.ndim != 2 or where.shape[1] not in (2, 3) or not (len(where),) == value.shape == width.shape:
+        number = np.full(value.shape, np.nan) if line is None else np.asarray(line, dtype=float)
+        shapes = (value.shape, width.shape, number.shape)
+        if where.ndim != 2 or where.shape[1] not in (2, 3) or {*shapes} != {(len(where),)}:
             raise InputError(
-                f"a map takes places (n, 2) or (n, 3), {self.name} (n,) and half (n,), got shapes "
-                f"{where.shape}, {value.shape} and {width.shape}"
+                f"a map takes places (n, 2) or (n, 3), {self.name} (n,), half (n,) and line (n,), got shapes "
+                f"{where.shape}, {', '.join(map(str, shapes))}"
             )
         if len(self) and where.shape[1] != self._places.shape[1]:
             raise InputError(
@@ -160,6 +170,7 @@ class FieldMap:
         if half is not None:
             self._refuse_contradictions(*together)
         self._places, self._values, self._half = together
+        self._line = np.concatenate([self._line, number])
         self._process = self._surface = None
 
     @property
@@ -167,7 +178,9 @@ class FieldMap:
         """The Gaussian process of all presses."""
         if self._process is None:
             self.surface  # noqa: B018 - refuses presses that span no surface
-            self._process = fit(self._places, *self._scaled(self._values, self._half))
+            lines, line = np.unique(self._line, return_inverse=True, equal_nan=False)
+            shared = line.astype(float) if 1 < len(lines) < len(line) else None
+            self._process = fit(self._places, *self._scaled(self._values, self._half), shared)
         return self._process
 
     def predict(self, places: Any) -> Prediction:
@@ -179,7 +192,8 @@ class FieldMap:
             )
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
-        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic)
+        z95 = self.process.z95
+        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, z95)
 
     def next(
         self,
@@ -219,7 +233,8 @@ class FieldMap:
         std = np.sqrt(
             left[chosen] + np.maximum(variance - np.diag(covariance), 0.0)[chosen] + self._common**2
         )
-        half = np.exp(mean[chosen]) * np.sinh(Z95 * std) if self.logarithmic else Z95 * std
+        half = self.process.z95 * std
+        half = np.exp(mean[chosen]) * np.sinh(half) if self.logarithmic else half
         return NextPresses(among[chosen], half)
 
     def presses_until(self, half: float) -> int | None:
@@ -234,7 +249,7 @@ class FieldMap:
         """
         if not half > 0.0:
             raise InputError(f"the half-width must be above 0, got {half:g}")
-        asked = ((np.log1p(half) if self.logarithmic else half) / Z95) ** 2 - self._common**2
+        asked = ((np.log1p(half) if self.logarithmic else half) / self.process.z95) ** 2 - self._common**2
         covariance, noise = self.process.likeliest.covariance(self._candidates()), self._noise
         presses = choose(covariance, np.ones(len(covariance)), noise)
         variances = chain([np.diag(covariance)], (variance for _, variance in presses))
@@ -252,9 +267,9 @@ class FieldMap:
 
     @property
     def _noise(self) -> float:
-        """Variance of a next press, of the logarithm if logarithmic."""
+        """Variance of a next press, on a line of its own, of the logarithm if logarithmic."""
         own = np.median(self._scaled(self._values, self._half)[1])
-        return float(own**2 + self.process.repeat**2)
+        return float(own**2 + self.process.repeat**2 + self.process.shared**2)
 
     def _candidates(self) -> Array:
         grid = self.grid(CANDIDATES)

@@ -131,7 +131,7 @@ class Touch(NamedTuple):
     reading: Reading
     force: float  # on the surface during the last step [N]
     mean: float  # over the last tick [N]
-    depth: float  # of the tip, negative in the air [m]
+    depth: float  # of the tip, negative in free motion [m]
 
 
 def body_at(q: Array, motor: Array) -> Body:

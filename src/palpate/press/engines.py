@@ -134,7 +134,7 @@ MODES = ("torque", "position")
 _TYPICAL = {"torque": "fr3", "position": "ur5e"}
 """Whose inner loop and sensor stand for those of an arm of which nobody has said any."""
 _DAMPED = 0.7
-"""Damping ratio of the tip on its spring in the air."""
+"""Damping ratio of the tip on its spring in free motion."""
 
 
 def usual_mode(name: str) -> str:

@@ -47,6 +47,12 @@ class Place:
     mass: float
     weakest: float
 
+    @property
+    def point(self) -> Array:
+        """Point of the surface in front of the tip, in the base's axes (3,) [m]."""
+        tip: Array = self.pose[:3, 3]
+        return tip + (self.place - tip @ self.normal) * self.normal
+
 
 def place_of(arm: SerialArm, at: Array | None, normal: Array | None, gap: float = GAP) -> Place:
     """Where the arm starts and what it faces.

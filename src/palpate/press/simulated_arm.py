@@ -104,7 +104,7 @@ class SimulatedArm:
         return Sense(self._k * self.loop.tick, force, self.arm.forward_kinematics(seen), seen)
 
     def at_rest(self) -> Array:
-        """Readings of the sensor in the second half of a rest in the air, tick by tick [N], shape (n,).
+        """Readings of the sensor in the second half of a rest in free motion, tick by tick [N], shape (n,).
 
         In the first half its low-pass settles.
         """
@@ -115,7 +115,7 @@ class SimulatedArm:
         return np.array(shown[len(shown) // 2 :], dtype=np.float64)
 
     def tare(self) -> None:
-        """Rests in the air, and takes what the sensor shows in the second half of that for zero."""
+        """Rests in free motion, and takes what the sensor shows in the second half of that for zero."""
         self.zero = float(self.at_rest().mean())
 
     def write(self, command: Command) -> None:

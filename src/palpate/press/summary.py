@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench.force_input import CONTACT
-from palpate.bench.metrics.window import WINDOW, force_figures, losses
+from palpate.bench.summary import WINDOW, force_figures, losses
 from palpate.contact_frame import Payload, identify_contact
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
@@ -67,6 +67,7 @@ class Asked:
                 "position": {"lag_s": 0.0},
             },
             "notes": list(self.notes),
+            "place_m": self.place.point.tolist(),
             **self.between,
         }
 

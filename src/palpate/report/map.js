@@ -1,19 +1,23 @@
-// Numbers under the pointer in a line of fixed height above the map, the map as it grew, and its files.
+// Numbers under the pointer in lines of fixed height above the maps, the map as it grew, and its files.
 (() => {
   const map = JSON.parse(document.getElementById("map").textContent);
   const pair = document.querySelector(".grid.two");
   const image = pair.querySelector("figure img");
   const make = (kind, parent, set = {}) => Object.assign(parent.appendChild(document.createElement(kind)), set);
-  const line = make("p", image.parentElement, { className: "small" });
-  image.before(line);
-  line.setAttribute("aria-live", "polite");
-  const rest = "Point at the map for its numbers.";
-  line.textContent = rest;
+  const images = [...pair.querySelectorAll("figure img")];
+  const rest = ["Point at the map for its numbers.", "Light: not known. Numbered: where to press next."];
+  const lines = rest.map((textContent, i) => {
+    const line = make("p", images[i].parentElement, { className: "small", textContent });
+    images[i].before(line);
+    line.setAttribute("aria-live", "polite");
+    return line;
+  });
+  const say = (texts) => texts.forEach((text, i) => (lines[i].textContent = text));
   const nearest = (list, value) =>
     list.reduce((best, each, i) => (Math.abs(each - value) < Math.abs(list[best] - value) ? i : best), 0);
   const number = (value) => Number(value.toPrecision(3)).toLocaleString("en", { useGrouping: false });
-  image.addEventListener("pointermove", (event) => {
-    const frame = image.getBoundingClientRect();
+  const show = (event) => {
+    const frame = event.target.getBoundingClientRect();
     const [left, top, right, bottom] = map.box;
     const u = ((event.clientX - frame.left) / frame.width - left) / (right - left);
     const v = ((event.clientY - frame.top) / frame.height - top) / (bottom - top);
@@ -21,16 +25,19 @@
     const y = map.y[1] - v * (map.y[1] - map.y[0]);
     const cell = nearest(map.rows, y) * map.columns.length + nearest(map.columns, x);
     const found = u >= 0 && u <= 1 && v >= 0 && v <= 1 ? map.values[cell] : null;
-    if (!found) {
-      line.textContent = rest;
-      return;
-    }
+    if (!found) return say(rest);
     const [k, low, high, nextLow, nextHigh] = found.slice(-map.names.length).map(number);
-    line.textContent = `${k} N/m (95 %: ${low} to ${high}); next press ${nextLow} to ${nextHigh}; at ${x.toFixed(1)}, ${y.toFixed(1)} mm`;
-  });
-  image.addEventListener("pointerleave", () => {
-    line.textContent = rest;
-  });
+    say([
+      `${k} N/m (95 %: ${low} to ${high}) at ${x.toFixed(1)}, ${y.toFixed(1)} mm`,
+      `± ${Math.round(100 * (high / k - 1))} %; a next press ${nextLow} to ${nextHigh} N/m`,
+    ]);
+  };
+  for (const each of images.slice(0, 2)) {
+    each.addEventListener("pointermove", show);
+    each.addEventListener("pointerleave", () => say(rest));
+  }
+  document.querySelector(".panels").style.gridTemplateColumns = "minmax(0, 1fr)";
+  document.querySelector("details").open = true;
 
   const files = make("p", image.parentElement, { className: "small screen" });
   const save = (name, content) => {
@@ -82,7 +89,7 @@
     make("figcaption", figure, { textContent: caption });
     return canvas;
   });
-  const show = (step) => {
+  const draw = (step) => {
     const frame = frames[step];
     count.textContent = `${frame.count} presses`;
     panes.forEach((canvas, k) => {
@@ -105,15 +112,15 @@
       }
     });
   };
-  slider.addEventListener("input", () => show(Number(slider.value)));
+  slider.addEventListener("input", () => draw(Number(slider.value)));
   play.addEventListener("click", () => {
     let step = 0;
     const timer = setInterval(() => {
       slider.value = step;
-      show(step);
+      draw(step);
       step += 1;
       if (step === frames.length) clearInterval(timer);
     }, 400);
   });
-  show(frames.length - 1);
+  draw(frames.length - 1);
 })();

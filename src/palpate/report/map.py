@@ -16,7 +16,7 @@ from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import Table, data_address
-from palpate.report.svg import svg
+from palpate.report.style import svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -176,25 +176,26 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
 def _cards(result: MapResult) -> list[Card]:
     cards = [
         Card(
-            f"Lump {k + 1}", plain(lump.stiffness, 3), "N/m", plain(0.5 * (lump.ci95[1] - lump.ci95[0]), 2),
+            f"Lump {k + 1}", plain(float(f"{lump.stiffness:.3g}")), "N/m",
+            plain(float(f"{0.5 * (lump.ci95[1] - lump.ci95[0]):.2g}")),
             f"at {place(lump.place)}; {_area(lump)}", "ok" if lump.is_sure else "warn",
             "stiffer" if lump.is_sure else "perhaps", "K",
         )
         for k, lump in enumerate(result.lumps[:3])
     ]  # fmt: skip
-    halves = np.expm1(1.96 * result.prediction.std[result.grid.inside])
+    halves = result.prediction.relative_half[result.grid.inside]
     return [
         *cards,
         *([Card("To press yet", more[0], why=more[1])] if (more := further(result)) else []),
         Card(
             "Half-width",
-            f"{100 * float(np.median(halves)):.2g}",
+            plain(float(f"{100.0 * float(np.median(halves)):.2g}")),
             "%",
             why="of the interval, at the median place",
         ),
         Card(
             "Press to press",
-            f"{100 * result.repeat:.2g}",
+            plain(float(f"{100.0 * result.repeat:.2g}")),
             "%",
             why="at one place, 95 %, beyond their own intervals",
         ),
@@ -247,7 +248,7 @@ def draw_map(result: MapResult) -> Figure:
             axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
                          linewidths=[0.9, 1.8, 0.9], linestyles=["--", "-", "--"])  # fmt: skip
         at = 1e3 * result.map.surface.coordinates(result.map.places)
-        axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
+        axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
         begin, end = (1e3 * point for point in _cut_ends(result))
         axis.plot(*zip(begin, end, strict=True), color="white", linewidth=0.9, linestyle=(0, (5, 4)))
     return figure
@@ -255,7 +256,7 @@ def draw_map(result: MapResult) -> Figure:
 
 def draw_interval(result: MapResult) -> Figure:
     """The half-width of the interval over the surface, and the next presses by their numbers."""
-    half = 100.0 * np.expm1(1.96 * np.hypot(result.prediction.std, result.request.common))
+    half = 100.0 * result.prediction.relative_half
     with style.ink(9.0):
         figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
         coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
@@ -272,7 +273,7 @@ def draw_field(result: MapResult, name: str) -> Figure:
         label = f"{_title(name).lower()} [{symbol}]"
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
         at = 1e3 * result.map.surface.coordinates(result.map.places[known])
-        axis.plot(*at.T, "o", mfc="white", mec=style.INK, markersize=4, mew=0.9)
+        axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
     return figure
 
 
@@ -283,12 +284,13 @@ def _picture(
     grid = result.grid
     figure, (axis,) = style.grid((5.0, 4.4))
     shown = np.where(grid.inside, values, np.nan).reshape(grid.shape)
-    image = axis.pcolormesh(1e3 * grid.across, 1e3 * grid.along, shown, cmap=colours, rasterized=True, **norm)
+    look = {"origin": "lower", "cmap": colours, "interpolation": "bilinear", **norm}
+    image = axis.imshow(shown, extent=tuple(1e3 * grid.ends), **look)
     bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
     axis.grid(visible=False)
     axis.set_aspect("equal")
-    names = ("along the first axis", "along the second axis") if result.map.surface.is_curved else ("x", "y")
-    axis.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]")
+    across, along = (f"{name} [mm]" for name in result.map.surface.names)
+    axis.set(xlabel=across, ylabel=along)
     return figure, axis, bar
 
 
@@ -381,8 +383,7 @@ def _film(result: MapResult) -> dict[str, Any]:
         for each in scaled
     ]
     at = result.map.surface.coordinates(result.map.places)
-    size = np.array([grid.across[-1] - grid.across[0], grid.along[-1] - grid.along[0]]) + np.sqrt(grid.cell)
-    corner = np.array([grid.across[0], grid.along[0]]) - 0.5 * np.sqrt(grid.cell)
+    low, high = grid.ends[::2], grid.ends[1::2]
     return {
         "shape": grid.shape,
         "frames": [
@@ -393,5 +394,5 @@ def _film(result: MapResult) -> dict[str, Any]:
             [to_hex(colormaps[name](i / (levels - 1))) for i in range(levels)]
             for name in ("Blues_r", "Greys_r")
         ],
-        "presses": np.round((at - corner) / size, 3).tolist(),
+        "presses": np.round((at - low) / (high - low), 3).tolist(),
     }

@@ -11,11 +11,13 @@ from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.numbers import as_html, as_text
 from palpate.report.page import Table, data_address, render
-from palpate.report.svg import svg
+from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from palpate.contact_frame.load_files import NumberOfLoad
 
 _NAMES = {
     "mass": "mass",
@@ -44,6 +46,33 @@ def sentence(found: Weighed) -> str:
         return "The poses do not determine the tool's mass: " + "; ".join(found.lacking) + "."
     mass = found.parameters["mass"]
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
+
+
+def check_table(rows: list[NumberOfLoad]) -> Table:
+    """Each number of a load file beside the log's."""
+    numbers = [
+        (
+            row.name,
+            f"{row.file:.4g}",
+            f"{row.log:.4g}",
+            _half(row.half),
+            row.unit,
+            "yes" if row.agrees else "no",
+        )
+        for row in rows
+    ]
+    return Table("", ("", "file", "log", "+- 95 %", "unit", "agrees"), numbers)
+
+
+def check_sentence(name: str, rows: list[NumberOfLoad]) -> str:
+    """Whether a load file agrees with the log."""
+    wrong = [row for row in rows if not row.agrees]
+    if not wrong:
+        return f"{printable(name)} agrees with the log."
+    parts = (
+        f"{row.name} {row.file:.4g} {row.unit}, {row.log:.4g} +- {row.half:.2g} by the log" for row in wrong
+    )
+    return f"{printable(name)} does not agree with the log: {'; '.join(parts)}."
 
 
 def line(found: Weighed) -> str:

@@ -51,7 +51,7 @@ class AtRest:
 
 
 def look(wire: Wire, order: Order) -> AtRest:
-    """Read an arm at rest in the air, and refuse what no press should begin with.
+    """Read an arm at rest in free motion, and refuse what no press should begin with.
 
     Raises:
         InputError: another rate than the gains', another clock, an arm that moves, a sensor that is saturated, untared,
@@ -149,7 +149,7 @@ def _check(found: AtRest, moved: float, order: Order) -> None:
     lowest = task.force * (1.0 - task.probe)
     if SURE * found.noise > lowest:
         raise InputError(
-            f"the force's noise is {found.noise:.2g} N in the air: {lowest:g} N is below 8 standard deviations of it"
+            f"the force's noise is {found.noise:.2g} N in free motion: {lowest:g} N is below 8 deviations of it"
         )
     check_drift(found.drift, found.drift_std, task.force, limits.seconds, gains.arm.sensor)
 
@@ -231,7 +231,7 @@ def unlike(tool: Payload, rest: AtRest) -> str | None:
     if apart <= sure:
         return None
     return (
-        f"the sensor shows {_show(rest.bias)} N in the air, and the tool as it was weighed makes {_show(expected)} N,"
+        f"the sensor shows {_show(rest.bias)} N in free motion, and the tool as weighed makes {_show(expected)} N,"
         f" {apart:.2g} N apart in one axis: the sensor was zeroed since or drifts, the tool is another, or wrench and"
         " pose are of other frames. The tare takes it off as long as the tool does not turn"
     )

@@ -12,9 +12,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.force.gains import Gains
+from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_state import beside
-from palpate.force.sliding.slide_world import directions
 from palpate.press.tare import TARE
 from palpate.press.tool import Plan
 from palpate.wires.protocol import Triple, triple

@@ -127,7 +127,7 @@ UNITS = {
     **{f"position_{axis}": "m" for axis in "xyz"},
     **{f"quaternion_{axis}": "1" for axis in "xyzw"},
 }
-"""Columns of a row. The first columns are along the direction of the press, the force without its bias in the air."""
+"""Columns of a row. The first are along the direction of the press, the force without its bias in free motion."""
 _ROWS, _HEAD = "rows.f64", "press.json"
 
 

@@ -234,7 +234,7 @@ def _age(now: Moment, order: Order) -> str | None:
     return f"a reading came {1e3 * now.age:.3g} ms late, more than the loop's lag of {1e3 * theta:.3g} ms"
 
 
-_PHASES = {"air": 0.0, "learning": 1.0, "locked": 2.0}
+_PHASES = {"free motion": 0.0, "learning": 1.0, "locked": 2.0}
 _SLIDING = 3.0
 _STILL = 1e-12
 """Speed that is none [m/s]."""
@@ -266,7 +266,7 @@ def press(
     """Press as told; the arm rests when this returns or raises.
 
     Args:
-        wire: to an arm at rest in the air.
+        wire: to an arm at rest in free motion.
         order: what to do with it, from `checked`.
         rows: keeps everything.
         asked_to_stop: the reason why the user wants it to end; None while he does not.

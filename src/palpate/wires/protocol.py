@@ -120,7 +120,7 @@ class Wire(Protocol):
         ...
 
     def tare(self) -> None:
-        """Let the arm's driver take its sensor's present reading for zero, if it can; the arm is in the air."""
+        """Let the arm's driver take its sensor's present reading for zero, if it can; the arm is in free motion."""
         ...
 
     def begin(self, silence: float = SILENCE) -> None:

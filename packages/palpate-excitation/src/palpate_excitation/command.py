@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
-from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -27,25 +27,18 @@ _FASTEST = 200_000
 @Parameter(name="*", group=Group("The surfaces", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SurfaceRangeOptions:
-    """Range of the surfaces.
-
-    Parameters
-    ----------
-    stiffness
-        Of the surfaces, N/m; one value if it is known.
-    damping
-        Of the surfaces, N s/m.
-    mass
-        Of the surfaces, kg; without it they have none.
-    """
+    """Range of the surfaces."""
 
     stiffness: Annotated[str, SIGNED]
+    "Of the surfaces, N/m; one value if it is known."
     damping: Annotated[str, SIGNED]
+    "Of the surfaces, N s/m."
     mass: Annotated[str | None, SIGNED] = None
+    "Of the surfaces, kg; without it they have none."
 
     def range(self) -> SurfaceRange:
         """Range of stiffness, damping and mass."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
         from palpate_excitation import SurfaceRange
 
         return SurfaceRange(
@@ -58,33 +51,23 @@ class SurfaceRangeOptions:
 @Parameter(name="*", group=Group("Limits", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class BudgetOptions:
-    """Limits of force and frequency.
-
-    Parameters
-    ----------
-    force
-        Mean force, N.
-    peak
-        Highest force, N.
-    least
-        Lowest force, N, so that contact is kept.
-    bandwidth
-        Highest frequency, Hz.
-    lowest
-        Lowest frequency, Hz.
-    force_rate
-        Fastest change of the desired force, N/s.
-    drive
-        Largest departure of the desired force from its mean, N, if it may exceed that of the force on the surface.
-    """
+    """Limits of force and frequency."""
 
     force: Annotated[str, SIGNED]
+    "Mean force, N."
     peak: Annotated[str, SIGNED]
+    "Highest force, N."
     least: Annotated[str, SIGNED] = "2"
+    "Lowest force, N, so that contact is kept."
     bandwidth: Annotated[str, SIGNED] = "40"
+    "Highest frequency, Hz."
     lowest: Annotated[str, SIGNED] = "0.5"
+    "Lowest frequency, Hz."
     force_rate: Annotated[str | None, SIGNED] = None
+    "Fastest change of the desired force, N/s."
     drive: Annotated[str | None, SIGNED] = None
+    """Largest departure of the desired force from its mean, N, if it may exceed that of the force on the
+    surface."""
 
     def budget(self) -> Budget:
         """Limits of force, frequency and speed."""
@@ -104,59 +87,39 @@ class BudgetOptions:
 @Parameter(name="*", group=Group("Goals", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class GoalOptions:
-    """Precision and time.
-
-    Parameters
-    ----------
-    precision
-        Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%.
-    duration
-        Of the excitation, s; the shortest sufficient one if not given.
-    longest
-        Longest duration, s.
-    settle
-        Initial time that does not count, s.
-    kind
-        multisine or chirp.
-    criterion
-        Optimality of a multisine: worst (the worst parameter), or D, A or E as in optimal experiment design.
-    """
+    """Wanted precision, and the time for it."""
 
     precision: Annotated[str, SIGNED] = "10%"
+    "Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%."
     duration: Annotated[str | None, SIGNED] = None
+    "Of the excitation, s; the shortest sufficient one if not given."
     longest: Annotated[str, SIGNED] = "60"
+    "Longest duration, s."
     settle: Annotated[str, SIGNED] = "1"
+    "Initial time that does not count, s."
     kind: str = "multisine"
+    "multisine or chirp."
     criterion: str = "worst"
+    "Optimality of a multisine: worst (the worst parameter), or D, A or E as in optimal experiment design."
 
 
 @Parameter(name="*", group=Group("The sensors", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class SensorOptions:
-    """Sensors of force and position.
-
-    Parameters
-    ----------
-    noise
-        Standard deviation of one reading of the force sensor, N.
-    sampling
-        Independent readings of the force sensor per second.
-    force_filter
-        Low-pass before the sampling, as butterworth3:120, or none.
-    rate
-        Rows per second of the log, and of --out.
-    position_step
-        Quantisation of the position, m.
-    lag_std
-        Standard deviation of the calibrated lag between force and position, s.
-    """
+    """Sensors of force and position."""
 
     noise: Annotated[str, SIGNED] = "0.6"
+    "Standard deviation of one reading of the force sensor, N."
     sampling: Annotated[int, SIGNED] = 480
+    "Independent readings of the force sensor per second."
     force_filter: str = "butterworth3:120"
+    "Low-pass before the sampling, as butterworth3:120, or none."
     rate: Annotated[int, SIGNED] = 1000
+    "Rows per second of the log, and of --out."
     position_step: Annotated[str, SIGNED] = "1.6:um"
+    "Quantisation of the position, m."
     lag_std: Annotated[str, SIGNED] = "0"
+    "Standard deviation of the calibrated lag between force and position, s."
 
     def sensors(self) -> Sensors:
         """Sensors of force and position."""
@@ -182,27 +145,18 @@ class SensorOptions:
 @Parameter(name="*", group=Group("The robot", sort_key=5))
 @dataclass(frozen=True, kw_only=True)
 class LoopOptions:
-    """Its force control.
-
-    Parameters
-    ----------
-    loop_bandwidth
-        Of the robot's force control, Hz, if nothing else is known of it.
-    tip_mass
-        Effective mass of the robot at its tip, kg; this and the following default to the bench's arm.
-    tip_friction
-        Dry friction as felt at the tip, N.
-    gain
-        Of the force error.
-    integral
-        Of the force error, 1/s.
-    """
+    """Force control of the arm."""
 
     loop_bandwidth: Annotated[str | None, SIGNED] = None
+    "Of the robot's force control, Hz, if nothing else is known of it."
     tip_mass: Annotated[str | None, SIGNED] = None
+    "Effective mass of the robot at its tip, kg; this and the following default to the bench's arm."
     tip_friction: Annotated[str | None, SIGNED] = None
+    "Dry friction as felt at the tip, N."
     gain: Annotated[float | None, SIGNED] = None
+    "Of the force error."
     integral: Annotated[float | None, SIGNED] = None
+    "Of the force error, 1/s."
 
     def loop(self) -> ForceLoop:
         """Force loop that follows the desired force."""
@@ -228,24 +182,16 @@ class LoopOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class ExcitationOutput(PictureOptions, FileOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Where to write the desired force over time: .csv or .parquet.
-    experiment
-        Where to write an experiment for palpate run, a TOML file.
-    replace
-        Replace the files at --out and --experiment.
-    figure
-        Where to write the figure, a PNG; excite.png in the current folder if not given.
-    """
+    """Where the excitation is written."""
 
     out: Path | None = None
+    "Where to write the desired force over time: .csv or .parquet."
     experiment: Path | None = None
+    "Where to write an experiment for palpate run, a TOML file."
     replace: Annotated[bool, FLAG] = False
+    "Replace the files at --out and --experiment."
     figure: Path | None = None
+    "Where to write the figure, a PNG; excite.png in the current folder if not given."
 
     def check_all(self) -> None:
         """Check every path before any work is done."""
@@ -275,7 +221,7 @@ def excite(
 
     Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
     """
-    from palpate.cli.options.quantities import shares
+    from palpate.cli.options.values import shares
     from palpate_excitation import Problem
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()

@@ -12,10 +12,9 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
+from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Experiment, SerialArm
-from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 
@@ -29,31 +28,22 @@ _DEFAULT = "foam-hybrid"
 @Parameter(name="*", group=Group("Source", sort_key=0))
 @dataclass(frozen=True, kw_only=True)
 class ShownOptions:
-    """A simulation, a log or a record.
-
-    Parameters
-    ----------
-    run
-        An experiment to simulate in real time (palpate run --list), or your own TOML file; foam-hybrid if nothing is
-        named.
-    arm_
-        An arm to simulate in 3D with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate press.
-    log
-        A log to replay, its columns named as for palpate identify.
-    record
-        A record of a run, or a bag (MCAP) with one wrench and one pose, which need no names.
-    seed
-        Of a simulation's noise.
-    whole_approach
-        Begin at the start of the approach, not shortly before the touch.
-    """
+    """A simulation, a log or a record."""
 
     run: Annotated[Experiment | None, QUIET] = None
+    """An experiment to simulate in real time (palpate run --list), or your own TOML file; foam-hybrid if
+    nothing is named."""
     arm_: Annotated[SerialArm | None, Parameter(name="--arm"), QUIET] = None
+    """An arm to simulate in 3D with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate
+    press."""
     log: Path | None = None
+    "A log to replay, its columns named as for palpate identify."
     record: Path | None = None
+    "A record of a run, or a bag (MCAP) with one wrench and one pose, which need no names."
     seed: Annotated[int, WHOLE] = 0
+    "Of a simulation's noise."
     whole_approach: Annotated[bool, FLAG] = False
+    "Begin at the start of the approach, not shortly before the touch."
 
     def file(self) -> Path | None:
         """The log or the record; None for a simulation.
@@ -71,30 +61,20 @@ class ShownOptions:
 @Parameter(name="*", group=Group("Server", sort_key=7))
 @dataclass(frozen=True, kw_only=True)
 class ServedOptions:
-    """Ports for the browser and other viewers.
-
-    Parameters
-    ----------
-    port
-        Port of the page; a free one if not given, or 0.
-    open_
-        Open the page in the browser.
-    share
-        Share the page on the network of this machine, for a lecture: the first page steers, others only watch.
-    foxglove
-        Serve Foxglove, Lichtblick and PlotJuggler too.
-    foxglove_port
-        Port of those viewers.
-    foxglove_origin
-        Origin of a viewer that is a web page, such as https://app.foxglove.dev; other pages are refused.
-    """
+    """Ports for the browser and other viewers."""
 
     port: Annotated[int, SIGNED] = 0
+    "Port of the page; a free one if not given, or 0."
     open_: Annotated[bool, FLAG, Parameter(name="--open")] = False
+    "Open the page in the browser."
     share: Annotated[bool, FLAG] = False
+    "Share the page on the network of this machine, for a lecture: the first page steers, others only watch."
     foxglove: Annotated[bool, FLAG] = False
+    "Serve Foxglove, Lichtblick and PlotJuggler too."
     foxglove_port: Annotated[int, SIGNED] = 8765
+    "Port of those viewers."
     foxglove_origin: str = ""
+    "Origin of a viewer that is a web page, such as https://app.foxglove.dev; other pages are refused."
 
 
 def live(

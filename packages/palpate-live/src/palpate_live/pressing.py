@@ -15,9 +15,8 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.press.engines import series_of
-from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, prepared
-from palpate.press.pressing import JOINT_LIMIT
+from palpate.press.pressing import JOINT_LIMIT, Cautious
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.signals.types import NORMAL

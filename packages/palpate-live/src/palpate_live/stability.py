@@ -214,7 +214,7 @@ def _covers(claim: Claim, gains: Gains, stiffness: float, damping: float) -> boo
 
 def _linear(experiment: Experiment) -> Iterator[Answer]:
     """By the loop's linear model, friction of the joints left out."""
-    from palpate.analysis import linearise, margins, stable_stiffness
+    from palpate_studies.analysis import linearise, margins, stable_stiffness
 
     known: Answer = {"stiffness": None, "proved": False, "label": "stable, linear model"}
     loop = linearise(experiment)

@@ -1,17 +1,17 @@
-"""Where the loop is stable, by a process of its own: the answers are those of `palpate.analysis`."""
+"""Where the loop is stable, by a process of its own: the answers are those of `palpate_studies.analysis`."""
 
 import threading
 
 import pytest
 
 from live.conftest import PATIENCE, near
-from palpate.analysis import linearise, margins
 from palpate.force.certificate import Claim
 from palpate.force.steps import margins as margins_on
 from palpate.press.engines import gains_for, loop_of
 from palpate.report.numbers import plain
 from palpate_live import stability
 from palpate_live.stability import OfArm, OfBench, Stability, answers
+from palpate_studies.analysis import linearise, margins
 
 
 @pytest.mark.long

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import law, part
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.contact_evidence import AIR
+from palpate.force.contact_evidence import FREE_MOTION
 from palpate.force.force_loop import PHASES, SurfaceEstimate, surface_estimate
 from palpate.force.gains import Gains
 from palpate.force.guard import QUIET, TROUBLES, GuardedState, safe_step
@@ -47,10 +47,10 @@ def force_update(gains, state, desired, force, position, missed):
 @law
 def force_estimate(gains, state):
     """The surface as it is known; zeros, but for the bound, in free motion and until there is an estimate."""
-    known, bound = state.law.known, state.law.bound.used
-    if state.law.stage.phase == AIR or known.std.x == 0.0:
+    estimate, bound = state.law.estimate, state.law.bound.used
+    if state.law.stage.phase == FREE_MOTION or estimate.std.x == 0.0:
         return SurfaceEstimate(0.0, 0.0, 0.0, 0.0, bound)
-    return surface_estimate(gains.cap, gains.theta, known.found, known.std, bound)
+    return surface_estimate(gains.cap, gains.theta, estimate.value, estimate.std, bound)
 
 
 def force_module(gains: Gains, notes: tuple[str, ...] = ()) -> Module:

@@ -11,15 +11,25 @@ from typing import Any
 import numpy as np
 
 from palpate._vector import ZERO3
+from palpate.arrays import Array
 from palpate.force.arm import Arm, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
+from palpate.robots import SerialArm
 from palpate.wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""
 FRICTION = 0.3
 """Of the surface."""
+_TURN = 1e-3
+"""Turning of the tool up to which it is none [rad/s]."""
+REST = (0.0, 0.0, 0.0)
+"""Velocity of an arm at rest [m/s]."""
+_DOWN = np.diag([1.0, -1.0, -1.0])
+"""Axes of the tool in columns: it points down, turned by half a turn about x."""
+_NEAR = 1e-7
+"""Of a place, at which joints are left as they are [m], [rad]."""
 _BEHIND = 1.0
 """Behind real time by which this process must have been stopped [s]: so much is not made up for in a hurry."""
 
@@ -45,15 +55,21 @@ class ToolAxisArm:
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
         self.at, self.bent = np.array([0.4, 0.0]), np.zeros(2)
-        self.aside: Any = (0.0, 0.0)
         self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
 
-    def tick(self, speed: float) -> None:
-        """Go on by one tick of the arm's own clock with this commanded speed, if it is any with `aside` [m/s]."""
+    def velocity_to(self, place: Any) -> Array:
+        """Velocity of the command that leads to a place within a tick, shape (3,) [m/s]."""
+        here = np.array([*self.at, START - self.command])
+        velocity: Array = (np.asarray(place, dtype=float) - here) / self.world.tick
+        return velocity
+
+    def tick(self, velocity: Any = REST) -> None:
+        """Go on by one tick of the arm's own clock with this commanded velocity in the base, shape (3,) [m/s]."""
         world = self.world
-        self.aside = np.array(self.aside) * (speed != 0.0)
-        self.at += world.tick * self.aside
-        bent = self.bent + world.tick * self.aside
+        speed, aside = -float(velocity[2]), np.asarray(velocity[:2], dtype=float)
+        aside = aside * min(1.0, world.speed / max(float(np.hypot(*aside)), 1e-12))
+        self.at += world.tick * aside
+        bent = self.bent + world.tick * aside
         most = FRICTION * abs(self.body.reading) / self.surface.stiffness
         self.bent = bent * min(1.0, most / max(np.hypot(*bent), 1e-12))
         self.command += world.tick * min(max(speed, -world.speed), world.speed)
@@ -71,6 +87,39 @@ class ToolAxisArm:
         """Force, torque, position, quaternion: the tool points down."""
         force = self.bias + np.array([*self.surface.stiffness * self.bent, -self.body.reading])
         return (*force, 0.0, 0.0, 0.0, *self.at, START - self.body.x, 1.0, 0.0, 0.0, 0.0)
+
+
+class Joints:
+    """Joints of a known arm whose tool points down at a place, by inverse kinematics.
+
+    Args:
+        name: of the arm.
+        place: of its tip in its base [m], shape (3,).
+    """
+
+    def __init__(self, name: str, place: Any):
+        self.arm = SerialArm.named(name)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = _DOWN, place
+        self.q = self.arm.inverse_kinematics(pose, near=self.arm.home)
+
+    def follow(self, place: Any) -> Any:
+        """Joint positions for a place near the last one, by a step of Newton's method [rad], shape (n,)."""
+        pose = self.arm.forward_kinematics(self.q)
+        turn = 0.5 * np.cross(pose[:3, :3].T, _DOWN.T).sum(axis=0)
+        error = np.concatenate([place - pose[:3, 3], turn])
+        if np.abs(error).max() > _NEAR:
+            self.q = self.q + self.rates(error)
+        return self.q
+
+    def rates(self, twist: Any) -> Any:
+        """Of the joints for a velocity of the tool, shape (6,), and for a small way likewise, shape (n,)."""
+        return np.linalg.pinv(self.arm.jacobian(self.q)) @ twist
+
+
+def turns(twist: Any) -> bool:
+    """Whether a velocity of the tool, linear above turning, shape (6,), turns it: no arm here simulates that."""
+    return bool(np.abs(np.asarray(twist[3:])).max() > _TURN)
 
 
 def words_of(module: str, about: str | None) -> argparse.ArgumentParser:

@@ -1,9 +1,10 @@
 """A simulated arm that speaks as a UR does, to rehearse with: RTDE, dashboard and script port, on a loopback address.
 
 `python -m palpate_rehearsal.rtde_arm --address 127.0.0.9`. It knows of ur-rtde's control script what a press needs:
-speedL, servoL and their stops, zeroFtSensor, the watchdog, the end. Every other command ends the script, and is named
-on standard error. Of the variables of RTDE, time, pose, force, status and the registers of ur-rtde are simulated;
-others are 0, and an unknown one is refused.
+speedL, servoL and their stops, zeroFtSensor, the watchdog, questions that its state answers, the end. Every other
+command ends the script, and is named on standard error; so are other scripts. The tool keeps pointing down, and the
+joints are those of a UR5e. Variables of RTDE that are not simulated are NaN, or 0 where they are integers; an unknown
+one is NOT_FOUND.
 """
 
 from __future__ import annotations
@@ -11,71 +12,30 @@ from __future__ import annotations
 import selectors
 import socket
 import struct
-import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from palpate_rehearsal.rehearsal import START, ToolAxisArm, arm_of, loopback, ready, ticks, words_of
+from palpate_rehearsal.rehearsal import arm_of, loopback, ready, ticks, words_of
+from palpate_rehearsal.rtde_controller import Controller
+from palpate_rehearsal.rtde_dictionary import CODES, INPUTS, OUTPUTS, UNKNOWN
 
 RTDE, SCRIPT, DASHBOARD = 30004, 30003, 29999
 _VERSION = (5, 15, 0, 0)
-_RUNNING, _STOPPED = 2, 1
-READY, DONE = 1, 2
-# Numbers of ur-rtde's commands.
-NOTHING, ZERO, SPEEDL, SPEED_STOP, SERVO_STOP, SERVOL, WATCHDOG, STOP = 0, 8, 10, 15, 16, 24, 35, 255
-_DONE = {ZERO, SPEED_STOP, SERVO_STOP, WATCHDOG}
-_TYPES = {
-    "VECTOR6D": "target_q target_qd target_qdd target_current target_moment actual_q actual_qd actual_current"
-    " actual_current_window joint_control_output actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose"
-    " target_TCP_speed joint_temperatures actual_joint_voltage payload_inertia ft_raw_wrench external_force_torque",
-    "VECTOR3D": "actual_tool_accelerometer elbow_position elbow_velocity payload_cog",
-    "VECTOR6INT32": "joint_mode",
-    "UINT64": "actual_digital_input_bits actual_digital_output_bits",
-    "UINT32": "runtime_state robot_status_bits safety_status_bits analog_io_types euromap67_input_bits"
-    " euromap67_output_bits tool_mode tool_analog_input_types output_bit_registers0_to_31 output_bit_registers32_to_63"
-    " input_bit_registers0_to_31 input_bit_registers32_to_63 script_control_line speed_slider_mask",
-    "INT32": "robot_mode safety_mode safety_status tool_output_voltage time_scale_source",
-    "UINT8": "tool_output_mode tool_digital_output0_mode tool_digital_output1_mode standard_digital_output_mask"
-    " configurable_digital_output_mask standard_digital_output configurable_digital_output standard_analog_output_mask"
-    " standard_analog_output_type",
-    "DOUBLE": "timestamp actual_execution_time speed_scaling target_speed_fraction actual_momentum actual_main_voltage"
-    " actual_robot_voltage actual_robot_current standard_analog_input0 standard_analog_input1 standard_analog_output0"
-    " standard_analog_output1 standard_analog_output_0 standard_analog_output_1 io_current euromap67_24V_voltage"
-    " euromap67_24V_current tool_analog_input0 tool_analog_input1 tool_output_current tool_temperature tcp_force_scalar"
-    " payload joint_position_deviation_ratio collision_detection_ratio speed_slider_fraction",
-}
-_TYPE_OF = {name: kind for kind, names in _TYPES.items() for name in names.split()}
-_REGISTERS = {"bit_register_": "BOOL", "int_register_": "INT32", "double_register_": "DOUBLE"}
+_OURS = b"def rtde_control():"
+"""By which ur-rtde's control script is known."""
 _DASHBOARD = {
     "PolyscopeVersion": "URSoftware 5.15.0.1202319 (Aug 22 2023)",
     "is in remote control": "true",
-    "running": "Program running: true",
     "robotmode": "Robotmode: RUNNING",
-    "stop": "Stopped",
     "get serial number": "20235500001",
     "get robot model": "UR5",
 }
 
 
-def kind_of(name: str) -> str:
-    """The type of a variable of RTDE, as its guide has it; NOT_FOUND of an unknown one."""
-    way, _, rest = name.partition("_")
-    register = next((kind for prefix, kind in _REGISTERS.items() if rest.startswith(prefix)), None)
-    if way in {"input", "output"} and register is not None:
-        return register
-    return _TYPE_OF.get(name, "NOT_FOUND")
-
-
-_CODES = {
-    "VECTOR6D": "6d", "VECTOR3D": "3d", "VECTOR6INT32": "6i", "UINT64": "Q", "UINT32": "I", "INT32": "i", "UINT8": "B",
-    "BOOL": "?", "DOUBLE": "d",
-}  # fmt: skip
-
-
 @dataclass
 class Client:
-    """One connection to RTDE.
+    """One connection to RTDE or to the script port.
 
     Args:
         socket: of it.
@@ -83,6 +43,8 @@ class Client:
         outputs: variables that it asked for.
         inputs: recipes that it sends, by number.
         started: whether it wants packets.
+        every: so many ticks of the arm from one packet to the next.
+        script: what has come of one, and is not known yet.
     """
 
     socket: socket.socket
@@ -90,86 +52,8 @@ class Client:
     outputs: list[str] = field(default_factory=list)
     inputs: dict[int, list[str]] = field(default_factory=dict)
     started: bool = False
-
-
-class Controller:
-    """The arm, and what a control script would do with it.
-
-    Args:
-        arm: the simulated arm.
-    """
-
-    def __init__(self, arm: ToolAxisArm):
-        self.arm = arm
-        self.running, self.state = False, READY
-        self.speed, self.zero = 0.0, 0.0
-        self.height: float | None = None
-        self.least, self.heard = 0.0, 0.0
-        self.commands: list[int] = []
-        self.master: Client | None = None
-
-    def start_script(self) -> None:
-        """A control script has come, and runs."""
-        self.running, self.state = True, READY
-        self.least, self.heard, self.speed, self.height = 0.0, self.arm.time, 0.0, None
-
-    def obey(self, numbers: dict[str, Any]) -> None:
-        """A packet of registers."""
-        command = int(numbers.get("input_int_register_0", 0))
-        self.heard = self.arm.time
-        if command == NOTHING:
-            self.state = READY
-            return
-        if not self.running:
-            return
-        self.commands.append(command)
-        value = [float(numbers.get(f"input_double_register_{i}", 0.0)) for i in range(8)]
-        if command in {SPEEDL, SERVOL}:
-            self.speed, self.height = -value[2], (value[2] if command == SERVOL else None)
-            self.arm.aside = value[:2] if command == SPEEDL else (0.0, 0.0)
-            return
-        if command in {SPEED_STOP, SERVO_STOP, STOP}:
-            self.speed, self.height = 0.0, None
-        if command == ZERO:
-            self.zero = self.arm.reading()[2]
-        if command == WATCHDOG:
-            self.least = value[0]
-        if command == STOP:
-            self.running = False
-        elif command not in _DONE:
-            self._refuse(command)
-            return
-        self.state = DONE
-
-    def _refuse(self, command: int) -> None:
-        """End the script, as a controller does with a command that it cannot execute."""
-        sys.stderr.write(f"rtde_arm: command {command} of ur-rtde is not simulated: the script has ended\n")
-        self.speed, self.height, self.running = 0.0, None, False
-
-    def tick(self) -> None:
-        """Go on by one tick."""
-        if self.least and self.arm.time - self.heard > 1.0 / self.least:
-            self.speed, self.height, self.running = 0.0, None, False
-        if self.height is not None:
-            self.speed = (START - self.height - self.arm.command) / self.arm.world.tick
-        self.arm.tick(self.speed)
-
-    def value(self, name: str) -> Any:
-        """Value of a variable, by its name."""
-        fx, fy, fz, *_, x, y, z = self.arm.reading()[:9]
-        code = _CODES[kind_of(name)]
-        known = {
-            "timestamp": self.arm.time,
-            "actual_TCP_pose": (x, y, z, 3.14159, 0.0, 0.0),
-            # The controller shows what the surface exerts on the tool.
-            "actual_TCP_force": (-fx, -fy, self.zero - fz, 0.0, 0.0, 0.0),
-            "robot_status_bits": 1 | (2 if self.running else 0),
-            "safety_status_bits": 1,
-            "runtime_state": _RUNNING if self.running else _STOPPED,
-            "output_int_register_0": self.state,
-        }
-        zeros = struct.unpack(f">{code}", bytes(struct.calcsize(f">{code}")))
-        return known.get(name, zeros if len(zeros) > 1 else zeros[0])
+    every: int = 1
+    script: bytes = b""
 
 
 class Server:
@@ -178,6 +62,9 @@ class Server:
     Args:
         address: of the loopback.
         controller: of the arm.
+
+    Raises:
+        OSError: a port is taken.
     """
 
     def __init__(self, address: str, controller: Controller):
@@ -194,11 +81,17 @@ class Server:
 
     def serve(self, seconds: float) -> None:
         """Run at real time until the seconds of the arm are over."""
-        for _ in ticks(self.controller.arm, seconds, self._listen):
+        for number, _ in enumerate(ticks(self.controller.arm, seconds, self._listen)):
             self.controller.tick()
             for client in list(self.clients.values()):
-                if client.started:
+                if client.started and number % client.every == 0:
                     self._send(client, "U", self._packet(client))
+
+    def close(self) -> None:
+        """Let go of all connections, and of the ports."""
+        for key in list(self.selector.get_map().values()):
+            key.fileobj.close()  # type: ignore[union-attr]
+        self.selector.close()
 
     def _listen(self, seconds: float) -> None:
         """Handle messages for so long, and once at least."""
@@ -215,7 +108,7 @@ class Server:
             made.setblocking(False)
             made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self.selector.register(made, selectors.EVENT_READ, ("data", port))
-            if port == RTDE:
+            if port != DASHBOARD:
                 self.clients[made] = Client(made)
             if port == DASHBOARD:
                 made.send(b"Connected: Universal Robots Dashboard Server\n")
@@ -233,7 +126,7 @@ class Server:
         elif port == DASHBOARD:
             self._dashboard(one, data)
         else:
-            self.controller.start_script()
+            self._script(self.clients[one], data)
 
     def _lose(self, one: socket.socket) -> None:
         self.selector.unregister(one)
@@ -242,9 +135,26 @@ class Server:
             self.controller.master = None  # its script runs on: the watchdog alone ends the motion
         one.close()
 
+    def _script(self, client: Client, data: bytes) -> None:
+        """A script ends where its sender says so, or after so much of another one than ur-rtde's."""
+        if _OURS in client.script:
+            return
+        client.script += data
+        if _OURS in client.script:
+            self.controller.start_script()
+        elif client.script.strip() and (b"\nend" in client.script or len(client.script) > len(data)):
+            self.controller.end(
+                f"a script that is not ur-rtde's ({client.script[:40].decode(errors='replace')!r})"
+            )
+
     def _dashboard(self, one: socket.socket, data: bytes) -> None:
         for line in data.decode(errors="replace").splitlines():
-            one.send((_DASHBOARD.get(line.strip(), "could not understand") + "\n").encode())
+            word = line.strip()
+            if word == "stop":
+                self.controller.end()
+            running = f"Program running: {str(self.controller.running).lower()}"
+            known = _DASHBOARD | {"running": running, "stop": "Stopped"}
+            one.send((known.get(word, f"could not understand: '{word}'") + "\n").encode())
 
     def _rtde(self, client: Client, data: bytes) -> None:
         client.buffer += data
@@ -258,13 +168,15 @@ class Server:
 
     def _answer(self, client: Client, kind: str, body: bytes) -> None:
         if kind == "V":
-            self._send(client, "V", b"\x01")
+            self._send(client, "V", bytes([body == b"\x00\x02"]))
         elif kind == "v":
             self._send(client, "v", struct.pack(">4I", *_VERSION))
         elif kind == "O":
             asked = [name for name in body[8:].decode(errors="replace").split(",") if name]
-            kinds = [kind_of(name) for name in asked]
-            client.outputs = [] if "NOT_FOUND" in kinds else asked
+            kinds = [OUTPUTS.get(name, UNKNOWN) for name in asked]
+            frequency = struct.unpack(">d", body[:8])[0] if len(body) >= 8 else 0.0
+            client.every = max(round(self.controller.arm.arm.rate / frequency), 1) if frequency > 0.0 else 1
+            client.outputs = [] if UNKNOWN in kinds else asked
             self._send(client, "O", bytes([bool(client.outputs)]) + ",".join(kinds).encode())
         elif kind == "I":
             self._inputs(client, [name for name in body.decode().split(",") if name])
@@ -273,7 +185,7 @@ class Server:
             self._send(client, kind, b"\x01")
         elif kind == "U":
             names = client.inputs.get(body[0], [])
-            code = ">" + "".join(_CODES[kind_of(name)] for name in names)
+            code = ">" + "".join(CODES[INPUTS[name]] for name in names)
             if names and len(body) == 1 + struct.calcsize(code):
                 self.controller.obey(dict(zip(names, struct.unpack(code, body[1:]), strict=True)))
 
@@ -283,8 +195,8 @@ class Server:
         if master is not None and master is not client:
             self._send(client, "I", b"\x00" + ",".join("IN_USE" for _ in names).encode())
             return
-        kinds, number = [kind_of(name) for name in names], 0
-        if "NOT_FOUND" not in kinds:
+        kinds, number = [INPUTS.get(name, UNKNOWN) for name in names], 0
+        if UNKNOWN not in kinds:
             self.controller.master = client
             number = len(client.inputs) + 1
             client.inputs[number] = names
@@ -293,7 +205,7 @@ class Server:
     def _packet(self, client: Client) -> bytes:
         parts = [b"\x01"]
         for name in client.outputs:
-            value, code = self.controller.value(name), ">" + _CODES[kind_of(name)]
+            value, code = self.controller.value(name), ">" + CODES[OUTPUTS[name]]
             parts.append(struct.pack(code, *value) if isinstance(value, tuple) else struct.pack(code, value))
         return b"".join(parts)
 
@@ -311,7 +223,10 @@ def main() -> None:
     told = words.parse_args()
     address = loopback(words, told.address)
     arm = arm_of(told, (0.0, 0.0, 3.0))
-    server = Server(address, Controller(arm))
+    try:
+        server = Server(address, Controller(arm))
+    except OSError as error:
+        words.error(f"--address {address}: {error.strerror or error}")
     ready(f"rtde:{address}")
     server.serve(told.seconds)
 

@@ -11,8 +11,10 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from palpate.wires import sim as protocol
-from palpate_rehearsal.rehearsal import ToolAxisArm, arm_of, ready, ticks, words_of
+from palpate_rehearsal.rehearsal import REST, ToolAxisArm, arm_of, ready, ticks, words_of
 
 _REST = 10
 """Ticks without a command after which it rests."""
@@ -30,7 +32,7 @@ class Master:
     session: int
     heard: float
     number: int = 0
-    speed: float = 0.0
+    velocity: Any = REST
     ticks: int = 0
     sent: int = 0
 
@@ -44,16 +46,17 @@ def serve(arm: ToolAxisArm, listening: socket.socket, seconds: float) -> None:
         seconds: of the arm's time.
     """
     listening.setblocking(False)
-    master, speed = None, 0.0
+    master, velocity = None, np.zeros(3)
     for _ in ticks(arm, seconds):
         master = _receive(listening, master, arm)
-        wanted = 0.0
+        wanted = np.zeros(3)
         if master is not None:
             master.ticks += 1
-            wanted = master.speed if master.ticks <= _REST else 0.0
+            if master.ticks <= _REST:
+                wanted = np.array(master.velocity)
         step = _SPEED_UP * arm.world.tick
-        speed = wanted if wanted else speed - min(max(speed, -step), step)
-        arm.tick(speed)
+        velocity = wanted if wanted.any() else velocity - np.clip(velocity, -step, step)
+        arm.tick(velocity)
         if master is not None:
             body = protocol.state(master.sent, arm.time, arm.reading())
             master.sent += 1
@@ -85,16 +88,16 @@ def _receive(listening: socket.socket, master: Master | None, arm: ToolAxisArm) 
             )
         elif master is not None and (address, session) == (master.address, master.session):
             master.heard = now
-            _obey(master, arm, kind, body)
+            _obey(master, kind, body)
 
 
-def _obey(master: Master, arm: ToolAxisArm, kind: int, body: bytes) -> None:
+def _obey(master: Master, kind: int, body: bytes) -> None:
     if kind == protocol.STOP:
-        master.speed, master.heard = 0.0, master.heard - _LEFT
+        master.velocity, master.heard = REST, master.heard - _LEFT
     found = protocol.read_move(body) if kind == protocol.MOVE else None
     if found is not None and found[0] > master.number:
         master.number, master.ticks = found[0], 0
-        arm.aside, master.speed = found[1][:2], -found[1][2]
+        master.velocity = found[1]
 
 
 def _send(listening: socket.socket, data: bytes, address: Any) -> None:

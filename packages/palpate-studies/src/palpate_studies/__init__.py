@@ -10,12 +10,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from palpate.bench.metrics import METRICS, Metric, Window
+    from palpate_studies.metrics import METRICS, Metric, Window
     from palpate_studies.run_one import Local
     from palpate_studies.run_study import run
 
 _NAMES = {
-    "palpate.bench.metrics": ("METRICS", "Window", "Metric"),
+    "palpate_studies.metrics": ("METRICS", "Window", "Metric"),
     "palpate_studies.run_one": ("Local",),
     "palpate_studies.run_study": ("run",),
 }

@@ -13,11 +13,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.figures import FigureOptions
-from palpate.cli.options.flags import FLAG
-from palpate.cli.options.names import QUIET, shipped_names
-from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
+from palpate.cli.options.common import (
+    QUIET,
+    FigureOptions,
+    FolderOptions,
+    KnownOptions,
+    PluginOptions,
+    print_names,
+    shipped_names,
+    source_of,
+)
+from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import (
     COMPILING,
     confirmed,
@@ -50,25 +56,17 @@ _SHOWN = 3
 @Parameter(name="*", group=Group("A cluster", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ClusterOptions:
-    """A cluster for the runs, in place of this machine's cores.
-
-    Parameters
-    ----------
-    scheduler
-        Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. Their answers can
-        execute code here: name only a cluster that you trust as this machine.
-    tls_ca
-        Certificate of the authority that signed those of the cluster, a PEM file, for tls://.
-    tls_cert
-        Certificate of this machine, likewise.
-    tls_key
-        Its key, likewise.
-    """
+    """A cluster for the runs, in place of this machine's cores."""
 
     scheduler: str | None = None
+    """Address of a Dask scheduler whose workers do the runs, tcp://HOST:PORT or tls://HOST:PORT. Their answers
+    can execute code here: name only a cluster that you trust as this machine."""
     tls_ca: Path | None = None
+    "Certificate of the authority that signed those of the cluster, a PEM file, for tls://."
     tls_cert: Path | None = None
+    "Certificate of this machine, likewise."
     tls_key: Path | None = None
+    "Its key, likewise."
 
     def cluster(self) -> Cluster | None:
         """The cluster; None if none is named."""

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.bench.metrics import metric_of
 from palpate.report.page import Table
+from palpate_studies.metrics import metric_of
 from palpate_studies.pairing import (
     Drawn,
     Entrant,

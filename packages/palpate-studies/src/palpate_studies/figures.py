@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from palpate.arrays import Mask
 from palpate.bench import Experiment, changed
 from palpate.bench.force_input import DONE
-from palpate.bench.metrics import Metric, metric_of
 from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report import style
+from palpate_studies.metrics import Metric, metric_of
 from palpate_studies.pairing import FEW, Drawn, StudyRows, logarithmic, restricted_to, sentence, short
 from palpate_studies.parameters import Axis
 from palpate_studies.plan import RunPlan, StudyPart
@@ -325,7 +325,7 @@ def _growing(part: StudyPart, name: str, fixed: Mapping[str, Any]) -> Growing:
 
 @cache
 def _growth(experiment: Experiment) -> float | None:
-    from palpate.analysis import linearise
+    from palpate_studies.analysis import linearise
 
     try:
         return math.log(linearise(experiment).growth)

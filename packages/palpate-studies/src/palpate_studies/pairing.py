@@ -18,8 +18,8 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench.force_input import DONE
-from palpate.bench.metrics import Metric, metric_of
 from palpate.errors import unknown
+from palpate_studies.metrics import Metric, metric_of
 from palpate_studies.parameters import Axis, Label, label
 from palpate_studies.plan import MAIN, RunPlan, StudyPart
 from palpate_studies.report.lines import Scale

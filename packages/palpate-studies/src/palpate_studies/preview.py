@@ -14,12 +14,12 @@ import numpy as np
 from palpate.bench import Experiment, build
 from palpate.bench.build import AnyExperiment, build_any, check_parts
 from palpate.bench.force_input import DONE, NO_CONTACT
-from palpate.bench.metrics import Window, metric_of
-from palpate.bench.metrics.verdicts import try_metric
 from palpate.bench.speed import cores
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.text import duration
+from palpate_studies.metrics import Window, metric_of
+from palpate_studies.metrics.verdicts import try_metric
 from palpate_studies.parameters import Label
 from palpate_studies.plan import MAIN, TRIED, RunPlan, RunSetting, samples
 from palpate_studies.run_one import FAILED, REFUSED, RunJob, Stopped, run_one

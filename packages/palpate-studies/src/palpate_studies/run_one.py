@@ -22,12 +22,12 @@ import msgspec
 
 import palpate
 from palpate.bench.build import AnyExperiment, build_any
-from palpate.bench.metrics import Window, metric_of
 from palpate.bench.speed import cores
 from palpate.errors import InputError
 from palpate.logs.store import write_parquet
 from palpate.plugins import Plugin
 from palpate.records import Record
+from palpate_studies.metrics import Window, metric_of
 from palpate_studies.parameters import Label
 from palpate_studies.plan import RunPlan, RunSetting
 

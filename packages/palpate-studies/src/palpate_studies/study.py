@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal, TypeVar
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.metrics import metric_of
 from palpate.bench.toml_parts import TomlFiles, explain, not_finite
 from palpate.errors import InputError, unknown
 from palpate.files import read_toml
 from palpate.plugins import look_in
 from palpate.signals.types import Positive, Table
+from palpate_studies.metrics import metric_of
 
 Points = Annotated[int, Meta(ge=1, le=1_000_000)]
 Seed = Annotated[int, Meta(ge=0)]

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench.force_input import DONE
-from palpate.bench.metrics import metric_of
 from palpate.files import with_author, write_json, write_text
 from palpate.report.page import Table
 from palpate_studies import effects
 from palpate_studies.effects import charts
 from palpate_studies.figures import draw, figures
+from palpate_studies.metrics import metric_of
 from palpate_studies.pairing import PairedComparison, comparisons, short, with_unit
 from palpate_studies.plan import MAIN, RunPlan
 from palpate_studies.preview import MetricMean, Ranked, Ranking, rankings

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from palpate.bench import load
-from palpate.bench.metrics import METRICS
 from palpate.errors import InputError
 from palpate_studies import figures
 from palpate_studies.figures import bounds, cells, equivalent, lines, points, references
+from palpate_studies.metrics import METRICS
 from palpate_studies.pairing import StudyRows
 from palpate_studies.plan import MAIN
 from palpate_studies.preview import MetricMean, rankings
@@ -231,7 +231,7 @@ def test_the_equivalent_of_the_neural_controller_is_its_integrator():
 
 @pytest.mark.long
 def test_the_bound_is_where_the_linear_model_turns_unstable():
-    from palpate.analysis import linearise
+    from palpate_studies.analysis import linearise
 
     source = text(
         '"surface.stiffness" = { log = [2000.0, 100000.0], points = 3 }\n"surface.damping" = [60.0]', fixed=""

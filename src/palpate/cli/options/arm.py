@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.values import span, vector, with_std
+from palpate.cli.options.values import FLAG, SIGNED, span, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,37 +18,26 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class FrameOptions:
-    """Axes, points and signs of a wrench and a pose.
-
-    Parameters
-    ----------
-    wrench_frame
-        Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool.
-    sensor_rpy
-        Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad.
-    tcp
-        The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm.
-    wrench_at
-        The reference point of the torque, likewise; the pose's origin if not given.
-    force_sign
-        +1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction: from the
-        surface on the tool. Detected if not given.
-    normal
-        Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not given.
-    gravity_compensated
-        The tool's weight is already subtracted from the wrench.
-    free
-        BEGIN,END in seconds of an interval of free motion; detected if not given.
-    """
+    """Axes, points and signs of a wrench and a pose."""
 
     wrench_frame: Literal["base", "tool", "sensor"] | None = None
+    "Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool."
     sensor_rpy: Annotated[str | None, SIGNED] = None
+    "Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad."
     tcp: Annotated[str | None, SIGNED] = None
+    "The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm."
     wrench_at: Annotated[str | None, SIGNED] = None
+    "The reference point of the torque, likewise; the pose's origin if not given."
     force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
+    """+1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction:
+    from the surface on the tool. Detected if not given."""
     normal: Annotated[str | None, SIGNED] = None
+    """Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not
+    given."""
     gravity_compensated: Annotated[bool, FLAG] = False
+    "The tool's weight is already subtracted from the wrench."
     free: str | None = None
+    "BEGIN,END in seconds of an interval of free motion; detected if not given."
 
     @property
     def sign(self) -> int | None:
@@ -94,30 +82,21 @@ class FrameOptions:
 @Parameter(name="*", group=Group("The arm", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class ArmOptions:
-    """Mass and stiffness between the sensors and the surface.
-
-    Parameters
-    ----------
-    tool_mass
-        Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is subtracted from M.
-    robot_stiffness
-        Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of K.
-    robot_mass
-        The arm's mass at the tip, before the force sensor, which swings on its own stiffness, in kg or kg:STD.
-    robot_stiffness_from
-        A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it.
-    payload
-        File of palpate payload: the tool's weight, and the mass to subtract from M.
-    position_from
-        joints: the position comes from joint encoders and does not contain the arm's deflection; tip: it does.
-    """
+    """Mass and stiffness between the sensors and the surface."""
 
     tool_mass: str | None = None
+    "Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is subtracted from M."
     payload: Path | None = None
+    "File of palpate payload: the tool's weight, and the mass to subtract from M."
     robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
+    """Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of
+    K."""
     robot_mass: str | None = None
+    "The arm's mass at the tip, before the force sensor, which swings on its own stiffness, in kg or kg:STD."
     robot_stiffness_from: Path | None = None
+    "A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it."
     position_from: Literal["joints", "tip"] | None = None
+    "joints: the position comes from joint encoders and does not contain the arm's deflection; tip: it does."
 
     def weighed(self) -> Payload | None:
         """The payload on the sensor, if it was weighed."""

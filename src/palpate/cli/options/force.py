@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
-from palpate.cli.options.names import QUIET, LoopArm
-from palpate.cli.options.values import with_std
-from palpate.cli.options.written import WRITTEN, FileOptions
+from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
+from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,21 +21,15 @@ if TYPE_CHECKING:
 @Parameter(name="*", group=Group("The arm", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class ArmOptions:
-    """The arm.
-
-    Parameters
-    ----------
-    arm
-        ur5e, fr3, panda, iiwa14, thesis, or a TOML file.
-    loop_from
-        A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay.
-    push
-        Column of the measured force in that log, in which the tip is pushed once: it identifies a servo that yields.
-    """
+    """The arm whose loop is tuned."""
 
     arm: Annotated[LoopArm, QUIET]
+    "ur5e, fr3, panda, iiwa14, thesis, or a TOML file."
     loop_from: Path | None = None
+    "A log of commanded and measured position in free motion: it identifies the arm's inner loop and delay."
     push: str | None = None
+    """Column of the measured force in that log, in which the tip is pushed once: it identifies a servo that
+    yields."""
 
     def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
         """The arm, and notes on the identification of its inner loop."""
@@ -55,29 +47,21 @@ class ArmOptions:
 @Parameter(name="*", group=Group("The surface", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class SurfaceOptions:
-    """Prior of the surface, without a log.
-
-    Parameters
-    ----------
-    stiffness
-        Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT.
-    stiffness_cap
-        Largest possible stiffness, N/m.
-    damping_max
-        Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives.
-    surface_speed
-        Speed of a moving surface, m/s.
-    """
+    """Prior of the surface, without a log."""
 
     stiffness: Annotated[str | None, SIGNED] = None
+    "Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT."
     stiffness_cap: Annotated[str | None, SIGNED] = None
+    "Largest possible stiffness, N/m."
     damping_max: Annotated[str | None, SIGNED] = None
+    "Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives."
     surface_speed: Annotated[float | None, SIGNED] = None
+    "Speed of a moving surface, m/s."
 
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest stiffness [N/m]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         return spread("--stiffness", str(self.stiffness), "stiffness")
 
@@ -95,18 +79,12 @@ class SurfaceOptions:
 @Parameter(name="*", group=Group("The press", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class PressOptions:
-    """Desired force and its limit.
-
-    Parameters
-    ----------
-    force
-        Desired force, N; the smallest one if it varies.
-    peak
-        Highest force allowed at the touch, N.
-    """
+    """Desired force and its limit."""
 
     force: Annotated[str, SIGNED]
+    "Desired force, N; the smallest one if it varies."
     peak: Annotated[str | None, SIGNED] = None
+    "Highest force allowed at the touch, N."
 
     @property
     def desired(self) -> float:
@@ -122,33 +100,22 @@ class PressOptions:
 @Parameter(name="*", group=Group("A slide along the surface", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class SlideNumberOptions:
-    """Numbers of a slide, for palpate slide and palpate.force.SlidingLoop.
-
-    Parameters
-    ----------
-    slide
-        Tune for a slide too, and print on which surfaces it holds the force within 3 % rms.
-    mu_max
-        Largest friction coefficient there may be.
-    speed
-        Speed along the surface, as 30:mm/s.
-    radius
-        Smallest radius of curvature of the surface, as 100:mm.
-    tilt
-        Standard deviation of the given normal, in degrees.
-    step
-        Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it.
-    touches
-        Spacing of three light touches that measure the normal before the slide; 0:mm for none.
-    """
+    """Numbers of a slide, for palpate slide and palpate.force.SlidingLoop."""
 
     slide: Annotated[bool, FLAG] = False
+    "Tune for a slide too, and print on which surfaces it holds the force within 3 % rms."
     mu_max: Annotated[float, SIGNED] = 0.9
+    "Largest friction coefficient there may be."
     speed: Annotated[str, SIGNED] = "30:mm/s"
+    "Speed along the surface, as 30:mm/s."
     radius: Annotated[str, SIGNED] = "100:mm"
+    "Smallest radius of curvature of the surface, as 100:mm."
     tilt: Annotated[float, SIGNED] = 7.0
+    "Standard deviation of the given normal, in degrees."
     step: Annotated[str, SIGNED] = "0:mm"
+    "Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it."
     touches: Annotated[str, SIGNED] = "10:mm"
+    "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
 
     def added_to(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
@@ -196,30 +163,20 @@ def with_slide(
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class ColumnOptions:
-    """Columns of a log of a press, and of the one that --loop-from names.
-
-    Parameters
-    ----------
-    time
-        Column of the time, in s if no unit is given.
-    rate
-        Rows per second, for a log without a column of time.
-    position
-        Column of the measured position, as position_mm:mm.
-    force_column
-        Column of the force in the log of a press, as force_mN:mN.
-    command
-        Column of the commanded position in the log of --loop-from, as target_mm:mm.
-    payload
-        For a log of a press: the file of palpate payload, whose mass is subtracted from M.
-    """
+    """Columns of a log of a press, and of the one that --loop-from names."""
 
     time: str | None = None
+    "Column of the time, in s if no unit is given."
     rate: float | None = None
+    "Rows per second, for a log without a column of time."
     position: str | None = None
+    "Column of the measured position, as position_mm:mm."
     force_column: str | None = None
+    "Column of the force in the log of a press, as force_mN:mN."
     command: str | None = None
+    "Column of the commanded position in the log of --loop-from, as target_mm:mm."
     payload: Path | None = None
+    "For a log of a press: the file of palpate payload, whose mass is subtracted from M."
 
     @property
     def of_press(self) -> dict[str, Any]:
@@ -231,29 +188,19 @@ class ColumnOptions:
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions(FileOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Where to write the gains (a TOML file) or the certificate (a JSON file).
-    """
+    """Where gains or a certificate are written."""
 
     out: Path | None = None
+    "Where to write the gains (a TOML file) or the certificate (a JSON file)."
 
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
 class TuningOutputOptions(OutputOptions):
-    """Files to write, and how much to print.
-
-    Parameters
-    ----------
-    verbose
-        Print every figure, every warning, and the cases that no proof covers.
-    """
+    """Files to write, and how much to print."""
 
     verbose: Annotated[bool, FLAG] = False
+    "Print every figure, every warning, and the cases that no proof covers."
 
 
 def inner_loop(log: Path, columns: ColumnOptions, push: str | None = None) -> InnerLoop:
@@ -288,19 +235,13 @@ def inner_loop(log: Path, columns: ColumnOptions, push: str | None = None) -> In
 @Parameter(name="*", group=Group("Young's modulus", sort_key=5))
 @dataclass(frozen=True, kw_only=True)
 class IndenterOptions:
-    """Shape of the indenter, if it is known.
-
-    Parameters
-    ----------
-    indenter
-        sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or cone:70:deg.
-        It adds Young's modulus E.
-    poisson
-        Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given.
-    """
+    """Shape of the indenter, if it is known."""
 
     indenter: str | None = None
+    """sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or
+    cone:70:deg. It adds Young's modulus E."""
     poisson: Annotated[str | None, SIGNED] = None
+    "Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given."
 
     def check(self) -> None:
         """Check the options before any work is done."""

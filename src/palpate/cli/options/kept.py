@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.names import QUIET, Preset
+from palpate.cli.options.common import QUIET, Preset
 from palpate.errors import InputError, unknown
 from palpate.files import check_place, read_text, read_toml, write_text
 from palpate.files.ownership import MADE
@@ -37,21 +37,15 @@ _KNOWN_BY = ("identify", "press")
 @Parameter(name="*", group=Group("Options from a file", sort_key=7))
 @dataclass(frozen=True, kw_only=True)
 class CellOptions:
-    """Saved options.
-
-    Parameters
-    ----------
-    options
-        A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.
-    preset
-        ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides it.
-    save_options
-        Where to write the options of log, frame, arm and model, for --options.
-    """
+    """Options saved in a file."""
 
     options: Path | None = None
+    'A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.'
     preset: Annotated[Preset | None, QUIET] = None
+    """ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides
+    it."""
     save_options: Path | None = None
+    "Where to write the options of log, frame, arm and model, for --options."
 
     def check(self) -> None:
         """Check the path before any work is done."""

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.names import QUIET, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.values import vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,34 +27,25 @@ RETREAT = 0.002
 @Parameter(name="*", group=Group("The press", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class AskOptions:
-    """The press, of any arm.
-
-    Parameters
-    ----------
-    force
-        Desired force, N, or with a unit as 20:N.
-    seconds
-        Duration of the press from the touch on.
-    gains
-        Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if left
-        out.
-    normal
-        Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated arm
-        presses where its tip points at home if left out.
-    probe
-        Share of the force by which it is lowered three times, to identify the surface: a constant force contains
-        little information for palpate identify. If left out, 0.2 for a simulated arm, 0 for a real one.
-    payload
-        File of palpate payload; the tool's mass is subtracted from M. A simulated arm carries that tool with its
-        sensor's bias; for a real arm the sensor's reading in free motion is compared with it.
-    """
+    """The press, of any arm."""
 
     force: Annotated[str | None, SIGNED] = None
+    "Desired force, N, or with a unit as 20:N."
     seconds: Annotated[float, SIGNED] = 6.0
+    "Duration of the press from the touch on."
     gains: Path | None = None
+    """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
+    left out."""
     normal: Annotated[str | None, SIGNED] = None
+    """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
+    arm presses where its tip points at home if left out."""
     probe: Annotated[float | None, SIGNED] = None
+    """Share of the force by which it is lowered three times, to identify the surface: a constant force
+    contains little information for palpate identify. If left out, 0.2 for a simulated arm, 0 for a real
+    one."""
     payload: Path | None = None
+    """File of palpate payload; the tool's mass is subtracted from M. A simulated arm carries that tool with
+    its sensor's bias; for a real arm the sensor's reading in free motion is compared with it."""
 
     @property
     def tool(self) -> Payload | None:
@@ -78,42 +68,29 @@ class AskOptions:
 @Parameter(name="*", group=Group("A simulated arm", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class SimulatedOptions:
-    """The simulated arm, its surface, and the results.
-
-    Parameters
-    ----------
-    arm
-        ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf.
-    surface
-        The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass.
-    site
-        The tip in the file: a site or a body of MJCF, a link of URDF.
-    mode
-        torque or position: the arm's input; its usual one when left out.
-    physics
-        own or mujoco (extra: arms).
-    controller
-        cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance.
-    at
-        Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out.
-    seed
-        Of the noise; the same seed gives the same numbers.
-    out
-        Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left out.
-    replace
-        Replace the results at --out.
-    """
+    """The simulated arm, its surface, and the results."""
 
     arm: Annotated[SerialArm | None, QUIET] = None
+    "ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf."
     surface: str | None = None
+    "The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass."
     site: str | None = None
+    "The tip in the file: a site or a body of MJCF, a link of URDF."
     mode: Annotated[Mode | None, QUIET] = None
+    "torque or position: the arm's input; its usual one when left out."
     physics: Annotated[Physics, QUIET] = "own"
+    "own or mujoco (extra: arms)."
     controller: Annotated[Controller, QUIET] = "cautious"
+    "cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance."
     at: Annotated[str | None, SIGNED] = None
+    "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
     seed: Annotated[int, WHOLE] = 0
+    "Of the noise; the same seed gives the same numbers."
     out: Path | None = None
+    """Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left
+    out."""
     replace: Annotated[bool, FLAG] = False
+    "Replace the results at --out."
 
     def question(self, asked: AskOptions, surface: KelvinVoigt | None = None) -> Question:
         """The press to simulate, on a surface that is given here or by --surface."""
@@ -148,86 +125,58 @@ class SimulatedOptions:
 @Parameter(name="*", group=Group("A map of a phantom, by a simulated arm", sort_key=5))
 @dataclass(frozen=True, kw_only=True)
 class PhantomOptions:
-    """The phantom and its map.
-
-    Parameters
-    ----------
-    map
-        A phantom, a TOML file: size, stiffness, damping and [[lumps]] with at, radius, stiffness and edge, in m, N/m
-        and N s/m.
-    presses
-        How many presses: sixteen on a grid, then where the map is worst known.
-    stiffer_than
-        A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it.
-    page
-        Where to write the page after each map; it loads itself again until the last.
-    """
+    """The phantom and its map."""
 
     map: Path | None = None
+    """A phantom, a TOML file: size, stiffness, damping and [[lumps]] with at, radius, stiffness and edge, in
+    m, N/m and N s/m."""
     presses: Annotated[int, WHOLE] = 40
+    "How many presses: sixteen on a grid, then where the map is worst known."
     stiffer_than: str | None = None
+    "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
     page: Path | None = None
+    "Where to write the page after each map; it loads itself again until the last."
 
 
 @Parameter(name="*", group=Group("A real arm, over its wire", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class WireOptions:
-    """The wire, and its safeguards.
-
-    Parameters
-    ----------
-    wire
-        rtde:ADDRESS of a UR, franka:ADDRESS, sim:HOST:PORT of a simulated arm in another process, or
-        ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one word.
-        There is no default.
-    dry_run
-        Read the arm, print the planned motion, and end: nothing moves.
-    yes
-        Do not ask for confirmation; for scripts.
-    record
-        Folder for all readings and commands; palpate identify reads its record.parquet.
-    certificate
-        File of palpate certify; without it the lateness is measured, and nothing is proved.
-    retreat
-        Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter.
-    ordinary_priority
-        Do not request real-time priority from the system.
-    recover
-        Build the record of a press that was killed, from the folder of its --record, and end.
-    """
+    """The wire, and its safeguards."""
 
     wire: str | None = None
+    """rtde:ADDRESS of a UR, franka:ADDRESS, sim:HOST:PORT of a simulated arm in another process, or
+    ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one
+    word. There is no default."""
     dry_run: Annotated[bool, FLAG] = False
+    "Read the arm, print the planned motion, and end: nothing moves."
     yes: Annotated[bool, FLAG] = False
+    "Do not ask for confirmation; for scripts."
     record: Path | None = None
+    "Folder for all readings and commands; palpate identify reads its record.parquet."
     certificate: Path | None = None
+    "File of palpate certify; without it the lateness is measured, and nothing is proved."
     retreat: Annotated[str | None, SIGNED] = None
+    "Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter."
     ordinary_priority: Annotated[bool, FLAG] = False
+    "Do not request real-time priority from the system."
     recover: Path | None = None
+    "Build the record of a press that was killed, from the folder of its --record, and end."
 
 
 @Parameter(name="*", group=Group("Limits at which a real arm stops", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
 class LimitOptions:
-    """Limits that end a press over a wire.
-
-    Parameters
-    ----------
-    force_limit
-        Force of any axis, as 40:N.
-    speed_limit
-        Largest commanded speed, as 20:mm/s; at twice this speed the arm stops.
-    travel_limit
-        Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains' stiffest
-        surface: so far a sensor that lies does no harm. Start that close to the surface.
-    time_limit
-        Total duration, as 20:s.
-    """
+    """Limits that end a press over a wire."""
 
     force_limit: Annotated[str | None, SIGNED] = None
+    "Force of any axis, as 40:N."
     speed_limit: Annotated[str | None, SIGNED] = None
+    "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
     travel_limit: Annotated[str | None, SIGNED] = None
+    """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
+    stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
     time_limit: Annotated[str | None, SIGNED] = None
+    "Total duration, as 20:s."
 
 
 def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, of: str) -> None:

@@ -207,8 +207,8 @@ def press_tick(law, s, late, desired, force, position, missed):
 @law
 def stiffness_in(c, press):
     """Stiffness that a press found, and its standard deviation [N/m]; that of an even share of K_u if it found none."""
-    if press.known.std.x > 0.0:
-        return max(c.cap * press.known.found.x, c.floor), c.cap * press.known.std.x
+    if press.estimate.std.x > 0.0:
+        return max(c.cap * press.estimate.value.x, c.floor), c.cap * press.estimate.std.x
     return 0.5 * press.bound.used, 0.29 * press.bound.used
 
 

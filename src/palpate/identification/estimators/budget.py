@@ -98,11 +98,13 @@ def _freedom(system: System, solution: Solution) -> Array:
 
 
 def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:
-    """Bias by noise of the position, (A - N)^-1 N theta, and its apparent information.
+    """Bias by noise of the position, and the information that is only apparent.
 
-    A are the normal equations, N what the noise adds to them (errors in variables: Fuller, 1987, ch. 1). Where the
-    columns tell two parameters apart by little more than their noise, as K from M at one frequency, nothing is told:
-    (A - N)^-1 has no bound there.
+    The normal equations are A + P with the prior P, and N is what the noise adds to A. In the directions in which A + P
+    is 1 and N is diagonal, P is p and N is s, a solution z has the mean (1 - p - s) of the truth and the variance 1 - p
+    (errors in variables: Fuller, 1987, ch. 1). With the prior the truth has so the information
+    p + (1 - p - s)^2/(1 - p): what the columns tell by little more than their noise, as K from M at one frequency or a
+    lag from a damping, only the prior tells.
 
     Args:
         system: of the log.
@@ -115,9 +117,13 @@ def of_position_noise(system: System, solution: Solution, noise: Array) -> Sprea
     value, vector = np.linalg.eigh(solution.cov / np.outer(size, size))
     half = size[:, None] * vector * np.sqrt(np.maximum(value, 0.0))  # cov = half half^T
     share, turn = np.linalg.eigh(half.T @ added @ half)
-    own, kept = half @ turn, np.maximum(1 - share, _ALONE)
-    pulled = (own / kept) @ (own.T @ added @ solution.theta)
-    return Spread(pulled**2 + np.sum(own**2 * np.maximum(kept**-2 - 1, 0.0), axis=1))
+    own = half @ turn
+    prior = np.minimum(system.prior_weight @ own**2, 1 - _ALONE)
+    told = np.maximum(1 - prior - share, 0.0) / (1 - prior)
+    known = np.maximum(prior + (1 - prior) * told**2, _ALONE)
+    normal = np.tensordot(weight, system.products[:, :-1, :-1], axes=1) + np.diag(system.prior_weight)
+    pulled = own @ ((told / known - 1) * (own.T @ normal @ (solution.theta - system.prior_mean)))
+    return Spread(pulled**2 + own**2 @ np.maximum(1 / known - 1, 0.0))
 
 
 def of_stretches(system: System, solution: Solution) -> Spread:

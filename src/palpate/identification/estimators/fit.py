@@ -128,26 +128,6 @@ def bias_corrected(
     return Compensation(np.append(part.step, 0.0), np.pad(part.less, (0, 1)), np.pad(part.doubt, (0, 1)))
 
 
-# More than seven arguments: what two estimates differ in, each by itself.
-def with_lag(
-    jacobian: Array,
-    fixed: Array,
-    motion: Motion,
-    noise: Noise,
-    lag: Lag,
-    pulled: Array,
-    std: Array | None,
-    less: Array | None,
-    more: Array | None,
-) -> Array:
-    """The covariance with the lag's own uncertainty, a prior that the log may sharpen."""
-    if lag.std == 0:
-        return fixed
-    prior = np.full(jacobian.shape[1], np.inf) if std is None else std
-    prior[-1] = lag.std
-    return covariance(jacobian, motion.rows, noise, prior, less, more) + pulled
-
-
 def hidden(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:
     """Covariance of Phi' e for what the position's encoder hides, as `resting` has it, shape (p, p)."""
     stiffness = float(theta[model.linear.index("K")]) if "K" in model.linear else 0.0
@@ -163,12 +143,10 @@ class Fit:
         names: of the parameters: the linear ones, then the nonlinear ones, then the lag.
         theta: their values, shape (p,).
         cov: their covariance, coloured noise and the lag's uncertainty included, shape (p, p).
-        fixed_cov: the same as if the lag were known exactly, shape (p, p).
         predicted, residuals: of the filtered force, shape (n,).
         r2, rmse: of the fit.
         noise: colour of the residuals.
         lag: the lag used [s].
-        attenuation: how far noise of the position may have pulled each parameter, shape (p,); part of `cov`.
         jacobian: of the predicted force by all of them, shape (n, p).
     """
 
@@ -176,24 +154,21 @@ class Fit:
     names: tuple[str, ...]
     theta: Array
     cov: Array
-    fixed_cov: Array
     predicted: Array
     residuals: Array
     r2: float
     rmse: float
     noise: Noise
     lag: float
-    attenuation: Array
     jacobian: Array
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
 
-    def std(self, name: str, lag_known: bool = False) -> float:
-        """Standard deviation of a parameter; as if the lag were known exactly if asked so."""
+    def std(self, name: str) -> float:
+        """Standard deviation of a parameter."""
         i = self.names.index(name)
-        cov = self.fixed_cov if lag_known else self.cov
-        return float(np.sqrt(max(cov[i, i], 0.0)))
+        return float(np.sqrt(max(self.cov[i, i], 0.0)))
 
     @property
     def t(self) -> float:
@@ -207,8 +182,7 @@ class Fit:
             cause: its name.
             effect: standard deviation of each parameter by it, shape (p,).
         """
-        more = np.outer(effect, effect)
-        return replace(self, cov=self.cov + more, fixed_cov=self.fixed_cov + more)
+        return replace(self, cov=self.cov + np.outer(effect, effect))
 
     def through(self, jacobian: Array, theta: Array) -> Fit:
         """Functions of the parameters instead, as of an `Answer`.
@@ -217,13 +191,7 @@ class Fit:
             jacobian: their derivatives by the parameters, shape (p, p).
             theta: their values, shape (p,).
         """
-        cov, fixed = (jacobian @ own @ jacobian.T for own in (self.cov, self.fixed_cov))
-        return replace(self, theta=theta, cov=cov, fixed_cov=fixed)
-
-    def score(self, effective: float) -> float:
-        """Schwarz's criterion for a common number of effective samples: smaller is better."""
-        mean_square = max(self.rmse**2, 1e-300)
-        return effective * float(np.log(mean_square)) + len(self.names) * float(np.log(effective))
+        return replace(self, theta=theta, cov=jacobian @ self.cov @ jacobian.T)
 
 
 def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | None = None) -> Fit:
@@ -257,24 +225,21 @@ def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
     theta = np.array([*point.theta, *(point.nonlinear[k.name] for k in model.nonlinear), point.lag])
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
     std = descent.known.std(names, level)
-    fixed = np.zeros((len(names), len(names)))
+    pulled, less, more = np.zeros((len(names), len(names))), None, None
     if model.of_position:
         by_noise = bias_corrected(model, motion, jacobian, theta, level, lag, std)
         theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
         more = hidden(model, motion, jacobian, theta)
-    else:
-        pulled, less = np.zeros_like(fixed), None
-        more = None
-    fixed[:-1, :-1] = (
-        covariance(
-            jacobian[:, :-1],
-            motion.rows,
-            noise,
-            None if std is None else std[:-1],
-            None if less is None else less[:-1, :-1],
-            None if more is None else more[:-1, :-1],
-        )
-        + pulled[:-1, :-1]
+    prior = np.full(len(names), np.inf) if std is None else std
+    prior[-1] = lag.std
+    cov, own = np.zeros_like(pulled), slice(None if lag.std > 0 else -1)
+    cov[own, own] = pulled[own, own] + covariance(
+        jacobian[:, own],
+        motion.rows,
+        noise,
+        prior[own],
+        None if less is None else less[own, own],
+        None if more is None else more[own, own],
     )
     residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.nonlinear.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
@@ -283,14 +248,12 @@ def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
         model=model,
         names=names,
         theta=theta,
-        cov=with_lag(jacobian, fixed, motion, noise, lag, pulled, std, less, more),
-        fixed_cov=fixed,
+        cov=cov,
         predicted=force - residuals,
         residuals=residuals,
         r2=1 - rmse**2 / spread if spread else 0.0,
         rmse=rmse,
         noise=noise,
         lag=float(theta[-1]),
-        attenuation=np.sqrt(np.diag(pulled)),
         jacobian=jacobian,
     )

@@ -52,6 +52,7 @@ class Linearisation:
         model: which.
         lag: of the force that its columns are formed at [s].
         at: its parameters that they are formed about; none for a model that is linear in all of them.
+        about: parameters that the column of the lag is formed with, by name.
         names: of the parameters: the model's own, then those of other forces.
         own: how many are the model's.
         prior: mean and deviation of what is known of some of them.
@@ -66,6 +67,7 @@ class Linearisation:
     model: Model
     lag: float
     at: dict[str, float]
+    about: dict[str, float]
     names: tuple[str, ...]
     own: int
     prior: dict[str, tuple[float, float]]
@@ -82,6 +84,7 @@ class Linearisation:
         model: Model,
         segments: list[Segment],
         theta: dict[str, float],
+        use: Mask | None = None,
     ) -> Linearisation:
         """Linearise a model about some parameters, and sum its columns by octave.
 
@@ -91,6 +94,8 @@ class Linearisation:
             segments: rows without a gap.
             theta: the parameters, the other forces' and the lag's among them; what is not is looked for (those that
                 the force is not linear in), zero (the others), or its prior's value (the lag).
+            use: octaves that count, shape (octaves,): likelihoods compare over the same; None for those in which the
+                columns are more than noise.
         """
         motion = problem.motion
         dt = float(np.median(np.diff(problem.time)))
@@ -115,11 +120,13 @@ class Linearisation:
         orders = model.derivatives if not model.nonlinear else {}
         most = max(orders.values(), default=0) + (LAG in free)
         noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
-        places = {free.index(name): k for name, k in orders.items()}
-        use = seen(motion, noisy, whole, {-1: 0, **places})
+        if use is None:
+            use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
         names = (*free, *effects, *bending)
         system = system_of(octaves.only(use), names, prior)
-        return cls(problem, model, lag, at, names, len(free), prior, segments, octaves, use, noisy, system)
+        return cls(
+            problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system
+        )
 
     @property
     def searched(self) -> dict[int, float]:
@@ -187,18 +194,20 @@ class Linearisation:
         )
 
     def _forces(self) -> list[list[int]]:
-        """Places of the columns of each force that may be there or not."""
+        """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
         others = list(enumerate(self.names))[self.own :]
-        found = (
+        found = [
             [i for i, name in others if name.startswith(kind)] for kind in (FRICTION, "depth", "hysteresis")
-        )
+        ]
+        if "M" in self.names and "M" not in self.prior:
+            found.append([self.names.index("M")])
         return [places for places in found if places]
 
     def _budget(self, member: Member, sensor: Array, told: Array) -> Budget:
         """By cause, with what a member supposes."""
         system, solution = member.system, member.solution
         budget = causes.of_noise(system, solution, self.names, self.own, LAG)
-        budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise(solution))
+        budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise())
         budget["repetition"] = causes.of_stretches(system, solution)
         budget["unexplained"] = causes.of_unexplained(
             system, solution, self._with_position(solution, sensor), told
@@ -212,11 +221,11 @@ class Linearisation:
         own = np.array(
             [solution.theta[i] * (name in self.model.derivatives) for i, name in enumerate(self.names)]
         )
-        by_position = np.einsum("i,oij,j->o", own, self._position_noise(solution), own)
+        by_position = np.einsum("i,oij,j->o", own, self._position_noise(), own)
         found: Array = np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
         return found
 
-    def _position_noise(self, solution: Solution) -> Array:
+    def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).
 
         The column of the lag is of the next derivatives: its noise is that of the speed's, as the damping's is.
@@ -226,7 +235,7 @@ class Linearisation:
             i = self.names.index(name)
             of[i, k] = 1.0
             if LAG in self.names:
-                of[self.names.index(LAG), k + 1] = -solution.theta[i]
+                of[self.names.index(LAG), k + 1] = -self.about.get(name, 0.0)
         return (
             np.einsum("ai,oij,bj->oab", of, derivative_products(self.noisy), of)
             * self.system.lines[:, None, None]

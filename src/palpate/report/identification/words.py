@@ -32,7 +32,7 @@ MARKS = {Verdict.IDENTIFIED: "✓", Verdict.NOT_IDENTIFIABLE: "?", Verdict.REJEC
 NO_NUMBER = "no number"
 
 ADVICE = {
-    Code.PAYLOAD_DOUBTFUL: "Weigh the tool again with palpate payload; tare the sensor in the air before the press.",
+    Code.PAYLOAD_DOUBTFUL: "Weigh the tool again with palpate payload; tare the sensor in free motion before a press.",
     Code.FORCE_LAGS_POSITION: "Measure the lag, by a knock on something stiff or with a known mass, and give --lag.",
     Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
     Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",

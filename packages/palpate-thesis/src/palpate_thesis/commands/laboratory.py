@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli.options.flags import FLAG
-from palpate.cli.options.values import FolderOptions
+from palpate.cli.options.common import FolderOptions
+from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
@@ -26,24 +26,16 @@ def _within(least: int, most: int) -> Parameter:
 @Parameter(name="*", group=Group("The search", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """Size of the search.
-
-    Parameters
-    ----------
-    particles
-        Points of the posterior; it begins with four times as many of the prior.
-    moves
-        Of each particle at each temperature; three times as many at the last.
-    seed
-        Of everything drawn.
-    half
-        Search by the calibration half alone, in a third of the time; the result is judged by all.
-    """
+    """Size of the search."""
 
     particles: Annotated[int, _within(8, 100_000)] = 128
+    "Points of the posterior; it begins with four times as many of the prior."
     moves: Annotated[int, _within(1, 1000)] = 2
+    "Of each particle at each temperature; three times as many at the last."
     seed: Annotated[int, _within(0, 2**31 - 1)] = 1
+    "Of everything drawn."
     half: Annotated[bool, FLAG] = False
+    "Search by the calibration half alone, in a third of the time; the result is judged by all."
 
     @property
     def command(self) -> str:
@@ -57,34 +49,23 @@ class SearchOptions:
 @Parameter(name="*", group=Group("Who tries", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class RunnerOptions:
-    """Cores or a cluster for the search.
-
-    Parameters
-    ----------
-    cores
-        That try laboratories in parallel; all when left out.
-    scheduler
-        Address of a Dask scheduler whose workers try them, tcp://HOST:PORT. Their answers can execute code here:
-        name only a cluster that you trust as this machine.
-    """
+    """Cores or a cluster for the search."""
 
     cores: Annotated[int | None, _within(1, 1024)] = None
+    "That try laboratories in parallel; all when left out."
     scheduler: str | None = None
+    """Address of a Dask scheduler whose workers try them, tcp://HOST:PORT. Their answers can execute code
+    here: name only a cluster that you trust as this machine."""
 
 
 @Parameter(name="*", group=Group("Output", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class InferredOptions(FolderOptions):
-    """Files to write.
-
-    Parameters
-    ----------
-    out
-        Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there is
-        resumed.
-    """
+    """Where the inferred laboratory is written."""
 
     out: Path = Path("runs/laboratory")
+    """Folder for the laboratory, the page and every laboratory that was tried. An unfinished inference there
+    is resumed."""
 
 
 def laboratory(

@@ -10,9 +10,9 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed
-from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.window import rms
 from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.force_control.panels import limits, panels
 from palpate_thesis.force_control.tracking import (

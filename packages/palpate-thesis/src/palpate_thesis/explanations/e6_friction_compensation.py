@@ -11,11 +11,11 @@ import numpy as np
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
 from palpate.bench.force_input import CONTACT, LOST
-from palpate.bench.metrics.following import SHARE
-from palpate.bench.metrics.window import losses
+from palpate.bench.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,

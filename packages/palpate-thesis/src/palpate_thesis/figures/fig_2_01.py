@@ -11,7 +11,7 @@ import numpy as np
 from palpate._vector import Vec3
 from palpate.arrays import Array, Mask
 from palpate.bench import changed, load
-from palpate.bench.metrics.window import losses
+from palpate.bench.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record

@@ -10,8 +10,8 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, changed, load
-from palpate.bench.metrics.window import losses
 from palpate.bench.plant import Loop, LoopState
+from palpate.bench.summary import losses
 from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
 from palpate.records import Record

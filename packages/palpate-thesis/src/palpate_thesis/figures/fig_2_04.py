@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.metrics.following import LIMIT, SHARE
-from palpate.bench.metrics.window import SETTLE, rms
-from palpate.controllers.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate.environments import KelvinVoigt, StandardLinearSolid
 from palpate.friction import LuGre
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
+from palpate_studies.metrics.following import LIMIT, SHARE
+from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
+from palpate_thesis.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.one_joint import JOINT_FRICTION, Link, one_joint

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import Experiment, changed, load
-from palpate.bench.metrics.following import LIMIT
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,

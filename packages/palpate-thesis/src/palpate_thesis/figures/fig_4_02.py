@@ -155,7 +155,7 @@ def _force(axis: Axes, data: Data) -> None:
 
 
 def _thresholds(axis: Axes, data: Data) -> None:
-    set_title(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in the air")
+    set_title(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in free motion")
     for f, some in data.by_threshold.items():
         axis.plot(
             np.full(len(some), f), [s.true_force for s in some], "o", color=style.SERIES[0], markersize=3.5

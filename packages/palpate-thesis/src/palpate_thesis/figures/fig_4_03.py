@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
-from palpate.bench.metrics.window import losses
+from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2
@@ -51,7 +51,7 @@ class LoopParameters:
 
     def radius(self, stiffness: Array) -> Array:
         """Spectral radius of one tick on surfaces of these stiffnesses [N/m], shape (n,); above 1 it is unstable."""
-        return np.asarray(np.abs(np.linalg.eigvals(self._ticks(np.atleast_1d(stiffness)))).max(axis=-1))
+        return np.asarray(np.abs(np.linalg.eigvals(self.ticks(np.atleast_1d(stiffness)))).max(axis=-1))
 
     def limit(self, low: float = 1e3, high: float = 3e6) -> float:
         """The stiffness from which it is unstable [N/m]; NaN if it is so at `low`, infinite if not below `high`."""
@@ -66,9 +66,9 @@ class LoopParameters:
             low, high = float(grid[first - 1]), float(grid[first])
         return float(np.sqrt(low * high))
 
-    def _ticks(self, stiffness: Array) -> Array:
+    def ticks(self, stiffness: Array) -> Array:
         """Transition of the state by one tick: tip and analog filter, delay line of readings, filter, integral."""
-        A, b, c = self._zero_order_hold(stiffness)
+        A, b, c = self.zero_order_hold(stiffness)
         n, line = 5, int(self.late / TICK) + 1
         share = self.late / TICK + 1 - line
         s1, s2, total = n + line, n + line + 1, n + line + 2
@@ -86,17 +86,21 @@ class LoopParameters:
         F[:, :n] += b[:, :, None] * (F[:, total] - self.kf * measured)[:, None, :]
         return F
 
-    def _zero_order_hold(self, stiffness: Array) -> tuple[Array, Array, Array]:
+    def zero_order_hold(self, stiffness: Array) -> tuple[Array, Array, Array]:
         """Tip and analog filter over one tick of constant force: x' = A x + b u for each stiffness, reading c x."""
-        Af, Bf, Cf = _analog(self.cutoff)
+        step = _exponential(TICK * self.rates(stiffness))
+        return step[:, :5, :5], step[:, :5, 5], np.concatenate([[0.0, 0.0], _analog(self.cutoff)[2]])
+
+    def rates(self, stiffness: Array) -> Array:
+        """d/dt of tip, analog filter and a held force for each stiffness, shape (n, 6, 6)."""
+        Af, Bf, _ = _analog(self.cutoff)
         whole = self.tip + self.mass
         A = np.zeros((len(stiffness), 6, 6))
         A[:, 0, 1] = 1.0
         A[:, 1, 0], A[:, 1, 1], A[:, 1, 5] = -stiffness / whole, -self.damping / whole, 1.0 / whole
         A[:, 2:5, 2:5] = Af
         A[:, 2:5, 0], A[:, 2:5, 1] = stiffness[:, None] * Bf, self.damping * Bf
-        step = _exponential(TICK * A)
-        return step[:, :5, :5], step[:, :5, 5], np.concatenate([[0.0, 0.0], Cf])
+        return A
 
 
 @cache

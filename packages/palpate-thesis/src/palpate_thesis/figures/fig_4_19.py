@@ -11,10 +11,10 @@ import numpy as np
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
-from palpate.bench.metrics.following import SHARE
-from palpate.bench.metrics.window import losses
+from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import (
     RELAXING_FOAM,

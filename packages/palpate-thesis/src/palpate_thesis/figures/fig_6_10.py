@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.bench import changed
-from palpate.bench.metrics.following import SHARE
 from palpate.records import Record
+from palpate_studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control.panels import dots_panel, force_panel, panels

@@ -11,10 +11,10 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import changed
 from palpate.bench.force_input import CONTACT, LOST
-from palpate.bench.metrics.following import LIMIT
-from palpate.bench.metrics.window import SETTLE, rms
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import LIMIT
+from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.figures.fig_6_13 import SLOW

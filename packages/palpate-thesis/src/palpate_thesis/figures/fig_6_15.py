@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import changed, load
-from palpate.bench.metrics.window import rms
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.window import rms
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import VARIED_SEEDS, rougher
 from palpate_thesis.force_control.panels import dots_panel, panels

@@ -9,9 +9,9 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import changed
-from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control.panels import following_panel, force_panel, panels

@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from palpate.bench.metrics.following import LIMIT
 from palpate.records import Record
 from palpate.report import style
+from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.force_control.tracking import Tracked, Tracking
 from palpate_thesis.look import Axes, Figure
 

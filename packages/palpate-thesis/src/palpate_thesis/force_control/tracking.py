@@ -11,10 +11,11 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment, changed, load
 from palpate.bench.force_input import CONTACT
-from palpate.bench.metrics import Window
-from palpate.bench.metrics.following import LIMIT, SHARE, interval_error
-from palpate.bench.metrics.window import SETTLE, losses, rms
+from palpate.bench.summary import losses
 from palpate.records import Record
+from palpate_studies.metrics import Window
+from palpate_studies.metrics.following import LIMIT, SHARE, interval_error
+from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import often, spread
 from palpate_thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
 from palpate_thesis.runs import Runs

@@ -1,0 +1,162 @@
+"""Answer about a controller of others: lines for a terminal, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.report import style
+from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
+from palpate.report.figure_panels.panels import panels_of
+from palpate.report.numbers import quantity
+from palpate_certify.controller_file import UNCOVERED, ControllerVerdict
+from palpate_certify.delayed_contact import DelayedContact
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DELAYS = np.geomspace(0.25, 4.0, 33)
+"""Of the delay, for which the edge is drawn."""
+
+
+def lines(answer: dict[str, Any], written: Sequence[Path] = ()) -> Iterator[str]:
+    """The answer, a line each."""
+    proved, better = answer["proved"]["stiffness"], answer["corrected"]
+    yield sentence(answer)
+    yield f"Proved stable: {_span(*proved)}." if proved else "Nothing could be proved."
+    place = f"   written: {', '.join(map(str, written))}" if written else ""
+    if better is None:
+        yield f"No numbers of this controller were found that are stable on the surfaces asked for.{place}"
+        return
+    most = "any stiffness" if better["exact"][1] is None else quantity(better["exact"][1], "N/m")
+    what = ", ".join(better["changed"]) + (place or "; --out writes them")
+    what = what if better["changed"] else f"none is needed{place}"
+    yield f"Corrected for {_span(*better['stiffness'])} (unstable from {most}): {what}"
+
+
+def sentence(answer: dict[str, Any]) -> str:
+    """From where on it is unstable."""
+    first, delay = answer["first_unstable"], quantity(answer["delay_s"], "s")
+    if first is None:
+        return f"Stable on every surface, with a delay of {delay}."
+    if first["stiffness"] == 0.0:
+        return f"Unstable without contact ({first['axis']}), with a delay of {delay}."
+    return f"Unstable from {quantity(first['stiffness'], 'N/m')} ({first['axis']}), with a delay of {delay}."
+
+
+def _span(low: float, high: float) -> str:
+    return f"{quantity(low, 'N/m')} to {quantity(high, 'N/m')}"
+
+
+def page(verdict: ControllerVerdict, path: Path, command: str) -> str:
+    """The page of `palpate certify FILE --controller ... --report`; `command` is what made it."""
+    answer = verdict.answer
+    longest = answer["damping_times_s"][-1]
+    damping = (
+        f"surfaces with B/K of 0 to {quantity(longest, 's')}, in {len(answer['damping_times_s'])} steps"
+        if longest
+        else "surfaces without damping"
+    )
+    return answer_page(
+        PageAnswer(
+            title=f"{path.name} as {answer['controller']}",
+            sentence=sentence(answer),
+            about=f"One axis at a time, everything that is late in one delay of {quantity(answer['delay_s'], 's')}, on "
+            f"{damping}. Asked for: up to {quantity(answer['asked'], 'N/m')}.",
+            cards={"": _cards(answer)},
+            scale=_scale(answer),
+            figures=[
+                {
+                    "panels": panels_of(draw(verdict)),
+                    "caption": "From which stiffness on the first axis is unstable, by the delay. Dashed: the delay "
+                    "given, and the stiffest surface asked for.",
+                }
+            ],
+            folds=[
+                (
+                    "Every axis",
+                    "unstable from",
+                    [(name, _from(end)) for name, end in answer["axes"].items()],
+                ),
+                ("Not covered", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
+            ],
+            source=("The file with corrected numbers", verdict.text) if answer["corrected"] else ("", ""),
+        ),
+        room="certify",
+        command=command,
+    )
+
+
+def _from(end: float | None) -> str:
+    return "never" if end is None else quantity(end, "N/m")
+
+
+def _cards(answer: dict[str, Any]) -> list[Card]:
+    proved, better, asked = answer["proved"]["stiffness"], answer["corrected"], answer["asked"]
+    far = proved is not None and proved[1] >= asked
+    number, _, unit = quantity(proved[1], "N/m").rpartition(" ") if proved else ("", "", "")
+    cards = [
+        Card(
+            "Stable, proved, up to", number, unit, why="as the file stands",
+            tone="ok" if far else "fail", verdict="as far as asked" if far else "not as far as asked",
+        )
+    ]  # fmt: skip
+    if better is None:
+        why = "no numbers of this controller were found that are stable on the surfaces asked for"
+        return [*cards, Card("Corrected", why=why, tone="fail", verdict="none")]
+    number, _, unit = quantity(better["stiffness"][1], "N/m").rpartition(" ")
+    changed = ", ".join(better["changed"]) or "nothing has to be changed"
+    return [
+        *cards,
+        Card("Corrected, proved up to", number, unit, why=changed, tone="ok", verdict="proved"),
+    ]
+
+
+def _scale(answer: dict[str, Any]) -> Any:
+    proved, better = answer["proved"]["stiffness"], answer["corrected"]
+    extents = [
+        Extent(name, 0.0, inf if end is None else end, "exact", f"unstable from {_from(end)}")
+        for name, end in answer["axes"].items()
+        if end != 0.0
+    ]
+    for name, ends in (("as it stands", proved), ("corrected", better and better["stiffness"])):
+        if ends:
+            low, high = ends
+            extents.append(Extent(f"proved, {name}", low, high, "proved", f"to {quantity(high, 'N/m')}"))
+    if not extents:
+        return None
+    caption = "The dashed line is the stiffest surface asked for; at an arrowhead nothing bounds it."
+    return log_scale("Where it is stable", caption, "N/m", extents, answer["asked"])
+
+
+def draw(verdict: ControllerVerdict) -> Figure:
+    """The edge of the first axis by the delay, as the file stands and corrected."""
+    answer = verdict.answer
+    with style.ink():
+        figure, (axis,) = style.figure(height=2.9)
+        axis.set(xlabel="delay [ms]", ylabel="unstable from [N/m]", yscale="log")
+        delays = answer["delay_s"] * DELAYS
+        for loop, name, colour in (
+            (verdict.before, "as it stands", style.F),
+            (verdict.after, "corrected", style.MEASURED),
+        ):
+            if loop is not None:
+                edges = [_edge_at(loop, float(delay)) for delay in delays]
+                axis.plot(1e3 * delays, edges, color=colour, linewidth=1.6, label=name)
+        axis.axvline(1e3 * answer["delay_s"], **style.KNOWN)
+        axis.axhline(answer["asked"], **style.KNOWN)
+        low, high = np.log10(axis.get_ylim())
+        axis.set_ylim(10.0 ** np.floor(low), 10.0 ** np.ceil(high))
+        style.legend(axis)
+    return figure
+
+
+def _edge_at(loop: DelayedContact, delay: float) -> float:
+    """Stiffness from which a loop is unstable with another delay [N/m]; not a number where none or all are."""
+    found = replace(loop, delay=delay).first_unstable()
+    return found if isfinite(found) and found > 0.0 else float("nan")

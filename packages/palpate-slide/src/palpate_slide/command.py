@@ -1,0 +1,240 @@
+"""`palpate slide`: a simulated arm holds a force while its tip moves along an unknown curved surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.common import QUIET, LoopArm, Physics
+from palpate.cli.options.force import with_slide
+from palpate.cli.options.kept import options_given
+from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
+from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.errors import InputError, unknown
+from palpate.files import RECORD, fresh_folder, with_author, write_json
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from palpate.arrays import Array
+    from palpate.force import Gains
+    from palpate_slide.ground import Ground
+    from palpate_slide.jointed_arm import JointedArm
+
+SHORTEST = 0.003
+"""Path that is one [m]."""
+_OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
+_SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
+
+
+_SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
+
+
+@Parameter(name="*", group=Group("The slide", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class SlideOptions:
+    """Arm, force and path."""
+
+    arm: Annotated[LoopArm, QUIET] = "ur5e"
+    "ur5e, fr3, panda, iiwa14, or a TOML file."
+    force: Annotated[str | None, SIGNED] = None
+    "Desired force, as 20:N; that of the gains if left out, or 15 N."
+    speed: Annotated[str, SIGNED] = "30:mm/s"
+    "Along the surface, as 30:mm/s."
+    shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
+    """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
+    mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
+    surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
+    "K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck)."
+    path: str = "circle"
+    "line, back, raster or circle."
+    length: Annotated[str, SIGNED] = "40:mm"
+    "Of a line or a pass, radius of a circle, as 60:mm."
+    seconds: Annotated[float, SIGNED] = 8.0
+    "Duration of the slide."
+    normal: Annotated[str | None, SIGNED] = None
+    """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
+    0,0,-1."""
+    mu_max: Annotated[float, SIGNED] = 0.9
+    "Largest friction coefficient that there may be."
+    tilt: Annotated[float, SIGNED] = 7.0
+    "Standard deviation of --normal in degrees."
+    step: Annotated[str, SIGNED] = "0:mm"
+    "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
+    touches: Annotated[str, SIGNED] = "10:mm"
+    "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
+    gains: Path | None = None
+    "Gains from palpate tune --slide; made for the arm if left out."
+    physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
+    "own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms)."
+    seed: Annotated[int, WHOLE, _SIMULATED] = 0
+    "Of the sensor's noise."
+
+    def ground(self, ways: Array, speed: float, rate: float) -> Ground:
+        """The surface under a path."""
+        from palpate_slide.ground import ground_of
+
+        numbers: dict[str, float] = {}
+        for part in self.surface.split(","):
+            key, _, text = (word.strip() for word in part.partition("="))
+            try:
+                numbers[_SURFACE[key]] = float(text)
+            except (KeyError, ValueError):
+                raise InputError(
+                    f"--surface needs K=..,B=..,mu=.. as numbers, as K=20000,mu=0.3; got {self.surface!r}"
+                ) from None
+        name, _, size = self.shape.partition(":")
+        stiffness, heights = numbers.pop("stiffness", 0.0), None
+        if name == "mesh":
+            from palpate_slide.mesh import heights_of
+
+            file, _, unit = size.rpartition(":")
+            if not file:
+                raise InputError(
+                    f"--shape mesh needs a file and its unit, as mesh:part.stl:mm; got {self.shape!r}"
+                )
+            way = speed / rate * ways.cumsum(axis=0)
+            heights = heights_of(Path(file), in_si("--shape", f"1:{unit}", "length"), float(abs(way).max()))
+        height = {"height": self.radius, "period": 0.02} if name == "step" else {}
+        radius = 0.2 if name == "step" else self.radius
+        return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
+
+    @property
+    def extent(self) -> float:
+        """Of the path [m]."""
+        length = in_si("--length", self.length, "length")
+        if not 1.0 <= self.seconds <= 600.0:
+            raise InputError(f"--seconds must be from 1 to 600, got {self.seconds:g}")
+        if not length >= SHORTEST:
+            raise InputError(f"--length must be at least {1e3 * SHORTEST:g} mm, got {1e3 * length:g} mm")
+        return length
+
+    @property
+    def radius(self) -> float:
+        """Radius of the shape, or its height [m]; of a plane or a mesh the smallest radius that is expected."""
+        name, _, size = self.shape.partition(":")
+        if name in {"plane", "mesh"} or not size:
+            return 0.1 if name == "mesh" else 0.2
+        radius = in_si("--shape", size, "length")
+        if not 1e-3 <= abs(radius) <= 1e4 and name != "step":
+            raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
+        return radius
+
+    @cached_property
+    def joints(self) -> JointedArm:
+        """The arm with its joints, for MuJoCo's physics."""
+        from palpate.press.engines import ENGINES
+        from palpate_slide.jointed_arm import jointed_arm
+
+        if self.physics not in ENGINES:
+            raise unknown("physics", self.physics, ENGINES)
+        return jointed_arm(self.arm)
+
+    def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
+        """Rows of the slide."""
+        into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
+        if self.physics == "own":
+            from palpate_slide.world import simulate
+
+            return simulate(gains, ground, ways, into=into, seed=self.seed)
+        return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
+
+    def tuned(self) -> Gains:
+        """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
+        from msgspec.structs import replace as msgspec_replace
+
+        from palpate.force import load_arm, load_gains
+        from palpate.force.gains import gains_for
+
+        wanted = in_si("--force", self.force or "15:N", "force")
+        if self.gains is not None:
+            gains = load_gains(self.gains)
+            return gains if self.force is None else msgspec_replace(gains, force=wanted)
+        if not wanted > 0.0:
+            raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
+        gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
+        return with_slide(
+            gains, self.mu_max, self.speed, f"{abs(self.radius):g}", self.tilt, self.step, self.touches
+        )
+
+
+def slide(
+    *,
+    asked: SlideOptions | None = None,
+    wire: WireOptions | None = None,
+    limits: LimitOptions | None = None,
+    out: Path | None = None,
+    replace: Annotated[bool, FLAG] = False,
+    json: Annotated[bool, FLAG] = False,
+) -> int:
+    """Hold a force while the tip moves along an unknown curved surface, in simulation or with a real arm.
+
+    palpate slide --arm fr3 --force 15:N --speed 30:mm/s --shape bowl:150:mm --surface K=20000,mu=0.3 --path raster
+
+    The arm looks for the surface along --normal, presses, and slides. It estimates normal, friction and stiffness, each
+    with an interval. Exit code 1: the force was not held within 3 % rms and 10 %.
+
+    A real arm slides with the gains of palpate tune --slide, after a confirmation, and with --dry-run not at all. The
+    path's first direction is the base's x along the surface. The arm stops as in palpate press --wire:
+
+    palpate slide --wire rtde:192.168.0.10 --gains gains.toml --force 15:N --normal 0,0,-1 --path line --length 40:mm
+    --force-limit 40:N --speed-limit 50:mm/s --travel-limit 60:mm --time-limit 30:s --dry-run
+
+    Parameters
+    ----------
+    out
+        Folder for record.parquet, summary.json, slide.png and report.html; runs/slide-ARM-SEED when left out.
+    replace
+        Replace the results at --out.
+    json
+        Print one JSON object and nothing else.
+    """
+    from palpate.force.sliding.paths import directions
+    from palpate.force.sliding.slide_domain import numbers_of
+    from palpate_slide.report import sentence, summarise, write_report
+
+    asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
+    if wire.wire is not None or wire.recover is not None:
+        return _slide_over(asked, wire, limits, json)
+    for part in (wire, limits):
+        only(part, "a real arm, and --wire is missing; add --wire")
+    gains = asked.tuned()
+    slide_numbers = numbers_of(gains)
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
+    ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
+    folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
+    with fresh_folder(folder, replace=replace) as fresh:
+        rows = asked.run(gains, ground, ways)
+        head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
+        summary: dict[str, Any] = with_author(
+            {"command": printable(command()), **head, **summarise(rows, gains, ground)}
+        )
+        write_report(rows, gains, summary, fresh, RECORD)
+        write_json(fresh / "summary.json", summary)
+    if json:
+        print_answer(summary)
+    else:
+        screen = console()
+        screen.print(f"{gains.arm.title}: {sentence(summary)}", soft_wrap=True)
+        for note in summary["troubles"]:
+            screen.print(f"! {note}", soft_wrap=True)
+        place(screen, "report:", folder / "report.html")
+    return 0 if summary["end"] == "held" else 1
+
+
+def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
+    from palpate.cli._press_wire import press_over
+    from palpate.wires.order import Path as SlidePath
+
+    other = next((name for name in options_given((asked,)) if name not in _OF_WIRE), None)
+    if other is not None:
+        raise InputError(
+            f"--{other} is for a simulated slide, and --wire names a real arm; leave out --{other}"
+        )
+    path = SlidePath(asked.path, asked.extent, asked.seconds)
+    press = AskOptions(force=asked.force, gains=asked.gains, normal=asked.normal, seconds=asked.seconds)
+    return press_over(press, wire, limits, json=json, path=path)

@@ -1,0 +1,220 @@
+"""A slide of a serial arm: MuJoCo moves the joints, the tip slides along a curved surface with friction.
+
+Drives, contact and sensor are palpate's laws, those of a press and of `slide_world.py`: MuJoCo's own contact, as soft
+as this, creeps below the limit of friction. Beside the simulation of a point with the same lags in each axis, this
+one has the joints' inertia, their drive trains, a tip that tilts, and resolved rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate._jit import Bound, kernel, law, part
+from palpate._vector import ZERO3, Mat3, Vec3
+from palpate.arrays import Array
+from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.errors import InputError
+from palpate.force.arm import Arm
+from palpate.force.gains import Gains
+from palpate.force.simulated_press import world_of
+from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
+from palpate.press.cell import Body, Cell, Reading, Touch, driven, sensed
+from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
+from palpate.press.setting import Place, cell_of, place_of
+from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.tool import Command
+from palpate.robots.serial.chain import Tip
+from palpate.robots.serial.from_toml import names
+from palpate.robots.serial.loading import mujoco
+from palpate.robots.serial.serial_arm import SerialArm
+from palpate_slide.ground import Ground
+from palpate_slide.world import COLUMNS, LONGEST, Carried, contact, note
+
+
+@part
+class Slid(NamedTuple):
+    """State of the contact and of the sensor's three axes, in the surface's axes."""
+
+    tip: Carried
+    x: Reading
+    y: Reading
+    z: Reading
+    mean: float  # of the normal force over the tick [N]
+
+
+@part
+class Frame(NamedTuple):
+    """The surface's axes in the base.
+
+    Args:
+        axes: in rows; the third out of the surface.
+        origin: first point of the surface [m].
+    """
+
+    axes: Mat3
+    origin: Vec3
+
+
+# More than seven arguments: the cell with its surface, and the state.
+@law
+def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
+    """Drives, contact and sensor after a step; fills the body's drive. `noise` has shape (3, 8)."""
+    driven(cell, body, setpoint)
+    x, v = frame.axes @ (tip.p - frame.origin), frame.axes @ tip.v
+    after = contact(world, ground, before.tip, x, v, cell.step)
+    f, sensor = after.force, cell.sensor
+    return Slid(
+        after, sensed(sensor, before.x, f.x, time, noise[0]), sensed(sensor, before.y, f.y, time, noise[1]),
+        sensed(sensor, before.z, f.z, time, noise[2]), before.mean + after.normal / cell.steps,
+    )  # fmt: skip
+
+
+compiled_slid, compiled_note = kernel(slid), kernel(note)
+_UPRIGHT = Mat3(*(Vec3(*map(float, row)) for row in np.eye(3)))
+_NOTHING = Carried(ZERO3, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
+
+
+class OnGround(ByMuJoCo):
+    """MuJoCo moves the arm; its tip touches a ground, and the sensor shows three axes.
+
+    Args:
+        arm, cell, q: as for `ByMuJoCo`.
+        ground: the surface.
+        inner: the arm's inner loop.
+        frame: of the surface.
+        seed: of the noise.
+    """
+
+    # More than seven arguments: arm and surface.
+    def __init__(
+        self, arm: SerialArm, cell: Cell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
+    ):
+        super().__init__(arm, cell, q)
+        none = Reading(ZERO3, 0.0, 0.0, 0.0)
+        self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), Bound(compiled_slid)
+        # the links' place is known here, and no spring lies between it and the surface
+        world = world_of(inner, noise=0.0)._replace(torque=1.0)
+        self._ground, self._world, self._frame = ground, world, frame
+        self._axes, self._noise = np.array(frame.axes), np.zeros((3, 8))
+        self._generator = np.random.default_rng(seed)
+
+    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+        """One tick, as `Engine` describes it; noise is drawn for three axes here."""
+        self.slid = self.slid._replace(mean=0.0)
+        self._noise = self._generator.standard_normal((3, 8))
+        return super().tick(cell, body, touch, setpoint, k, noise)
+
+    @property
+    def reading(self) -> Array:
+        """Last reading in the surface's axes [N], shape (3,)."""
+        return np.array([axis.value for axis in (self.slid.x, self.slid.y, self.slid.z)])
+
+    def _contact(
+        self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
+    ) -> Touch:
+        self.slid = self._law(
+            cell, self._world, self._ground, self._frame, body, self.slid, tip, setpoint, time, self._noise
+        )
+        return touch
+
+    def _fill(self, body: Body) -> Tip:
+        """Joints, Jacobian, and of the tip the place and the velocity: the contact takes no more of MuJoCo."""
+        data, J, dofs = self._data, self._J[:3], self._dofs
+        body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
+        at = self._scene.tip(data)[0]
+        self._engine.mj_jac(self._model, data, J, None, at, self._scene.body)
+        v = J @ data.qvel
+        return Tip(_three(at), _UPRIGHT, _three(v), ZERO3, ZERO3, ZERO3)
+
+    def _load(self, body: Body, touch: Touch) -> Array:
+        return np.asarray((self._axes @ self._J[:3, self._dofs]).T @ np.array(self.slid.tip.force))
+
+
+@dataclass(frozen=True)
+class JointedArm:
+    """A serial arm before the first point of a surface.
+
+    Args:
+        arm: what moves.
+        place: where it starts.
+        inner: its inner loop and sensor.
+    """
+
+    arm: SerialArm
+    place: Place
+    inner: Arm
+
+    # More than seven arguments: as of `slide_world.simulate`.
+    def slide(
+        self, gains: Gains, ground: Ground, ways: Array, *, into: ArrayLike = DOWN, seed: int = 0
+    ) -> Array:
+        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 20).
+
+        Args:
+            gains: with a table `slide`.
+            ground: the surface.
+            ways: directions of the slide, tick by tick, shape (m, 3).
+            into: direction in which the law looks for the surface, shape (3,).
+            seed: of the noise.
+
+        Raises:
+            InputError: a joint reached the end of its range; gains of another kind of arm.
+        """
+        check_mode(gains, self.inner.kind)
+        rows, ticks = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS))), 0
+        frame, loop = self._frame(), SlidingLoop(gains, into)
+        cell = cell_of(self.arm, self.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
+        engine = OnGround(self.arm, cell, self.place.q, ground, gains.arm, frame, seed)
+        tip = SimulatedArm(self.arm, gains.arm, self.place, cell, engine)
+        axes, origin = np.array(frame.axes), np.array(frame.origin)
+        for k, row in enumerate(rows):
+            if ticks >= len(ways):
+                return rows[:k]
+            reading = engine.reading
+            velocity = loop.update(reading, axes @ (tip.read().pose[:3, 3] - origin), ways[ticks])
+            ticks += int(loop.sliding or ticks > 0)
+            tip.write(Command(velocity=np.concatenate([velocity @ axes, np.zeros(3)])))
+            self._check_range(tip.truth.q, k * gains.arm.tick)
+            after = engine.slid
+            v, f = _three(velocity), _three(reading)
+            compiled_note(ground, loop.state, after.tip, v, f, float(after.mean), row)
+            row[13] = (1.0 if loop.sliding else 2.0) * min(ticks, 1)
+        return rows
+
+    def _frame(self) -> Frame:
+        """The surface's axes, and its first point before the tip."""
+        n, axes = self.place.normal, self.place.axes
+        at = self.place.pose[:3, 3]
+        at = at + (self.place.place - n @ at) * n
+        return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
+
+    def _check_range(self, q: Array, time: float) -> None:
+        beyond = np.flatnonzero(~((q >= self.arm.lower) & (q <= self.arm.upper)))
+        if len(beyond):
+            raise InputError(
+                f"{self.arm.names[beyond[0]]} reached the end of its range at {time:.3f} s; make --length smaller"
+            )
+
+
+def jointed_arm(name: str) -> JointedArm:
+    """An arm by its name, at home above a surface that its tool's axis meets squarely.
+
+    Raises:
+        InputError: an arm whose joints are not known, or no MuJoCo.
+    """
+    mujoco()
+    if name not in names():
+        raise InputError(
+            f"--physics mujoco needs an arm whose joints are known ({', '.join(names())}), got {name}"
+        )
+    arm = SerialArm.named(name)
+    place = place_of(arm, None, None)
+    return JointedArm(arm, place, loop_of(name, arm.title, usual_mode(name), place.mass))
+
+
+def _three(values: Array) -> Vec3:
+    return Vec3(*map(float, values))

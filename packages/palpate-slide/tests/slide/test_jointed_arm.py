@@ -1,0 +1,99 @@
+"""Slides of arms with joints, which MuJoCo moves."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from palpate.cli import main
+from palpate.errors import InputError
+from palpate.force import Gains
+from palpate.force.gains import gains_for
+from palpate.force.slide_table import Slide
+from palpate.force.sliding.paths import directions
+from palpate_slide.ground import ground_of
+from palpate_slide.jointed_arm import JointedArm, jointed_arm
+from palpate_slide.world import GAP, figures_of
+
+pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
+
+
+@pytest.fixture(scope="module")
+def fr3() -> JointedArm:
+    return jointed_arm("fr3")
+
+
+def tuned(arm: JointedArm) -> Gains:
+    return replace(gains_for(arm.inner, 15.0, cap=4e4), slide=Slide(speed=0.03, mu_max=0.9, slope=0.04))
+
+
+def test_the_force_is_held_by_an_arm_with_joints(fr3: JointedArm) -> None:
+    gains, ground = tuned(fr3), ground_of("bowl", 0.12, 2e4, friction=0.4)
+    ways = directions("circle", 1.5, gains.arm.rate, 0.03, 0.04)
+    rows = fr3.slide(gains, ground, ways, into=[0.05, 0.05, -1.0])
+    found = figures_of(rows, gains, ground)
+    assert found.obeys
+    assert found.worst < 1.15
+    assert found.normal < np.radians(0.5)
+    assert min(found.cone, found.friction, found.stiffness) > 0.9
+    assert rows[0, 3] == pytest.approx(GAP, abs=1e-4)
+    on = rows[rows[:, 13] == 1.0]
+    assert np.hypot(on[:, 1], on[:, 2]).max() > 0.02  # it went along the bowl,
+    height = on[:, 3] - (0.12 - np.sqrt(0.12**2 - on[:, 1] ** 2 - on[:, 2] ** 2))
+    assert np.abs(height + gains.force / 2e4).max() < 2e-4  # as deep in it as the force asks for
+
+
+def test_the_force_on_the_joints_is_that_of_the_contact(fr3: JointedArm) -> None:
+    """Without friction and with a held force the arm's own spring carries F_d: the tip lags its goal by F_d / K."""
+    gains, ground = tuned(fr3), ground_of("plane", 0.2, 2e4)
+    rows = fr3.slide(gains, ground, directions("line", 0.5, gains.arm.rate, 0.03, 0.1))
+    assert rows[-1, 3] == pytest.approx(-gains.force / 2e4, rel=0.02)
+    assert rows[-200:, 16:18] == pytest.approx(0.0, abs=6.0 * gains.arm.sensor.noise)
+    assert rows[-200:, 18].mean() == pytest.approx(-gains.force, rel=0.01)
+
+
+def test_a_joint_at_the_end_of_its_range_is_one_line(fr3: JointedArm) -> None:
+    short = replace_upper(fr3)
+    with pytest.raises(InputError, match=r"reached the end of its range at .* make --length smaller"):
+        short.slide(tuned(fr3), ground_of("plane", 0.2, 2e4), directions("line", 0.5, 1000.0, 0.03, 0.1))
+
+
+def replace_upper(arm: JointedArm) -> JointedArm:
+    from dataclasses import replace as changed
+
+    return changed(arm, arm=changed(arm.arm, upper=arm.arm.home + 1e-4))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--arm", "gains.toml"], "whose joints are known"), (["--physics", "bullet"], "physics")],
+)
+def test_wrong_words_are_one_line(words: list[str], said: str, tmp_path, capsys) -> None:
+    assert main(["slide", "--physics", "mujoco", "--out", str(tmp_path / "out"), *words]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+
+
+def test_the_command_says_by_whom_the_arm_was_moved(tmp_path, capsys) -> None:
+    words = [
+        "slide",
+        "--arm",
+        "iiwa14",
+        "--physics",
+        "mujoco",
+        "--seconds",
+        "1",
+        "--touches",
+        "0:mm",
+        "--tilt",
+        "3",
+    ]
+    assert main([*words, "--out", str(tmp_path / "out"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["physics"] == "mujoco"
+    assert answer["end"] == "held"
+    assert (tmp_path / "out" / "report.html").is_file()

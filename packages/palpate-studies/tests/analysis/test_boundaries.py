@@ -1,0 +1,95 @@
+"""Where the loop is stable, over any number of the experiment."""
+
+import numpy as np
+import pytest
+
+from analysis.worlds import surface
+from palpate.bench import build
+from palpate.bench.tables import changed
+from palpate.errors import InputError
+from palpate.force.boundary import stable_between
+from palpate_studies.analysis import linearise, stable_intervals, stable_stiffness
+from palpate_studies.analysis.boundaries import growth, stable_pieces
+
+# Of a tip alone, y and phi left out, as a feasibility study had them [N/m].
+ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("damping", "kf", "ki", "limit"), ONE_DIRECTION)
+def test_the_limits_are_those_of_one_direction_but_for_what_the_others_do(damping, kf, ki, limit):
+    """The arm's joints share their inertia, and 20 N on a moving lever are a spring: up to a fifth."""
+    low, high = stable_stiffness(surface(0.9 * limit, damping, kf, ki), 0.7 * limit, 1.5 * limit)
+    assert low == 0.7 * limit
+    assert high == pytest.approx(limit, rel=0.21)
+
+
+def test_the_boundary_is_where_the_growth_is_one():
+    base = surface(1e4, 480.0, 1.0, 0.003)
+    low, high = stable_stiffness(base, 5e4, 2e5, x=0.4688)
+    assert low == 5e4
+    for share in (0.999, 1.001):
+        on = linearise(changed(base, {"surface.stiffness": share * high}), x=0.4688)
+        assert on.stable == (share < 1.0)
+
+
+@pytest.mark.long
+def test_intervals_of_a_gain():
+    ((low, high),) = stable_intervals(surface(5e4, 480.0, 1.0, 0.003), "controller.kf", 0.0, 3.0)
+    assert low == 0.0
+    assert 1.0 < high < 3.0
+    assert not linearise(surface(5e4, 480.0, 1.05 * high, 0.003)).stable
+
+
+def test_what_has_no_interval_is_told():
+    with pytest.raises(InputError, match="no stiffness from"):
+        stable_stiffness(surface(1e4, 60.0, 1.0, 0.003), 1e5, 2e5)
+    with pytest.raises(InputError, match="lower end first"):
+        stable_intervals(surface(1e4, 60.0, 1.0, 0.003), "controller.kf", 2.0, 1.0)
+    with pytest.raises(InputError, match="stiffnes"):
+        stable_intervals(surface(1e4, 60.0, 1.0, 0.003), "surface.stiffnes", 1.0, 2.0)
+
+
+@pytest.mark.long
+def test_a_bench_has_the_boundary_of_its_experiment():
+    base = surface(1e4, 480.0, 1.0, 0.003)
+    ends = "surface.stiffness", 1e5, 1.1e5
+    assert stable_intervals(build(base), *ends, x=0.4688) == stable_intervals(base, *ends, x=0.4688)
+    with pytest.raises(InputError, match=r"unknown number of the bench 'controller\.kq'"):
+        stable_intervals(build(base), "controller.kq", 0.1, 1.0, x=0.4688)
+    with pytest.raises(InputError, match="is no number of the bench but Vec3"):
+        stable_intervals(build(base), "controller.kp", 0.1, 1.0, x=0.4688)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_cells_find_what_the_exact_crossings_say(seed):
+    """Matrices that differ through one signal: their crossings are eigenvalues, islands too.
+
+    Within 1e-3: a real eigenvalue that is nearer to 1 than `CONSTANT` counts as one that never changes.
+    """
+    rng = np.random.default_rng(seed)
+    start = rng.standard_normal((4, 4))
+    start *= 1.02 / np.abs(np.linalg.eigvals(start)).max()
+    across = np.outer(rng.standard_normal(4), rng.standard_normal(4))
+    exact = stable_between(start, start + across, 1.0)
+    found = stable_pieces(lambda s: start + s * across, 0.0, 1.0)
+    assert np.array(found).ravel() == pytest.approx(np.array(exact).ravel(), abs=1e-3)
+
+
+def test_an_island_is_found_that_a_grid_steps_over():
+    def period(s):
+        return np.diag([1.02 - 0.04 * np.exp(-(((s - 0.5) / 0.03) ** 2)), 0.5])
+
+    half = 0.03 * np.sqrt(np.log(2.0))
+    ((low, high),) = stable_pieces(period, 0.0, 1.0)
+    assert (low, high) == pytest.approx((0.5 - half, 0.5 + half), abs=2e-4)
+    assert not any(growth(period(s)) < 0.0 for s in np.linspace(0.0, 1.0, 16))
+
+
+@pytest.mark.long
+def test_no_value_of_a_grid_is_on_the_wrong_side():
+    base = surface(1e4, 480.0, 1.0, 0.003)
+    found = stable_intervals(base, "controller.kf", 1.0, 4.0)
+    for value in np.geomspace(1.0, 4.0, 7).tolist():
+        told = any(a <= value <= b for a, b in found)
+        assert linearise(changed(base, {"controller.kf": value})).stable == told
