@@ -49,10 +49,9 @@ IN_IDENTIFIER = {
     "x == 0.0 ? -INFINITY : NAN": "likewise",
     "x == INFINITY": "likewise",
     "numbers.at[GOOD] >= 0.0": "a jump from a position that was never accepted: the first is accepted",
-    "missing <= (double)positions->gap": "a gap that ends on the very first row",
     "bend = !isnan(x0)": "a gap that begins behind the very first row",
     "whole + state.at[AFTER] > track->numbers.at[RESOLVED]": "a row that is resolved has been passed by the row of now",
-    "far > 3.0 * contact.at[QUANTUM]": "the end of the range in the second contact of a press that has a fit of none",
+    "far > 3.0 * contact.at[QUANTUM]": "so many readings stand at the highest only where the tip has moved that far",
     "size > 0.0 ? v / sqrt(size) : 0.0": "a sample without rate and acceleration, in a contact",
     "level < LEVELS_octave_sums": "2^21 samples of one contact, at which the highest octave ends",
     "level == LEVELS_octave_sums": "likewise",
@@ -75,7 +74,7 @@ def contacts(touch, **options):
     [
         ("force", 400_000, 300, IN_FORCE_LOOP),
         ("squares", 20_000, 35, IN_SQUARES),
-        ("identifier", 60_000, 290, IN_IDENTIFIER),
+        ("identifier", 100_000, 290, IN_IDENTIFIER),
     ],
 )
 def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(
