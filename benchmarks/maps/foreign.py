@@ -175,7 +175,8 @@ def judge(kind: str, count: int, seed: int) -> tuple[float, float]:
     for fold in range(FOLDS):
         out = left_out == fold
         result = StiffnessMap()
-        result.update(places[~out], value[~out], 1.96 * stated[~out] * value[~out])
+        line = group[~out] if errors is shared else None
+        result.update(places[~out], value[~out], 1.96 * stated[~out] * value[~out], line)
         seen = result.predict(places[out])
         for found, ends, true in ((surface, seen.ci95, np.exp(truth[out])), (press, seen.next95, value[out])):
             found[out] = (ends[:, 0] <= true) & (true <= ends[:, 1])

@@ -18,18 +18,20 @@ def prior_covariance(p, places, others):
     return p.smooth**2 * (1 + s + s**2 / 3) * np.exp(-s) + p.rough**2 * (1 + r) * np.exp(-r)
 
 
-def test_the_gradient_is_that_of_the_likelihood():
-    theta = np.log([0.4, 0.05, 0.2, 0.01, 0.02])
+@pytest.mark.parametrize("lines", [None, 5])
+def test_the_gradient_is_that_of_the_likelihood(lines):
+    theta = np.log([0.4, 0.05, 0.2, 0.01, 0.02, 0.03][: 5 if lines is None else 6])
     distance, step = pdist(PLACES), 1e-5
+    same = None if lines is None else pdist(np.arange(25.0)[:, None] % lines) == 0.0
     numeric = [
         (
-            loss(theta + step * e, distance, VALUES, NOISE)[0]
-            - loss(theta - step * e, distance, VALUES, NOISE)[0]
+            loss(theta + step * e, distance, VALUES, NOISE, same)[0]
+            - loss(theta - step * e, distance, VALUES, NOISE, same)[0]
         )
         / (2 * step)
-        for e in np.eye(5)
+        for e in np.eye(len(theta))
     ]
-    assert loss(theta, distance, VALUES, NOISE)[1] == pytest.approx(numeric, rel=1e-5, abs=1e-6)
+    assert loss(theta, distance, VALUES, NOISE, same)[1] == pytest.approx(numeric, rel=1e-5, abs=1e-6)
 
 
 def test_conditioning_is_that_of_a_normal_distribution_whose_mean_is_unknown():
@@ -94,3 +96,18 @@ def test_intervals_are_wider_than_normal_ones_where_the_field_jumps():
     assert plain.z95 == pytest.approx(1.96, abs=0.15)
     assert jump.z95 > 2.2
     assert np.mean(np.abs(jump.likeliest.leave_one_out()) < jump.z95) >= 0.94
+
+
+def test_an_error_that_lines_share_is_not_taken_for_the_field():
+    rng = np.random.default_rng(5)
+    x, line = rng.uniform(0.0, 0.1, 80), np.repeat(np.arange(8.0), 10)
+    places, noise = np.column_stack([x, 0.0125 * line]), np.full(80, 0.02)
+    values = np.sin(40.0 * x) + 0.15 * rng.normal(size=8)[line.astype(int)] + noise * rng.normal(size=80)
+    process, blind = fit(places, values, noise, line), fit(places, values, noise)
+    assert process.shared == pytest.approx(0.15, rel=0.5)
+    assert blind.shared == 0.0
+    at = RNG.uniform([0.0, 0.0], [0.1, 0.0875], (300, 2))
+    (mean, variance), (other, _) = process.predict(at), blind.predict(at)
+    true = np.sin(40.0 * at[:, 0])
+    assert np.mean(np.abs(mean - true) < 1.96 * np.sqrt(variance)) > 0.9
+    assert np.mean((mean - true) ** 2) < np.mean((other - true) ** 2)

@@ -14,9 +14,11 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from palpate.cli import main
+from palpate.logs.store import write_record
 from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
 from palpate.maps.presses import read_table
 from palpate.maps.result import MapRequest, map_of
+from palpate.records import Record
 
 PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
 
@@ -316,3 +318,41 @@ def test_an_arm_maps_a_phantom(tmp_path, capsys):
         assert abs(row["stiffness"] - true) < 2.0 * row["half"] + 0.03 * true
     stiffest = max(answer["map"], key=lambda row: row["stiffness"])
     assert np.hypot(stiffest["x"] - 0.02, stiffest["y"] - 0.02) < 0.012
+
+
+def test_a_column_of_lines_and_a_folder_of_presses_are_read(table, tmp_path, capsys):
+    """Lines of a table share an error; records of two arms have two frames."""
+    rows = table.read_text(encoding="utf-8").splitlines()
+    lines = [f"{row},{i // 11}" for i, row in enumerate(rows[1:])]
+    wide = tmp_path / "lines.csv"
+    wide.write_text("\n".join([f"{rows[0]},line", *lines]), encoding="utf-8")
+    assert main(["map", "--table", str(wide), "--next", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["line_half"] > 0.0
+    press = polars.read_csv(PRESS)
+    columns = {
+        "t": press["time_s"].to_numpy(),
+        "x_measured": 1e-3 * press["position_mm"].to_numpy(),
+        "force_sampled": press["force_N"].to_numpy(),
+    }
+    units = {"t": "s", "x_measured": "m", "force_sampled": "N"}
+    for i, at in enumerate([(0.0, 0.0, 0.1), (0.02, 0.0, 0.1), (0.0, 0.02, 0.1)]):
+        (tmp_path / f"p{i}").mkdir()
+        record = Record(columns, units, {"place_m": list(at), "arm": "one"})
+        write_record(record, tmp_path / f"p{i}" / "record.parquet")
+    folders = [str(tmp_path / f"p{i}") for i in range(3)]
+    assert main(["map", *folders, "--next", "0", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [(row["x"], row["y"], row["z"]) for row in answer["places"]] == [
+        (0.0, 0.0, 0.1),
+        (0.02, 0.0, 0.1),
+        (0.0, 0.02, 0.1),
+    ]
+    write_record(
+        Record(columns, units, {"place_m": [0.0, 0.0, 0.1], "arm": "other"}),
+        tmp_path / "p2" / "record.parquet",
+    )
+    assert main(["map", folders[0], folders[2]]) == 2
+    error = capsys.readouterr().err
+    assert "'one'" in error
+    assert "'other'" in error
+    assert error.count("\n") == 1

@@ -11,18 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG
+from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET
-from palpate.cli.options.written import WRITTEN, JsonOption, ReportOption
+from palpate.cli.options.values import FLAG
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 from palpate.units import split_spec, unit
@@ -43,7 +41,8 @@ class PlaceOptions:
 
     table: Path | None = None
     """A table with a row a press instead of logs: columns x, y (and z), stiffness and half, the half-width of
-    its 95 % interval; a name such as x_mm carries its unit."""
+    its 95 % interval; a name such as x_mm carries its unit. A column line numbers the slide or session of a press,
+    whose presses share an error."""
     columns: str | None = None
     "Columns of the table, as x:mm,y:mm,K:N/mm,half:N/mm."
     place: str | None = None

@@ -20,7 +20,7 @@ from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
 from scipy.stats import norm
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
 
 Posterior = Callable[[Array], tuple[float, Array]]
 """Minus the logarithm of a density, and its gradient."""
@@ -53,6 +53,7 @@ class Hyperparameters:
         rough: standard deviation of the rough process.
         short: its length scale [m].
         repeat: standard deviation from press to press at one place, beyond what each press states of itself.
+        shared: standard deviation of the error that the presses of one line have in common.
     """
 
     smooth: float
@@ -60,6 +61,7 @@ class Hyperparameters:
     rough: float
     short: float
     repeat: float
+    shared: float = 0.0
 
     def covariance(self, distance: Array) -> Array:
         """Covariance of the field at distances [m] of any shape."""
@@ -92,18 +94,22 @@ class Conditioned:
         values: (n,).
         noise: standard deviation of each value (n,).
         parameters: of the processes.
+        line: of each value, a number (n,); None where no values share an error.
     """
 
     places: Array
     values: Array
     noise: Array
     parameters: Hyperparameters
+    line: Array | None = None
 
     @cached_property
     def factor(self) -> Array:
         """Lower Cholesky factor of the values' covariance (n, n)."""
         K = self.parameters.covariance(cdist(self.places, self.places))
         K[np.diag_indices_from(K)] += self.noise**2 + self.parameters.repeat**2
+        if self.line is not None:
+            K += self.parameters.shared**2 * (self.line[:, None] == self.line)
         return cholesky(K, lower=True, check_finite=False)
 
     @cached_property
@@ -125,6 +131,13 @@ class Conditioned:
         total += squareform(parameters.covariance(pdist(places)))
         total[np.diag_indices_from(total)] += parameters.variance
         return total
+
+    def first(self, count: int) -> Conditioned:
+        """The same process, given the first values alone."""
+        line = None if self.line is None else self.line[:count]
+        return Conditioned(
+            self.places[:count], self.values[:count], self.noise[:count], self.parameters, line
+        )
 
     def leave_one_out(self) -> Array:
         """Deviation of each value from what the others foretell, by its standard deviation (n,) (section 5.4.2)."""
@@ -174,8 +187,8 @@ class LogPrior:
     """Normal prior of the logarithms of the parameters.
 
     Args:
-        mean: of the logarithms, in the order of `Hyperparameters` (5,).
-        std: (5,).
+        mean: of the logarithms, in the order of `Hyperparameters` (d,).
+        std: (d,).
     """
 
     mean: Array
@@ -196,21 +209,29 @@ def prior_of(distance: Array, values: Array, noise: Array) -> LogPrior:
     return LogPrior(np.log(middle), np.array([1.0, 0.7, 1.0, 0.7, 1.5]))
 
 
-def loss(theta: Array, distance: Array, values: Array, noise: Array) -> tuple[float, Array]:
-    """Minus the restricted log likelihood, and its gradient (5,) by the logarithms theta (5,) (eqs. 5.8, 5.9).
+def loss(
+    theta: Array, distance: Array, values: Array, noise: Array, same: Mask | None = None
+) -> tuple[float, Array]:
+    """Minus the restricted log likelihood, and its gradient by the logarithms theta (eqs. 5.8, 5.9).
 
     Args:
-        theta: logarithms of the parameters.
+        theta: logarithms of the parameters, of five or, with `same`, of all six.
         distance: of each two places [m], as `scipy.spatial.distance.pdist` lists them.
         values: (n,).
         noise: standard deviation that each value states of itself (n,).
+        same: whether two values are of one line, listed as the distances.
     """
     p = Hyperparameters(*np.exp(theta))
     s, r = SMOOTH / p.long * distance, ROUGH / p.short * distance
     fall_s, fall_r = p.smooth**2 * np.exp(-s), p.rough**2 * np.exp(-r)
     smooth, rough = (1.0 + s + s * s / 3.0) * fall_s, (1.0 + r) * fall_r
-    K = squareform(smooth + rough)
-    K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2
+    slopes = [2.0 * smooth, s * s * (1.0 + s) / 3.0 * fall_s, 2.0 * rough, r * r * fall_r]
+    covariance = smooth + rough
+    if same is not None:
+        covariance += p.shared**2 * same
+        slopes.append(2.0 * p.shared**2 * same)
+    K = squareform(covariance)
+    K[np.diag_indices_from(K)] = p.variance + noise**2 + p.repeat**2 + p.shared**2
     factor = cholesky(K, lower=True, check_finite=False)
     P, _ = dpotri(factor, lower=1)  # of 100 presses it starts no threads, nor do the sums below
     P += np.tril(P, -1).T
@@ -219,11 +240,11 @@ def loss(theta: Array, distance: Array, values: Array, noise: Array) -> tuple[fl
     a = np.einsum("ij,j", P, values)
     G = P - np.outer(a, a)  # G / 2 is the derivative by the covariance; each pair stands in that twice
     pairs, own = squareform(G, checks=False), np.trace(G)
-    slopes = (2.0 * smooth, s * s * (1.0 + s) / 3.0 * fall_s, 2.0 * rough, r * r * fall_r)
     gradient = [np.einsum("i,i", pairs, slope) for slope in slopes]
-    alone = own * np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2])
+    gradient.insert(4, 0.0)  # of two different values none is of the repetition
+    alone = own * np.array([p.smooth**2, 0.0, p.rough**2, 0.0, p.repeat**2, p.shared**2])
     value = 0.5 * values @ a + np.log(np.diag(factor)).sum() + 0.5 * np.log(w.sum())
-    return float(value), np.array([*gradient, 0.0]) + alone
+    return float(value), np.array(gradient) + alone[: len(gradient)]
 
 
 @dataclass(frozen=True)
@@ -247,6 +268,11 @@ class GaussianProcess:
     def repeat(self) -> float:
         """Standard deviation from press to press at one place, beyond what each press states."""
         return float(np.sqrt(self.weights @ [node.parameters.repeat**2 for node in self.nodes]))
+
+    @property
+    def shared(self) -> float:
+        """Standard deviation of the error that the presses of one line have in common."""
+        return float(np.sqrt(self.weights @ [node.parameters.shared**2 for node in self.nodes]))
 
     @cached_property
     def z95(self) -> float:
@@ -298,7 +324,7 @@ class GaussianProcess:
         return mean, variance
 
 
-def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
+def fit(places: Array, values: Array, noise: Array, line: Array | None = None) -> GaussianProcess:
     """The process given values at places, with the posterior of its parameters by points about its mode.
 
     The points are those of a cubature of third degree of the normal distribution that the curvature at the mode gives;
@@ -308,12 +334,16 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
         places: (n, d) [m], at least three different ones.
         values: (n,).
         noise: standard deviation that each value states of itself (n,).
+        line: of each value, a number (n,), of which all share an error; None without lines.
     """
     prior = prior_of(cdist(places, places), values, noise)
+    if line is not None:  # a line errs as presses repeat
+        prior = LogPrior(np.append(prior.mean, prior.mean[-1]), np.append(prior.std, prior.std[-1]))
     noise = np.maximum(noise, 1e-4 * np.std(values))  # else rounding decides between presses at one place
     order = np.random.default_rng(0).permutation(len(values))
     parts = np.array_split(order, -(-len(values) // BLOCK))
-    blocks = [(pdist(places[b]), values[b], noise[b]) for b in parts]
+    same = [None if line is None else pdist(line[b][:, None]) == 0.0 for b in parts]
+    blocks = [(pdist(places[b]), values[b], noise[b], one) for b, one in zip(parts, same, strict=True)]
 
     def posterior(theta: Array) -> tuple[float, Array]:
         z = (theta - prior.mean) / prior.std
@@ -323,7 +353,7 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
         )
 
     # The short scale may stand for the whole field or for its edges: the likelihood has a mode for each.
-    edges = prior.mean + np.array([-1.0, 0.0, 0.7, 0.5, 0.0])
+    edges = prior.mean + np.array([-1.0, 0.0, 0.7, 0.5, 0.0, 0.0])[: len(prior.mean)]
     bounds = [(m - 6.0 * s, m + 6.0 * s) for m, s in zip(prior.mean, prior.std, strict=True)]
     modes = [
         minimize(posterior, start, jac=True, method="L-BFGS-B", bounds=bounds)
@@ -333,13 +363,13 @@ def fit(places: Array, values: Array, noise: Array) -> GaussianProcess:
     points, weights = _cubature(posterior, mode.x, float(mode.fun), float(prior.std.max()) ** -2)
     kept = weights >= LEAST_WEIGHT
     nodes = tuple(
-        Conditioned(places, values, noise, Hyperparameters(*np.exp(point))) for point in points[kept]
+        Conditioned(places, values, noise, Hyperparameters(*np.exp(point)), line) for point in points[kept]
     )
     return GaussianProcess(nodes, weights[kept] / weights[kept].sum())
 
 
 def _cubature(posterior: Posterior, mode: Array, least: float, flattest: float) -> tuple[Array, Array]:
-    """Points (k, 5) and weights (k,), the mode first; no curvature counts below the flattest, the prior's."""
+    """Points (k, d) and weights (k,), the mode first; no curvature counts below the flattest, the prior's."""
     d, step = len(mode), 1e-3
     rows = [(posterior(mode + step * e)[1] - posterior(mode - step * e)[1]) / (2.0 * step) for e in np.eye(d)]
     curvature, axes = eigh(0.5 * (np.array(rows) + np.array(rows).T))

@@ -41,6 +41,7 @@ class Presses:
         refused: logs that give no stiffness, by name, each with the reason.
         fields: further quantities of the presses by name, each (n,), NaN where a press has none.
         units: of the fields, SI.
+        line: number of the line or log of each press, whose presses share an error (n,); None without.
         frames: of the places, where logs name them, each with the first press in it; more than one is refused.
 
     Raises:
@@ -54,6 +55,7 @@ class Presses:
     refused: dict[str, str] = field(default_factory=dict)
     fields: dict[str, Array] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    line: Array | None = None
     frames: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,11 +74,16 @@ def merge_presses(parts: Sequence[Presses]) -> Presses:
         name: np.concatenate([p.fields.get(name, np.full(len(p.stiffness), np.nan)) for p in parts])
         for name in fields
     }
+    line = None
+    if any(p.line is not None for p in parts):
+        own = [np.zeros(len(p.stiffness)) if p.line is None else p.line - p.line.min() for p in parts]
+        ends = np.cumsum([0.0, *(each.max() + 1.0 for each in own)])
+        line = np.concatenate([each + end for each, end in zip(own, ends[:-1], strict=True)])
     return Presses(
         np.vstack([p.places for p in parts]), np.concatenate([p.stiffness for p in parts]),
         np.concatenate([p.half for p in parts]), [name for p in parts for name in p.names],
         {name: why for p in parts for name, why in p.refused.items()}, columns, fields,
-        {frame: name for p in reversed(parts) for frame, name in p.frames.items()},
+        line, {frame: name for p in reversed(parts) for frame, name in p.frames.items()},
     )  # fmt: skip
 
 
@@ -114,7 +121,8 @@ def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] =
             raise InputError(f"--fields names {name!r}, which the map has already")
         (numbers,) = sheet.numbers([column], ())
         fields[name], units[name] = numbers * unit(symbol or "1").factor, unit(symbol or "1").si
-    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units)
+    line = sheet.numbers([sheet.resolve("line")], ())[0] if "line" in sheet.names else None
+    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units, line)
 
 
 def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:
@@ -179,8 +187,9 @@ def read_logs(
     """
     places, numbers, names, refused, further = [], [], [], dict[str, str](), []
     frames: dict[str, str] = {}
+    lines = list[int]()
     twice = len({log.name for log in logs}) < len(logs)
-    for log in track(logs):
+    for number, log in enumerate(track(logs)):
         title = f"{log.parent.name}/{log.name}" if twice else log.name
         try:
             parts = _contacts(log, identifier, title) if each_contact else {title: identifier}
@@ -197,6 +206,7 @@ def read_logs(
             frames.setdefault(frame, name)
             places.append(where)
             names.append(name)
+            lines.append(number)
             further.append([each(found) for _, each in FIELDS.values()])
     if not places:
         raise InputError(
@@ -206,7 +216,8 @@ def read_logs(
     columns = np.array(further, dtype=float).T
     fields = {name: each for name, each in zip(FIELDS, columns, strict=True) if np.isfinite(each).any()}
     units = {name: FIELDS[name][0] for name in fields}
-    return Presses(np.array(places), stiffness, half, names, refused, fields, units, frames)
+    line = np.array(lines, dtype=float) if each_contact else None
+    return Presses(np.array(places), stiffness, half, names, refused, fields, units, line, frames)
 
 
 def _relaxation(found: Identification) -> float | None:

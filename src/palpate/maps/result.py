@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from scipy.spatial.distance import cdist
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import write_text
+from palpate.maps.gaussian_process import Z95
 from palpate.maps.lumps import Lump, lumps_of
 from palpate.maps.next_press import Goal, NextPresses
 from palpate.maps.presses import AXES, LEAST, Presses
@@ -130,8 +131,7 @@ class MapResult:
         distance = cdist(whole.places, self.coarse.places)
         frames = []
         for k in map(int, counts):
-            first = replace(whole, places=whole.places[:k], values=whole.values[:k], noise=whole.noise[:k])
-            mean, variance = first.reduction.predict(distance[:k])
+            mean, variance = whole.first(k).reduction.predict(distance[:k])
             std, common = np.sqrt(variance), self.request.common
             frames.append((k, Prediction(mean, std, std, common, z95=self.map.process.z95)))
         return frames
@@ -144,7 +144,7 @@ class MapResult:
     @property
     def repeat(self) -> float:
         """Relative half-width by which two presses at one place differ, 95 %, beyond their own intervals."""
-        return float(np.expm1(1.96 * self.map.process.repeat))
+        return float(np.expm1(Z95 * self.map.process.repeat))
 
     def to_json(self) -> dict[str, Any]:
         """The answer for programs; docs/json.md has the keys."""
@@ -167,6 +167,7 @@ class MapResult:
             ),
             "next": _rows(self.next.places, {"expected_half": self.next.expected_half})[: self.request.next],
             "repeat_half": self.repeat,
+            "line_half": float(np.expm1(Z95 * self.map.process.shared)),
             "disagreeing": [self.presses.names[i] for i in self.disagreeing],
             "refused": self.presses.refused,
         }
@@ -228,7 +229,7 @@ def map_of(presses: Presses, request: MapRequest) -> MapResult:
         InputError: they span no surface, or one place has two stiffnesses.
     """
     result = StiffnessMap(request.common)
-    result.update(presses.places, presses.stiffness, presses.half)
+    result.update(presses.places, presses.stiffness, presses.half, presses.line)
     result.surface.grid(1)
     return MapResult(presses, request, result)
 

@@ -93,6 +93,7 @@ class FieldMap:
             )
         self.logarithmic, self.name, self._common = logarithmic, name, common
         self._places, self._values, self._half = np.empty((0, 2)), np.empty(0), np.empty(0)
+        self._line = np.empty(0)
         self._process: GaussianProcess | None = None
         self._surface: Surface | None = None
 
@@ -124,7 +125,7 @@ class FieldMap:
             self._surface = Surface(self._places)
         return self._surface
 
-    def update(self, places: Any, values: Any, half: Any = None) -> None:
+    def update(self, places: Any, values: Any, half: Any = None, line: Any = None) -> None:
         """Add presses.
 
         Args:
@@ -132,16 +133,20 @@ class FieldMap:
             values: (n,), such as stiffness [N/m].
             half: half-width of each 95 % interval (n,), in the values' unit; None where presses state none, and the
                 presses' own scatter is all that is known of their error.
+            line: a number of each press (n,), such as that of its slide or session: presses of one number share an
+                error, which is estimated; NaN or None for presses that share none.
 
         Raises:
             InputError: shapes differ, a number is not finite or not above zero, or one place has two values.
         """
         where, value = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
         width = np.zeros(len(value)) if half is None and value.ndim else np.asarray(half, dtype=float)
-        if where.ndim != 2 or where.shape[1] not in (2, 3) or not (len(where),) == value.shape == width.shape:
+        number = np.full(value.shape, np.nan) if line is None else np.asarray(line, dtype=float)
+        shapes = (value.shape, width.shape, number.shape)
+        if where.ndim != 2 or where.shape[1] not in (2, 3) or {*shapes} != {(len(where),)}:
             raise InputError(
-                f"a map takes places (n, 2) or (n, 3), {self.name} (n,) and half (n,), got shapes "
-                f"{where.shape}, {value.shape} and {width.shape}"
+                f"a map takes places (n, 2) or (n, 3), {self.name} (n,), half (n,) and line (n,), got shapes "
+                f"{where.shape}, {', '.join(map(str, shapes))}"
             )
         if len(self) and where.shape[1] != self._places.shape[1]:
             raise InputError(
@@ -165,6 +170,7 @@ class FieldMap:
         if half is not None:
             self._refuse_contradictions(*together)
         self._places, self._values, self._half = together
+        self._line = np.concatenate([self._line, number])
         self._process = self._surface = None
 
     @property
@@ -172,7 +178,9 @@ class FieldMap:
         """The Gaussian process of all presses."""
         if self._process is None:
             self.surface  # noqa: B018 - refuses presses that span no surface
-            self._process = fit(self._places, *self._scaled(self._values, self._half))
+            lines, line = np.unique(self._line, return_inverse=True, equal_nan=False)
+            shared = line.astype(float) if 1 < len(lines) < len(line) else None
+            self._process = fit(self._places, *self._scaled(self._values, self._half), shared)
         return self._process
 
     def predict(self, places: Any) -> Prediction:
@@ -259,9 +267,9 @@ class FieldMap:
 
     @property
     def _noise(self) -> float:
-        """Variance of a next press, of the logarithm if logarithmic."""
+        """Variance of a next press, on a line of its own, of the logarithm if logarithmic."""
         own = np.median(self._scaled(self._values, self._half)[1])
-        return float(own**2 + self.process.repeat**2)
+        return float(own**2 + self.process.repeat**2 + self.process.shared**2)
 
     def _candidates(self) -> Array:
         grid = self.grid(CANDIDATES)
