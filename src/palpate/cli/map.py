@@ -118,7 +118,7 @@ class OutputOptions(ReportOption, JsonOption):
     ply: Path | None = None
     "Where to write the map as coloured points, for a viewer of point clouds."
     mcap: Path | None = None
-    "Where to write the map as it grew, for Foxglove and Lichtblick."
+    "Where to write the map as it grew, for Foxglove, Lichtblick and Rerun."
 
     def check(self) -> None:
         """Check every path before any work is done."""
