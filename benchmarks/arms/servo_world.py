@@ -1,6 +1,7 @@
 """An arm of position servos in MuJoCo: links and actuators, a sensor, and a one-sided surface or a hand that pushes.
 
-Nothing of it is palpate's but the tables of the links: MuJoCo moves the joints, and all else is written here again.
+Nothing of that world is palpate's but the tables of the links: MuJoCo moves the joints, and all else is written here
+again. `arm_of` is the same arm as palpate describes it, in one direction.
 """
 
 from __future__ import annotations
@@ -11,6 +12,9 @@ from importlib.resources import files
 import numpy as np
 from scipy.signal import butter, tf2ss
 
+from palpate.force.arm import Arm, Limits, Sensor, ServoLoop
+from palpate.robots import SerialArm
+
 SERVOS = {
     "ur5e": ((2000, 2000, 2000, 500, 500, 500), (400, 400, 400, 100, 100, 100)),
     "iiwa14": ((2000,) * 7, (200,) * 7),
@@ -18,6 +22,21 @@ SERVOS = {
 """kp [N m/rad] and kd [N m s/rad] of the joints of MuJoCo menagerie's models."""
 RATE, STEPS = 500.0, 8
 """Ticks a second, and steps of the physics in a tick."""
+
+
+def arm_of(name: str) -> Arm:
+    """The tip of an arm at home, along its own z, as a servo of one direction: K_s and D of all joints in series."""
+    robot, (kp, kd) = SerialArm.named(name), SERVOS[name]
+    q = np.array(robot.home)
+    along = robot.forward_kinematics(q)[:3, 2] @ robot.jacobian(q)[:3]
+    stiffness, damping = (1.0 / float(along**2 @ (1.0 / np.array(gain))) for gain in (kp, kd))
+    mass = 1.0 / float(along @ np.linalg.solve(robot.mass_matrix(q), along))
+    return Arm(
+        title=f"{name}, servos of MuJoCo menagerie", rate=RATE,
+        inner=ServoLoop(mass=mass, stiffness=stiffness, damping=damping, delay=0.008),
+        sensor=Sensor(low_pass="butterworth3:120", sampling=480.0, noise=0.1, full_scale=100.0),  # noqa: S106
+        limits=Limits(speed=0.25, stiffness=2e5),
+    )  # fmt: skip
 
 
 def model_of(name: str, gains):

@@ -8,7 +8,7 @@ damping ratio of 0.01 to 0.3, 20 N desired. The gains know 0.1 N of noise, and n
 whose commanded speed into the surface is above the approach while the true force is zero. `over`:
 largest true force over F_d. `settled`: the true force is within 5 % of F_d, and of the fault's last value, for good.
 Every press is kept as it ends: the same command resumes. `servo-ur5e` and `servo-iiwa14` are those of
-benchmarks/arms/servos.py.
+benchmarks/arms/servo_world.py.
 """
 
 from __future__ import annotations
@@ -85,9 +85,9 @@ FAULTS: dict[str, tuple[Callable, float]] = {
 
 
 def servo(name: str) -> Arm:
-    """An arm of benchmarks/arms/servos.py."""
+    """An arm of benchmarks/arms/servo_world.py."""
     sys.path.append(str(Path(__file__).parents[1] / "arms"))
-    from servos import arm_of
+    from servo_world import arm_of
 
     return arm_of(name)
 

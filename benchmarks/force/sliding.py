@@ -1,6 +1,6 @@
 """Slides along surfaces that nobody has measured: how well the force is held, and whether the intervals hold.
 
-    python benchmarks/force/sliding.py slides|joints|rivals|faults [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
+    python benchmarks/force/sliding.py PART [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
 
 The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N,
 noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along circles, there and back, 4 s
@@ -8,7 +8,8 @@ each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (stan
 `touches` it is as far off, and three touches 10 mm apart measure it first. `obeys`: after
 0.5 s the true normal force is within 3 % rms and 10 %, contact kept. `domain`: the slides that the closed form of
 palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along paths of at most 60 mm. `rivals` begin
-where the force is first held, with the same K_u. `faults`: steps of 1 mm over 2 mm, up or down, with and without
+where the force is first held, with the same K_u; `leaderboard` has a row for each.
+`dither`: stiffness along the path. `faults`: steps of 1 mm over 2 mm, up or down, with and without
 `step` in the gains, and friction that is 1.5 times as high at rest, from the near start.
 """
 
@@ -25,6 +26,7 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import obeys, slide_terms
+from palpate_slide.dither import dither_frequency, stiffness_along
 from palpate_slide.ground import ground_of
 from palpate_slide.jointed_arm import jointed_arm
 from palpate_slide.world import figures_of, simulate
@@ -158,6 +160,55 @@ def rivals(args):
     in_markdown(["lower rms than: touches; far; near", *(TITLES[arm] for arm in args.arms)], rows.values())
 
 
+def leaderboard(args):
+    """A row for each law on the same slides, the better ones first."""
+    rows = []
+    for arm in args.arms:
+        rng, found = np.random.default_rng(args.seed), {name: [] for name in ("cautious slide", *RIVALS)}
+        for _ in range(args.slides):
+            gains, ground, ways, into, seed, _ = drawn(load_arm(arm), rng, "touches")
+            for name, results in found.items():
+                law = {"control": RIVALS[name]} if name in RIVALS else {}
+                results.append(
+                    figures_of(simulate(gains, ground, ways, into=into, seed=seed, **law), gains, ground)
+                )
+        order = sorted(found.items(), key=lambda item: -sum(f.obeys for f in item[1]))
+        for name, results in order:
+            cells = numbers_of(results)
+            tail = np.percentile([f.rms for f in results], 95)
+            rows.append(
+                [f"{TITLES[arm]}, {name}", cells[0], cells[1], f"{100 * tail:.3g} %", cells[2], cells[3]]
+            )
+    in_markdown(["slide", "obeys", "rms, median", "rms, 95 % below", "worst force (p99)", "lost"], rows)
+
+
+def dither(args):
+    """Stiffness along the path of slides at 5 to 15 mm/s for 10 s, the force dithered by a tenth."""
+    rows = []
+    for arm in args.arms:
+        rng, error, half, held = np.random.default_rng(args.seed + 2), [], [], []
+        for _ in range(args.slides):
+            gains, ground, _, into, seed, _ = drawn(load_arm(arm), rng, "touches")
+            speed, grade, frequency = even(rng, 5e-3, 15e-3), rng.uniform(-5.0, 5.0), dither_frequency(gains)
+            gains, ground = (
+                replace(gains, slide=replace(gains.slide, speed=speed)),
+                ground._replace(grade=grade),
+            )
+            ways = directions("circle", 10.0, gains.arm.rate, speed, 0.02)
+            out = simulate(gains, ground, ways, into=into, seed=seed, dither=(0.1, frequency))
+            found = stiffness_along(out, gains.arm, frequency)
+            truth = ground.stiffness * (1.0 + grade * found.places[:, 0])
+            error += list(np.abs(found.stiffness / truth - 1.0))
+            half += list(found.half / truth)
+            held.append(figures_of(out, gains, ground).obeys)
+        inside = share(np.array(error) < half)
+        cells = [f"{100 * np.median(error):.2g} %", f"{100 * np.median(half):.2g} %", inside, share(held)]
+        rows.append([TITLES[arm], f"{len(error)}", *cells])
+    in_markdown(
+        ["", "places", "error, median", "half-width, median", "interval holds", "slides that obey"], rows
+    )
+
+
 def faults(args):
     """Steps and friction at rest."""
     rows = []
@@ -174,7 +225,7 @@ def faults(args):
     in_markdown(["", "slides", "obeys", "worst force (p99)", "lost", "said, where beyond 10 %"], rows)
 
 
-PARTS = {part.__name__: part for part in (slides, joints, rivals, faults)}
+PARTS = {part.__name__: part for part in (slides, joints, rivals, leaderboard, dither, faults)}
 
 
 def main():

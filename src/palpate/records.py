@@ -1,19 +1,122 @@
-"""A record: named columns of equal length, in SI units, with metadata."""
+"""A record of named columns, and what every result is: printed, compared, drawn, written as a page."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.results import Result
+from palpate.text import in_python
 
 if TYPE_CHECKING:
     from polars import DataFrame
+
+
+def same(one: object, other: object) -> bool:
+    """Whether two values are equal, arrays by their elements, and no number equal to no number."""
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return _same_arrays(one, other)
+    if type(one) is not type(other):
+        return bool(one == other)
+    if is_dataclass(one):
+        return all(
+            same(getattr(one, own.name), getattr(other, own.name)) for own in fields(one) if own.compare
+        )
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, str | bytes):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float) and one != one:  # noqa: PLR0124 - not a number
+        return bool(other != other)  # noqa: PLR0124
+    return bool(one == other)
+
+
+def _same_arrays(one: object, other: object) -> bool:
+    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return False
+    return np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
+
+
+class Readable:
+    """A value with a `repr` of one line and a view for notebooks; `palpate.report.values` has the facts of each."""
+
+    def __init_subclass__(cls, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        for name in ("__repr__", "_repr_html_"):  # a dataclass writes a repr where its own class has none
+            setattr(cls, name, getattr(cls, name))
+
+    def __repr__(self) -> str:
+        return str(import_module("palpate.report.values").line(self))
+
+    def _repr_html_(self) -> str:
+        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
+        return str(import_module("palpate.report.values").html(self))
+
+
+class Compared(Readable):
+    """A frozen dataclass whose fields may hold arrays: `==` compares these by their elements."""
+
+    def __eq__(self, other: object) -> bool:
+        return same(self, other) if type(self) is type(other) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Result(Compared):
+    """A result that can be read, drawn and written.
+
+    A class says where its looks are, `class Record(Result, shown_by="palpate.report.record")`: a
+    module with `line`, `text`, `html`, `draw` and `page`, each of one result. It is imported when it is first asked.
+    """
+
+    _shown_by = ""
+
+    def __init_subclass__(cls, *, shown_by: str = "", **others: Any) -> None:
+        super().__init_subclass__(**others)
+        cls._shown_by = shown_by or cls._shown_by
+
+    def _looks(self) -> Any:
+        return import_module(self._shown_by)
+
+    def __str__(self) -> str:
+        return in_python(str(self._looks().text(self)))
+
+    def __repr__(self) -> str:
+        return in_python(f"<{type(self).__name__}: {self._looks().line(self)}>")
+
+    def _repr_html_(self) -> str:
+        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
+        return in_python(str(self._looks().html(self)))
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """Draw it.
+
+        Args:
+            path: where to write the figure too, a PNG, SVG or PDF by its ending.
+
+        Returns:
+            A `matplotlib.figure.Figure`, which a notebook shows.
+
+        Raises:
+            InputError: it holds nothing that can be drawn; palpate may not write there.
+        """
+        if path is None:
+            return self._looks().draw(self)
+        return import_module("palpate.report.numbers").write_figure(self, self._looks().draw, Path(path))
+
+    def report(self, path: str | Path) -> Path:
+        """Write a page with everything, an HTML file that opens without a network.
+
+        Raises:
+            InputError: palpate may not write there, or the name has another ending.
+        """
+        return Path(import_module("palpate.report.numbers").write_page(self, self._looks().page, Path(path)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

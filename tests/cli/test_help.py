@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from palpate.cli import main
 from palpate.cli._help import example, page, wrap
 from palpate.cli._program import COMMANDS, added_commands, program
-from palpate.cli.options.names import MODELS
+from palpate.cli.options.common import MODELS
 from palpate.identification.models import NAMES
 
 ALL = [*COMMANDS, *added_commands()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.cli.options.quantities import quantity, shares, spread
+from palpate.cli.options.values import quantity, shares, spread
 from palpate.errors import InputError
 
 

@@ -15,7 +15,7 @@ from identification.synthetic_contacts import pressed
 from logs.ros_bags import BEGIN, joints, pose, wrench, write_bag
 from logs.test_laboratories import aurora, labview, saved
 from palpate.cli import main
-from palpate.contact_frame.vectors import matrices
+from palpate.contact_frame.free_motion import matrices
 from palpate.logs import read_log, read_wrench_and_pose, write_record
 from palpate.logs.listing import list_log
 from palpate.records import Record

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.networks import THESIS_AMPLITUDE, Perceptron, layers_of, network, random_layers, thesis_layers
-from palpate.networks.backpropagation import backward, descend, forward, sigmoid, slope
+from palpate.networks.network import backward, descend, forward, sigmoid, slope
 
 DEEP = {1: (4, 5, 2), 2: (3, 6, 4, 2), 3: (5, 4, 3, 4, 3)}
 deep = pytest.mark.parametrize("sizes", DEEP.values(), ids=[f"{n} hidden" for n in DEEP])

@@ -5,8 +5,7 @@ import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.press.engines import gains_for, loop_of
-from palpate.press.pilots import Cautious
-from palpate.press.pressing import press
+from palpate.press.pressing import Cautious, press
 from palpate.press.setting import cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.tool import Plan

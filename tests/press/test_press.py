@@ -16,9 +16,8 @@ from palpate.errors import InputError
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, sensed
-from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, arm_of, prepared, surface_of
-from palpate.press.pressing import press
+from palpate.press.pressing import Cautious, press
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise

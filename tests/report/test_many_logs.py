@@ -12,8 +12,9 @@ from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
 from palpate.report.identification.words import Source
-from palpate.report.many.forest import draw, write_figure
-from palpate.report.many.page import page
+from palpate.report.many.page import draw_logs as draw
+from palpate.report.many.page import page_of_logs as page
+from palpate.report.many.page import write_figure
 from palpate.report.many.table import LogRow, failures, json_of, sentence, show
 from report.test_identification_page import Reader
 

@@ -13,8 +13,7 @@ from palpate.files.ownership import ours
 from palpate.identification import identify, pool
 from palpate.identification.indenter import Indenter, with_modulus
 from palpate.report.identification.words import Source
-from palpate.report.many.paper_table import cells, write_table
-from palpate.report.many.table import LogRow
+from palpate.report.many.table import LogRow, cells, write_table
 from report.outcomes import OUTCOMES
 
 

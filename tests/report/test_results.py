@@ -13,7 +13,7 @@ import palpate
 from palpate.errors import InputError
 from palpate.force import Known, load_arm, tune
 from palpate.identification import pool
-from palpate.results import same
+from palpate.records import same
 
 HOSTILE = "<script>alert(1)</script>\x1b[31m&\"'"
 

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import pytest
 
-from palpate.report.svg import svg
+from palpate.report.style import svg
 
 
 def drawn(left: float) -> bytes:

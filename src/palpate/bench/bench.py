@@ -17,8 +17,7 @@ from palpate.bench.plant import Loop, start_at
 from palpate.bench.simulation import Simulation
 from palpate.controllers.controller import controller
 from palpate.errors import InputError
-from palpate.records import Record
-from palpate.results import Readable
+from palpate.records import Readable, Record
 
 CHUNK = 500
 """Ticks between two looks at the progress."""

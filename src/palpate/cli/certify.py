@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, print_lines
-from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
-from palpate.cli.options.written import ReportOption
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class ProofOptions:
     @property
     def surfaces(self) -> tuple[float, float] | None:
         """K + B/theta [N/m]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.stiffness is None:
             return None
@@ -64,7 +64,7 @@ class ProofOptions:
     @property
     def longest(self) -> float | None:
         """Longest damping time B/K [s]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         if self.damping_time is None:
             return None
@@ -100,7 +100,7 @@ class OthersOptions(ReportOption):
     @property
     def seconds(self) -> float:
         """Everything late between contact and motion [s]."""
-        from palpate.cli.options.quantities import quantity
+        from palpate.cli.options.values import quantity
 
         if self.delay is None:
             raise InputError(
@@ -111,7 +111,7 @@ class OthersOptions(ReportOption):
     @property
     def kilograms(self) -> float | None:
         """Mass of the tip along the normal [kg]."""
-        from palpate.cli.options.quantities import quantity
+        from palpate.cli.options.values import quantity
 
         return None if self.mass is None else quantity("--mass", self.mass, "mass")
 
@@ -247,6 +247,6 @@ def _print(
         print_lines(*lines(certificate, verdict))
         return
     from palpate.report.terminal import print_hanging
-    from palpate.report.tuning.table import proof_lines
+    from palpate.report.tuning import proof_lines
 
     print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())

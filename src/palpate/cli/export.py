@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.written import WRITTEN, FileOptions
+from palpate.cli.options.common import WRITTEN, FileOptions
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 

@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import KINDS, console
 from palpate.cli.one_log import OneLog, has_number
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG, SIGNED
+from palpate.cli.options.common import QUIET, WRITTEN, Model, PictureOptions
 from palpate.cli.options.force import IndenterOptions
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Model
-from palpate.cli.options.values import lag_of, with_std
-from palpate.cli.options.written import WRITTEN, PictureOptions
+from palpate.cli.options.values import FLAG, SIGNED, lag_of, with_std
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 
@@ -86,7 +84,7 @@ class IdentifyOutput(PictureOptions):
 
     def paper_table(self) -> Path | None:
         """Path of the table, checked before any work is done."""
-        from palpate.report.many.paper_table import ENDINGS
+        from palpate.report.many.table import ENDINGS
 
         if self.table is not None:
             ending = self.table.suffix.lower()
@@ -179,8 +177,7 @@ def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
 
         write_text(page, page_of(found, origin))
     if table is not None:
-        from palpate.report.many.paper_table import write_table
-        from palpate.report.many.table import LogRow
+        from palpate.report.many.table import LogRow, write_table
 
         write_table([LogRow(origin, found)], None, table)
     _print(found, origin, [path for path in (figure, page, table) if path is not None], output)

@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, show_answer
 from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG
+from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET
-from palpate.cli.options.quantities import quantity
-from palpate.cli.options.written import WRITTEN, JsonOption, ReportOption
+from palpate.cli.options.values import FLAG, quantity
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
 from palpate.units import split_spec

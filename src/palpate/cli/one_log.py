@@ -8,8 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import KINDS, STYLE, bar, console, place, say
 from palpate.cli.options.arm import ArmOptions, FrameOptions
@@ -193,15 +192,15 @@ def _write(
     dpi: int | None,
 ) -> list[Path]:
     if figure is not None:
-        from palpate.report.many.forest import write_figure
+        from palpate.report.many.page import write_figure
 
         write_figure(rows, pooled, figure, dpi)
     if page is not None:
-        from palpate.report.many.page import page as page_of
+        from palpate.report.many.page import page_of_logs as page_of
 
         write_text(page, page_of(rows, pooled))
     if table is not None:
-        from palpate.report.many.paper_table import write_table
+        from palpate.report.many.table import write_table
 
         write_table(rows, pooled, table)
     return [path for path in (figure, page, table) if path is not None]

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import place, show_answer
 from palpate.cli.options.arm import FrameOptions
-from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import vector
-from palpate.cli.options.written import WRITTEN, FileOptions, ReportOption
+from palpate.cli.options.values import SIGNED, vector
 from palpate.errors import InputError
 from palpate.files import write_text
 

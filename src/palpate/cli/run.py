@@ -11,14 +11,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import COMPILING, console, place, show_answer, simulation_progress
-from palpate.cli.options.figures import DRAWN, FigureOptions
-from palpate.cli.options.flags import FLAG, WHOLE
-from palpate.cli.options.names import QUIET, Experiment
-from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
+from palpate.cli.options.common import (
+    DRAWN,
+    QUIET,
+    Experiment,
+    FigureOptions,
+    FolderOptions,
+    KnownOptions,
+    PluginOptions,
+    print_names,
+    source_of,
+)
+from palpate.cli.options.values import FLAG, WHOLE
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
 from palpate.text import printable

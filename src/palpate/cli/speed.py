@@ -6,9 +6,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import COMPILING, print_lines, say
-from palpate.cli.options.written import WRITTEN
+from palpate.cli.options.common import WRITTEN
 
 
 def speed(*, json: Annotated[bool, Parameter(negative="", group=WRITTEN)] = False) -> int:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import (
     COMPILING,
     STYLE,

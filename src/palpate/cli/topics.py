@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._answer import print_answer
+from palpate.cli._program import print_answer
 from palpate.cli._terminal import print_lines
-from palpate.cli.options.written import WRITTEN
+from palpate.cli.options.common import WRITTEN
 from palpate.logs.signals import GB, Signals
 
 if TYPE_CHECKING:

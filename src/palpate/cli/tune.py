@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli._answer import print_answer
-from palpate.cli._program import command
+from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import console, place
 from palpate.cli.one_log import read_found
+from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import (
     ArmOptions,
     ColumnOptions,
@@ -18,7 +18,6 @@ from palpate.cli.options.force import (
     SurfaceOptions,
     TuningOutputOptions,
 )
-from palpate.cli.options.written import ReportOption
 from palpate.errors import InputError
 from palpate.files import write_text
 
@@ -117,7 +116,7 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
         write_text(out, told.gains.to_toml())
     if page is not None:
-        from palpate.report.tuning.page import page as page_of
+        from palpate.report.tuning import page as page_of
 
         write_text(page, page_of(told, command()))
     return [path for path in (out, page) if path is not None]
@@ -129,7 +128,7 @@ def _print(
     if output.json:
         print_answer(told.to_json() | {"inner_loop": inner} | _slide(told))
         return
-    from palpate.report.tuning.table import show, show_all
+    from palpate.report.tuning import show, show_all
 
     screen = console()
     if not output.verbose:

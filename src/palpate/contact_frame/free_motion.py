@@ -1,26 +1,47 @@
-"""Rows of a log in which nothing is touched, the level of a force there, and the mass that it follows.
-
-A tool of mass m adds -m a to what it exerts on its sensor. A driver that takes this off leaves nothing; one that takes
-it off with the wrong sign leaves +m a, which in contact no log of second order distinguishes from a lag and a damping.
-
-No acceleration is measured. With a smooth function phi that vanishes at both ends of a window, partial integration
-gives int phi a = int phi'' p (the modulating functions of Shinbrot, 1957), so that the position itself serves. Sums
-over rows and second differences obey the same rule exactly. The window is the one that determines the mass best.
-
-Over the position, a force is flat up to the touch and rises from there on. A probe that never leaves has no such bend,
-and a spring that only hardens has one without a flat side.
-"""
+"""Rows of a log as vectors, and where of them the tool moves freely."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
 from palpate.identification.contacts import contacts_of
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
+from palpate.signals.samples import continuous
+
+Vector = tuple[float, float, float]
+FEWEST = 20
+"""Rows for a mean that is said of a log: its standard deviation is then a fifth of a reading's, or less."""
+_UNIT = 0.1
+"""By which a quaternion's length is off at most where its four numbers are rounded to one digit."""
+
+
+def read_rows(vectors: Array) -> Mask:
+    """Rows of vectors, shape (n, k), that hold a reading in each component."""
+    return np.isfinite(vectors.sum(axis=1))
+
+
+def matrices(time: Array, quaternions: Array) -> Array:
+    """Rotation matrices, shape (n, 3, 3), of quaternions (x, y, z, w), shape (n, 4); rows of NaN are bridged.
+
+    Raises:
+        InputError: they are not of unit length.
+    """
+    from scipy.spatial.transform import Rotation
+
+    there = read_rows(quaternions)
+    lengths = np.linalg.norm(quaternions[there], axis=1)
+    if not len(lengths) or np.abs(lengths - 1).max() > _UNIT:
+        worst = lengths[np.argmax(np.abs(lengths - 1))] if len(lengths) else float("nan")
+        raise InputError(f"the pose's quaternions must have length 1, got {worst:.3g}; give them as x,y,z,w")
+    steady = continuous(quaternions[there])
+    if not there.all():
+        steady = np.column_stack([np.interp(time, time[there], part) for part in steady.T])
+    turned: Array = Rotation.from_quat(steady).as_matrix()
+    return turned
+
 
 _WINDOWS = np.geomspace(0.04, 2.0, 9)
 """Lengths that are tried [s]."""

@@ -28,8 +28,7 @@ import numpy as np
 from msgspec import Meta
 
 from palpate.arrays import Array
-from palpate.contact_frame.free_motion import BLOCKS
-from palpate.contact_frame.vectors import Vector
+from palpate.contact_frame.free_motion import BLOCKS, Vector
 from palpate.errors import InputError
 from palpate.files import read_text, write_text
 from palpate.force.arm import NotNegative, Table, from_toml

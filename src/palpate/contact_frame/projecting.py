@@ -13,7 +13,14 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.arm import with_arm
-from palpate.contact_frame.free_motion import CHANCE, free_inertia, wrong_sign, wrong_sign_of
+from palpate.contact_frame.free_motion import (
+    CHANCE,
+    FEWEST,
+    free_inertia,
+    read_rows,
+    wrong_sign,
+    wrong_sign_of,
+)
 from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
 from palpate.contact_frame.signals_in_base import (
     FORCE,
@@ -24,7 +31,6 @@ from palpate.contact_frame.signals_in_base import (
     in_range,
     signals_of,
 )
-from palpate.contact_frame.vectors import FEWEST, read_rows
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
 from palpate.records import Record

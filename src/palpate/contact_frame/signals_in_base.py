@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_motion import contact_rows, rows_between
+from palpate.contact_frame.free_motion import Vector, contact_rows, matrices, read_rows, rows_between
 from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
-from palpate.contact_frame.vectors import Vector, matrices, read_rows
 from palpate.errors import InputError
 from palpate.identification.sample_clock import at_limit
 from palpate.records import Record

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_motion import BLOCKS, free_inertia
+from palpate.contact_frame.free_motion import BLOCKS, FEWEST, Vector, free_inertia, read_rows
 from palpate.contact_frame.load import Payload
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
-from palpate.contact_frame.vectors import FEWEST, Vector, read_rows
 from palpate.contact_frame.weighing import (
     Estimated,
     PoseFit,
@@ -25,8 +24,7 @@ from palpate.contact_frame.weighing import (
 )
 from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
-from palpate.records import Record
-from palpate.results import Result
+from palpate.records import Record, Result
 
 _FEWEST = 3
 """Orientations of three axes each: weight, bias and drift are nine numbers."""

@@ -5,8 +5,14 @@ from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
 from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface, join, surface_of
-from palpate.environments.surface_state import SurfaceState, contact_force, impact, part_from, touch
-from palpate.environments.surface_table import SurfaceTable
+from palpate.environments.surface_state import (
+    SurfaceState,
+    SurfaceTable,
+    contact_force,
+    impact,
+    part_from,
+    touch,
+)
 
 __all__ = [
     "HuntCrossley",

@@ -6,8 +6,7 @@ from typing import Annotated, ClassVar, NamedTuple
 from msgspec import Meta
 
 from palpate._jit import part
-from palpate.environments.surface_state import UNTOUCHED, SurfaceState, implicitness, swing
-from palpate.environments.surface_table import SurfaceTable
+from palpate.environments.surface_state import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
 from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 

@@ -4,8 +4,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from palpate._jit import part
-from palpate.environments.surface_state import UNTOUCHED
-from palpate.environments.surface_table import SurfaceTable
+from palpate.environments.surface_state import UNTOUCHED, SurfaceTable
 from palpate.errors import InputError
 from palpate.signals.types import example, kinds
 

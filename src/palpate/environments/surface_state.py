@@ -1,15 +1,24 @@
-"""Common parts of all surface laws: the state, and the events of touch and separation.
+"""State of a surface in a kernel, and the table that describes a surface in an experiment's file."""
 
-Penetration p and deflection s are positive into the surface; forces are those on the surface, positive when
-it is pressed. In contact the surface moves with the tip (s = p); free, it moves by its own law. The surface
-carries a light mass m_s: a tip of mass m_t, with acceleration a_0 if there were no contact, feels while they
-move together f_c = (f + m_s a_0) m_t/(m_t + m_s). It has the sign of f + m_s a_0, and where that is negative
-they part.
-"""
+from typing import Any, ClassVar, NamedTuple
 
-from typing import NamedTuple
+from msgspec.structs import asdict
 
 from palpate._jit import law
+from palpate.signals.types import Table
+
+
+class SurfaceTable(Table, tag_field="kind"):
+    """The [surface] table of an experiment. Derive from it beside the part, with the word that is its `kind` as tag.
+
+    ``part`` is the surface, whose fields bear the names of the table's.
+    """
+
+    part: ClassVar[type]
+
+    def build(self) -> Any:
+        """The surface that the table describes."""
+        return self.part(**{name: float(value) for name, value in asdict(self).items()})
 
 
 class SurfaceState(NamedTuple):

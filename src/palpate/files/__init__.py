@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from palpate.files.folders import RECORD, check_kept_folder, fresh_folder, kept_folder
 from palpate.files.ownership import FORCE, MADE, SIGNATURE, WRITTEN, check_place, ours
 from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
-from palpate.files.writing import as_json, whole, with_author, write_json, write_text
+from palpate.files.writing import (
+    RECORD,
+    as_json,
+    check_kept_folder,
+    fresh_folder,
+    kept_folder,
+    whole,
+    with_author,
+    write_json,
+    write_text,
+)
 
 __all__ = [
     "FORCE",

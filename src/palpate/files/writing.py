@@ -1,17 +1,59 @@
-"""Files are written atomically: whole, or not at all."""
+"""Files and folders are written whole or not at all, by one process at a time."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.files.locks import draft_path, locking
 from palpate.files.ownership import SIGNATURE, WRITTEN, check_place, ours
 from palpate.text import printable
+
+HIDDEN = ".palpate-part"
+"""Ends the name of what is being written."""
+
+
+def draft_path(path: Path, ending: str = HIDDEN) -> Path:
+    """Where a file or a folder stands until it is whole."""
+    return path.with_name(f".{path.name}{ending}")
+
+
+def locked(handle: int) -> bool:
+    """Whether the open file or folder could be locked; where there are no such locks, it counts as locked."""
+    try:
+        import fcntl
+    except ImportError:  # two processes at one place are then their user's care
+        return True
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+@contextmanager
+def locking(path: Path, flags: int = os.O_RDONLY) -> Iterator[int | None]:
+    """Open and lock a file or a folder, a link excepted; None while another process has it."""
+    handle = os.open(path, flags | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    try:
+        yield handle if locked(handle) and _stands(handle, path) else None
+    finally:
+        os.close(handle)
+
+
+def _stands(handle: int, path: Path) -> bool:
+    """Whether the opened file is still the one at its path, and was not replaced in the meantime."""
+    try:
+        there = os.lstat(path)
+    except FileNotFoundError:
+        return False
+    return os.path.samestat(os.fstat(handle), there)
 
 
 @contextmanager
@@ -79,3 +121,159 @@ def with_author(value: Mapping[str, Any]) -> dict[str, Any]:
     from palpate import __version__
 
     return {WRITTEN: f"{SIGNATURE} {__version__}", **value}
+
+
+RECORD = "record.parquet"
+"""Name of the record in the folder of a run or a press."""
+_OLD = ".palpate-old"
+
+
+@contextmanager
+def fresh_folder(path: Path, *, replace: bool) -> Iterator[Path]:
+    """Yield a hidden folder beside `path` to write into; it takes its place when the block ends well.
+
+    The place is checked before the block runs, so that no long run ends at a closed door. When the block
+    raises, the hidden folder is removed and what stood at `path` is untouched. What a process that was killed left
+    behind is put right first.
+
+    Args:
+        path: where the results shall stand.
+        replace: replace existing results.
+
+    Raises:
+        InputError: `path` is taken, and `replace` is off or there is anything in it that palpate did not write; or
+            another process of palpate is writing to it.
+    """
+    path = path.absolute()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = draft_path(path)
+    draft.mkdir(exist_ok=True)
+    with locking(draft) as handle:
+        if handle is None:
+            raise _busy(path)
+        try:
+            _recover(path)
+            _empty(draft)
+            _check_fresh(path, replace)
+            yield draft
+            _check_fresh(path, replace)
+            _take_place(draft, path)
+        except OSError as error:
+            if error.filename is not None:
+                error.filename = str(error.filename).replace(str(draft), str(path))
+            raise
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def kept_folder(path: Path, begun: str, *, replace: bool) -> Iterator[None]:
+    """Make a folder, or go on in one, and keep it for this process alone; drafts left in it are removed.
+
+    Args:
+        path: where the results are, or shall be.
+        begun: the file that tells that what is to be done there was begun.
+        replace: remove what palpate wrote there.
+
+    Raises:
+        InputError: it is no folder, or a link; another process has it; it holds other files, and `replace` is off or
+            there is anything among them that palpate did not write.
+    """
+    check_kept_folder(path, begun, replace=replace)
+    path.mkdir(parents=True, exist_ok=True)
+    with locking(path) as handle:
+        if handle is None:
+            raise _busy(path)
+        for left in path.rglob(f".*{HIDDEN}"):
+            if left.is_file() and not left.is_symlink():
+                left.unlink()
+        check_kept_folder(path, begun, replace=replace)
+        if replace:
+            (path / begun).unlink(missing_ok=True)  # first: what is left after a kill is then no results
+            _empty(path)
+        yield
+
+
+def check_kept_folder(path: Path, begun: str, *, replace: bool) -> None:
+    """Refuse a folder that `kept_folder` would refuse, before the work: it may be another's only while it lasts.
+
+    Raises:
+        InputError: as `kept_folder`.
+    """
+    _check_folder(path)
+    if not path.exists():
+        return
+    if replace:
+        check_all_ours(path)
+    elif not (path / begun).exists() and any(not own.name.endswith(HIDDEN) for own in path.iterdir()):
+        raise InputError(
+            f"{path} holds other files; choose another --out, or add --replace to replace results"
+        )
+
+
+def check_all_ours(folder: Path) -> None:
+    """Refuse a folder in which there is anything that palpate did not write.
+
+    Raises:
+        InputError: there is, and which.
+    """
+    for place, folders, files in os.walk(folder):
+        inner = [Path(place, name) for name in folders]
+        for found in (*(p for p in inner if p.is_symlink()), *(Path(place, name) for name in files)):
+            if found.is_symlink() or not (found.name.endswith(HIDDEN) or ours(found)):
+                name = found.relative_to(folder)
+                raise InputError(
+                    f"{folder} holds {name}, which palpate did not write; move it, or choose another --out"
+                )
+
+
+def _check_folder(path: Path) -> None:
+    if path.is_symlink() or (path.exists() and not path.is_dir()):
+        kind = "a link" if path.is_symlink() else "not a folder"
+        raise InputError(f"{path} is {kind}; choose another --out")
+
+
+def _check_fresh(path: Path, replace: bool) -> None:
+    _check_folder(path)
+    if not path.exists():
+        return
+    if not replace:
+        raise InputError(f"{path} exists; choose another --out, or add --replace to replace it")
+    check_all_ours(path)
+
+
+def _recover(path: Path) -> None:
+    """Puts back the results of a process that was killed between taking them away and putting new ones there."""
+    old = draft_path(path, _OLD)
+    if not old.is_dir() or old.is_symlink():
+        return
+    if path.exists():
+        shutil.rmtree(old)
+    else:
+        old.rename(path)
+
+
+def _take_place(draft: Path, path: Path) -> None:
+    if not path.exists():
+        draft.rename(path)
+        return
+    old = draft_path(path, _OLD)
+    path.rename(old)
+    try:
+        draft.rename(path)
+    except OSError:
+        old.rename(path)
+        raise
+    shutil.rmtree(old)
+
+
+def _empty(folder: Path) -> None:
+    for inner in folder.iterdir():
+        if inner.is_dir() and not inner.is_symlink():
+            shutil.rmtree(inner)
+        else:
+            inner.unlink()
+
+
+def _busy(path: Path) -> InputError:
+    return InputError(f"another palpate is at work in {path}; wait for it, or choose another --out")

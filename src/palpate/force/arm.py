@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from palpate.errors import InputError, unknown
 from palpate.files import read_table, read_text
-from palpate.results import Readable
+from palpate.records import Readable
 from palpate.signals.low_pass import LowPass
 
 Positive = Annotated[float, Meta(gt=0)]

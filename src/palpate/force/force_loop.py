@@ -33,7 +33,7 @@ from palpate.force.flat import (
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST, TROUBLES, safe_step
 from palpate.force.stage import LEARNING, LOCKED
-from palpate.results import Readable
+from palpate.records import Readable
 
 if TYPE_CHECKING:
     from palpate.force.certificate import Certificate

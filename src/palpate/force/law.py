@@ -28,7 +28,7 @@ from palpate.force.contact_evidence import (
 from palpate.force.onset import NO_STARTS, Starts
 from palpate.force.regression import NOTHING, Fit
 from palpate.force.stage import STEP, Stage, is_false_touch, next_stage
-from palpate.force.stiffness_bound import Bound, Sure, next_bound
+from palpate.force.stiffness_bound import EARNED, Bound, Sure, next_bound
 
 SMOOTHING = 0.1
 """Of a servo's lag in free motion, by which its lead is smoothed: the usual filter of a PID controller's derivative,
@@ -150,7 +150,7 @@ class Cautious(NamedTuple):
         speed = max(min(u + forward, limit), -limit)
         if stage.phase == FREE_MOTION:
             speed = backstop.care * self.approach if backstop.bounces < MOST else 0.0
-        most = self.speed if bound.sure.stiffness > 0.0 else limit
+        most = self.speed if limit > EARNED * self.approach else limit
         speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
         return speed, CautiousState(
             state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace
@@ -192,8 +192,9 @@ def lead_speed(law, pace, speed, bound, limit):
 
     A tip that a servo pulls against a surface of stiffness K is late by the slowest time constant of
     m s^2 + D s + K_s + K. The command is ahead by that. What the limit takes off is taken off the smoothed speed, so
-    that it stays the speed that the tip can have. The speed that a surface has earned is the tip's: the command is
-    ahead of it by up to the arm's own limit.
+    that it stays the speed that the tip can have. The speed that a test has borne out is the tip's: the command is
+    then ahead of it by up to the arm's own limit. Before, a tip that gathers speed slowly touches gently where a sensor
+    lied: measured by benchmarks/force/free_motion.py.
     """
     if law.lead == 0.0:
         return speed, speed

@@ -19,14 +19,14 @@ from palpate.force.known_surface import Known
 from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
 from palpate.force.steps import Margins, Step, margins, step_of
-from palpate.results import Result
+from palpate.records import Result
 
 RIGID = 1e9
 """Largest stiffness that is printed [N/m]; stiffer surfaces are shown as this."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Result, shown_by="palpate.report.tuning.page"):
+class Tuning(Result, shown_by="palpate.report.tuning"):
     """A tuned loop: what `palpate tune` says.
 
     Args:

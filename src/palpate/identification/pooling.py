@@ -18,7 +18,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Verdict
 from palpate.identification.uncertainty import Contribution, student
-from palpate.results import Result
+from palpate.records import Result
 from palpate.signals.types import NORMAL
 
 Interval = tuple[float, float]
@@ -153,7 +153,7 @@ class PooledPoint:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pooled(Result, shown_by="palpate.report.many.in_python"):
+class Pooled(Result, shown_by="palpate.report.many.page"):
     """Estimates pooled over many logs.
 
     Args:

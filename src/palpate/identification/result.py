@@ -12,7 +12,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification.causes import Warn
 from palpate.identification.uncertainty import Contributions, Input, Uncertainty
-from palpate.results import Compared, Readable, Result
+from palpate.records import Compared, Readable, Result
 from palpate.signals import Estimate
 from palpate.signals.types import NORMAL
 

@@ -21,7 +21,7 @@ from palpate.identifiers.kernels.contact_stream import take_tick
 from palpate.identifiers.kernels.octave_sums import LineNoise
 from palpate.identifiers.octave_fit import octave_fit
 from palpate.identifiers.octave_system import OctaveData
-from palpate.results import Readable
+from palpate.records import Readable
 from palpate.signals.low_pass import FRACTIONS, LowPass, taps
 from palpate.signals.types import Estimate
 

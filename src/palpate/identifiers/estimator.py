@@ -18,7 +18,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers.kernels.dimension import size_of
 from palpate.identifiers.kernels.least_squares import length, stretch, stretch_of
-from palpate.results import Readable
+from palpate.records import Readable
 from palpate.signals.types import Estimate, Table, coerce_fields, require
 
 LARGEST = 1e30

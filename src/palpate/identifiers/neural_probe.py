@@ -17,9 +17,8 @@ from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.networks import Network, layers_of, network, random_layers
-from palpate.networks.backpropagation import backward, descend, forward
-from palpate.records import Record
-from palpate.results import Readable
+from palpate.networks.network import backward, descend, forward
+from palpate.records import Readable, Record
 from palpate.signals.types import Estimate
 
 

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.networks.backpropagation import backward, descend, forward
-from palpate.networks.network import layers_of, network, random_layers
+from palpate.networks.network import backward, descend, forward, layers_of, network, random_layers
 
 
 class Perceptron:

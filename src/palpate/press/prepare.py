@@ -14,8 +14,7 @@ from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
-from palpate.press.pilots import CAUTIOUS, CONTROLLERS, pilot_of
-from palpate.press.pressing import Progress, press
+from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, pilot_of, press
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked

@@ -16,7 +16,7 @@ from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import Table, data_address
-from palpate.report.svg import svg
+from palpate.report.style import svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,7 +11,7 @@ from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.numbers import as_html, as_text
 from palpate.report.page import Table, data_address, render
-from palpate.report.svg import svg
+from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:

@@ -89,7 +89,7 @@ def draw(record: Record) -> Figure:
 
 def page(record: Record) -> str:
     """The table and the figure as a page."""
-    from palpate.report.svg import svg
+    from palpate.report.style import svg
 
     figures = []
     if any(np.isfinite(record[name]).any() for name in record.columns if name != _clock(record)):

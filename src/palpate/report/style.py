@@ -1,9 +1,12 @@
-"""How figures look: one size, one palette, light grids."""
+"""Style of figures, and the same figure as an SVG for a page."""
 
 from __future__ import annotations
 
+import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +20,44 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Text
+
+
+_BY_DARK = dict(PAIRS[name] for name in ("ink", "quiet", "grid", "line", "card"))
+
+
+def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
+    """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
+
+    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be. `tight`
+    leaves out what is empty around it.
+    """
+    import matplotlib
+
+    buffer = io.StringIO()
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "palpate", "svg.fonttype": "none", "path.simplify_threshold": 0.3}
+    ):
+        within = {"bbox_inches": "tight", "pad_inches": 0.04} if tight else {}
+        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None}, **within)
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    for name, shape in set(re.findall(r'<clipPath id="(\w+)">(.*?)</clipPath>', text, flags=re.DOTALL)):
+        # matplotlib's own name is a hash of the unrounded shape
+        text = text.replace(name, f"p{sha256(shape.encode()).hexdigest()[:10]}")
+    names = {colour: f"--c{i}" for i, colour in enumerate(_BY_DARK)}
+    for colour, name in names.items():
+        text = text.replace(colour, f"var({name})")
+    end = text.index(">") + 1
+    mark = f"<!-- Made by {SIGNATURE} -->\n" if signed else ""
+    return f"{mark}{text[:end]}\n{_sheet(names)}{text[end:]}".encode()
+
+
+def _sheet(names: dict[str, str]) -> str:
+    light = "".join(f"{name}:{colour};" for colour, name in names.items())
+    dark = "".join(f"{names[colour]}:{other};" for colour, other in _BY_DARK.items())
+    return f"<style>:root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}</style>"
+
 
 INK, QUIET, GRID, LINE, CARD = (PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card"))
 K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
@@ -169,8 +210,6 @@ def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:
     _spell_out(drawing)
     with whole(path) as draft:
         if kind == ".svg":
-            from palpate.report.svg import svg
-
             draft.write_bytes(svg(drawing, signed=True))
             return path
         about = {"Software": SIGNATURE} if kind == ".png" else {"Creator": SIGNATURE, "CreationDate": None}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.results import Readable
+from palpate.records import Readable
 from palpate.robots.arm3 import Arm3
 
 _THESIS = Arm3()

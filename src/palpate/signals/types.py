@@ -16,7 +16,7 @@ from palpate._jit import part
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.results import Compared, Readable
+from palpate.records import Compared, Readable
 
 NORMAL = 1.96
 """Standard deviations of a 95 % half-width."""

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
-from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.common import PluginOptions
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si
 from palpate.cli.toolkit import (
     COMPILING,
     command,
@@ -64,7 +64,7 @@ class ForceOptions:
 
     def of_simulation(self) -> Surfaces:
         """Surfaces of the test."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
         from palpate_benchmark.simulated import Surfaces
 
         low, high = spread("--stiffness", self.stiffness, "stiffness")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
-from palpate.cli.options.written import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
+from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -38,7 +38,7 @@ class SurfaceRangeOptions:
 
     def range(self) -> SurfaceRange:
         """Range of stiffness, damping and mass."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
         from palpate_excitation import SurfaceRange
 
         return SurfaceRange(
@@ -221,7 +221,7 @@ def excite(
 
     Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
     """
-    from palpate.cli.options.quantities import shares
+    from palpate.cli.options.values import shares
     from palpate_excitation import Problem
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()

@@ -12,10 +12,9 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.identify import ModelOptions
 from palpate.cli.options.arm import ArmOptions, FrameOptions
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE
+from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.names import QUIET, Experiment, SerialArm
-from palpate.cli.options.plugins import PluginOptions
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 
@@ -106,10 +105,10 @@ def live(
     shown, at = shown or ShownOptions(), at or ServedOptions()
     path = shown.file()
     if shown.arm_ is not None:
-        return _serve(_pressing(shown.arm_, shown.seed), at)
+        return show_live(_pressing(shown.arm_, shown.seed), at)
     if path is None:
         with (own or PluginOptions()).consent():
-            return _serve(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
+            return show_live(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
     from palpate.cli.one_log import OneLog
 
     asked = OneLog(
@@ -117,7 +116,7 @@ def live(
     )
     if shown.record is not None and not asked.source.plain:
         raise InputError("a record states its own columns; use --log FILE with --time, --position, --force")
-    return _serve(_replay(path, asked, shown.whole_approach), at)
+    return show_live(_replay(path, asked, shown.whole_approach), at)
 
 
 def _simulation(name: str, seed: int, whole: bool) -> RowSource:
@@ -147,7 +146,8 @@ def _replay(path: Path, asked: Any, whole: bool) -> RowSource:
     return of_log(source.title, found, along)
 
 
-def _serve(shown: RowSource, at: ServedOptions) -> int:
+def show_live(shown: RowSource, at: ServedOptions) -> int:
+    """Serves a source of rows until Ctrl-C; the first line printed is the page's address."""
     from palpate_live.player import Feed, Player, made_ready
     from palpate_live.server import HOST, WARNING, network_address, qr_code, serve
 

@@ -59,8 +59,8 @@
   const offered = [
     { title: "Force", y: `force [${view.units.measured}]`, needs: "measured", series: [measured, force, desired] },
     { title: "Position", y: `${view.position} [${view.units.depth}]`, needs: "depth", series: [{ label: view.position, kind: "own", colour: "F", of: "depth" }] },
-    { title: "Stiffness K", y: "K [N/m]", needs: "K", series: estimated("K"), wanted: about("K", 0.06) },
-    { title: "Damping B", y: "B [N s/m]", needs: "B", series: estimated("B"), wanted: about("B", 0.3) },
+    ...Object.entries(view.quantities).map(([key, [title, unit]], i) => (
+      { title, y: `${title.split(" ").pop()} [${unit}]`, needs: key, series: estimated(key), wanted: about(key, i ? 0.3 : 0.06) })),
   ].filter((one) => there.has(one.needs));
   offered.forEach((one) => { one.series = one.series.filter((s) => there.has((s.of || s.high).replace("_high", "_half"))); });
   const tall = () => (innerWidth > 900 ? Math.max(120, (innerHeight - 150) / offered.length - 44) : 170);

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -15,11 +14,11 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.press.engines import series_of
-from palpate.press.pilots import Cautious
 from palpate.press.prepare import Question, prepared
-from palpate.press.pressing import JOINT_LIMIT
-from palpate.press.setting import cell_of
+from palpate.press.pressing import JOINT_LIMIT, Cautious
+from palpate.press.setting import Place, cell_of
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.robots.serial.serial_arm import SerialArm as Serial
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 from palpate_live.stability import OfArm
@@ -81,7 +80,7 @@ class PressingArm:
             stride=self._stride * asked.gains.arm.tick,
             sliders=sliders,
             rest=tuple(float(v) for v in asked.place.q),
-            scene=_scene(asked),
+            scene=scene_of(asked.arm, asked.place),
             notes=tuple(printable(note) for note in asked.notes),
         )
         self.reset()
@@ -259,9 +258,9 @@ def _sliders(gains: Gains) -> tuple[Slider, ...]:
     )
 
 
-def _scene(asked: Any) -> ViewScene:
+def scene_of(arm: Serial, place: Place) -> ViewScene:
     """The arm's joints and the surface around the tip, as the page draws them."""
-    chain, place = asked.arm.chain, asked.place
+    chain = arm.chain
     centre = place.pose[:3, 3] + (place.place - place.normal @ place.pose[:3, 3]) * place.normal
     u, v = _PATCH * place.axes[1], _PATCH * place.axes[2]
     return ViewScene(

@@ -114,6 +114,7 @@ class View:
         notes: for the reader, such as missing signals of the log.
         identified: what `palpate identify` says of a log, by parameter: text, verdict.
         position: name of the depth.
+        quantities: name and unit of each of `K` and `B`: friction, where a tip slides.
         units: of the charted columns.
     """
 
@@ -131,6 +132,9 @@ class View:
     notes: tuple[str, ...] = ()
     identified: tuple[dict[str, str], ...] = ()
     position: str = "depth in the surface"
+    quantities: dict[str, tuple[str, str]] = field(
+        default_factory=lambda: {"K": ("Stiffness K", "N/m"), "B": ("Damping B", "N s/m")}
+    )
     units: dict[str, str] = field(default_factory=lambda: {"depth": "mm", "measured": "N"})
 
     def to_json(self) -> dict[str, Any]:

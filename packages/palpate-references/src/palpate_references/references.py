@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from palpate.cli.options.flags import FLAG
+from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import console, place, print_answer, print_lines, progress_of_pieces, show_table
 
 if TYPE_CHECKING:

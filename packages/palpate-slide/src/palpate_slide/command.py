@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.common import QUIET, LoopArm, Physics
 from palpate.cli.options.force import with_slide
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.names import QUIET, LoopArm, Physics
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
-from palpate.cli.options.values import vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError, unknown
-from palpate.files import RECORD, fresh_folder, with_author, write_json
+from palpate.files import fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -29,7 +29,14 @@ if TYPE_CHECKING:
 SHORTEST = 0.003
 """Path that is one [m]."""
 _OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
-_SURFACE = {"K": "stiffness", "B": "damping", "mu": "friction", "mus": "sticking", "creep": "creep"}
+_SURFACE = {
+    "K": "stiffness",
+    "B": "damping",
+    "mu": "friction",
+    "mus": "sticking",
+    "creep": "creep",
+    "grade": "grade",
+}
 
 
 _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
@@ -50,7 +57,8 @@ class SlideOptions:
     """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
     mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
     surface: Annotated[str, _SIMULATED] = "K=20000,mu=0.3"
-    "K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck)."
+    """K=..,B=..,mu=.. in N/m and N s/m; mus for friction at rest, creep for its speed in m/s (Stribeck); grade for the
+    relative change of K along x per metre."""
     path: str = "circle"
     "line, back, raster or circle."
     length: Annotated[str, SIGNED] = "40:mm"
@@ -68,6 +76,9 @@ class SlideOptions:
     "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
     touches: Annotated[str, SIGNED] = "10:mm"
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
+    dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
+    """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
+    which palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
@@ -135,14 +146,22 @@ class SlideOptions:
             raise unknown("physics", self.physics, ENGINES)
         return jointed_arm(self.arm)
 
+    @property
+    def into(self) -> tuple[float, ...]:
+        """Direction into the surface that is given to the law."""
+        return tuple(vector("normal", self.normal, "number") or (0.0, 0.0, -1.0))
+
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
-        into = vector("normal", self.normal, "number") or (0.0, 0.0, -1.0)
         if self.physics == "own":
+            from palpate_slide.dither import dither_frequency
             from palpate_slide.world import simulate
 
-            return simulate(gains, ground, ways, into=into, seed=self.seed)
-        return self.joints.slide(gains, ground, ways, into=into, seed=self.seed)
+            share = (self.dither, dither_frequency(gains))
+            return simulate(gains, ground, ways, into=self.into, seed=self.seed, dither=share)
+        if self.dither:
+            raise InputError("--dither needs --physics own; leave out --physics mujoco")
+        return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
 
     def tuned(self) -> Gains:
         """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
@@ -170,6 +189,7 @@ def slide(
     limits: LimitOptions | None = None,
     out: Path | None = None,
     replace: Annotated[bool, FLAG] = False,
+    live: Annotated[bool, FLAG] = False,
     json: Annotated[bool, FLAG] = False,
 ) -> int:
     """Hold a force while the tip moves along an unknown curved surface, in simulation or with a real arm.
@@ -188,14 +208,17 @@ def slide(
     Parameters
     ----------
     out
-        Folder for record.parquet, summary.json, slide.png and report.html; runs/slide-ARM-SEED when left out.
+        Folder for record.parquet, summary.json, film.svg, slide.png and report.html; runs/slide-ARM-SEED when left out.
     replace
         Replace the results at --out.
+    live
+        Watch the slide in the browser, around a circle, its joints moved by MuJoCo (extras: arms, live).
     json
         Print one JSON object and nothing else.
     """
     from palpate.force.sliding.paths import directions
     from palpate.force.sliding.slide_domain import numbers_of
+    from palpate_slide.dither import check_share, dither_frequency, stiffness_along
     from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
@@ -203,10 +226,13 @@ def slide(
         return _slide_over(asked, wire, limits, json)
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
+    check_share(asked.dither)
     gains = asked.tuned()
     slide_numbers = numbers_of(gains)
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
     ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
+    if live:
+        return _watch(replaced(asked, physics="mujoco"))
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
@@ -214,7 +240,11 @@ def slide(
         summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
-        write_report(rows, gains, summary, fresh, RECORD)
+        if asked.dither:
+            along = stiffness_along(rows, gains.arm, dither_frequency(gains))
+            write_text(fresh / "places.csv", along.to_csv())
+            summary["along"] = along.to_json()
+        write_report(rows, gains, ground, summary, fresh)
         write_json(fresh / "summary.json", summary)
     if json:
         print_answer(summary)
@@ -225,6 +255,26 @@ def slide(
             screen.print(f"! {note}", soft_wrap=True)
         place(screen, "report:", folder / "report.html")
     return 0 if summary["end"] == "held" else 1
+
+
+def _watch(asked: SlideOptions) -> int:
+    """Serves the live page of a slide."""
+    from palpate.force.sliding.paths import directions
+    from palpate.force.sliding.slide_domain import numbers_of
+
+    try:
+        from palpate_live.command import ServedOptions, show_live
+        from palpate_slide.watched import WatchedSlide
+    except ImportError:
+        raise InputError(
+            "--live needs palpate-live, which is not installed: pip install palpate-live"
+        ) from None
+    gains = asked.tuned()
+    ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
+    ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
+    return show_live(
+        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed), ServedOptions()
+    )
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:

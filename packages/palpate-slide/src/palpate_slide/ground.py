@@ -3,7 +3,7 @@
 The surface's own axes are x and y along it at its first point and z out of it.
 """
 
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +36,7 @@ class Ground(NamedTuple):
         height: of a step, downwards if negative [m].
         stiffness: K [N/m].
         damping: B [N s/m].
+        grade: relative change of the stiffness along x [1/m].
         friction: mu at speed.
         sticking: mu of a contact at rest, at least `friction`.
         creep: speed over which one becomes the other [m/s].
@@ -50,6 +51,7 @@ class Ground(NamedTuple):
     height: float
     stiffness: float
     damping: float
+    grade: float
     friction: float
     sticking: float
     creep: float
@@ -133,13 +135,13 @@ def ground_of(
     friction = others.get("friction", 0.0)
     numbers = {
         "radius": radius, "period": 2.0 * radius, "height": 0.0, "stiffness": stiffness, "damping": 0.0,
-        "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC,
+        "grade": 0.0, "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC,
         "spacing": SPACING, **others,
     }  # fmt: skip
     low = [
         f"{name} of {value:g}"
         for name, value in numbers.items()
-        if not 0.0 <= value < inf and name != "height"
+        if not 0.0 <= value < inf and name not in {"height", "grade"}
     ]
     if low or not radius > 0.0 or not stiffness > 0.0:
         raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
@@ -149,3 +151,16 @@ def ground_of(
         )
     grid = np.zeros((3, 2, 2)) if heights is None else heights
     return Ground(SHAPES[shape], heights=grid, **{name: float(value) for name, value in numbers.items()})
+
+
+def surface_height(ground: Ground, x: float, y: float) -> float:
+    """Height of any surface over a place of its plane at the first point [m]; NaN beside a sphere."""
+    z = 0.0
+    for _ in range(30):
+        distance, out = outside(ground, Vec3(x, y, z))
+        if not out.z > 0.05:
+            return nan
+        z -= distance / out.z
+        if abs(distance) < 1e-7:
+            return float(z)
+    return nan

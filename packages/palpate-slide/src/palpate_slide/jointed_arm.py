@@ -98,7 +98,7 @@ class OnGround(ByMuJoCo):
         self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), Bound(compiled_slid)
         # the links' place is known here, and no spring lies between it and the surface
         world = world_of(inner, noise=0.0)._replace(torque=1.0)
-        self._ground, self._world, self._frame = ground, world, frame
+        self.ground, self._world, self._frame = ground, world, frame
         self._axes, self._noise = np.array(frame.axes), np.zeros((3, 8))
         self._generator = np.random.default_rng(seed)
 
@@ -117,7 +117,7 @@ class OnGround(ByMuJoCo):
         self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
     ) -> Touch:
         self.slid = self._law(
-            cell, self._world, self._ground, self._frame, body, self.slid, tip, setpoint, time, self._noise
+            cell, self._world, self.ground, self._frame, body, self.slid, tip, setpoint, time, self._noise
         )
         return touch
 
@@ -152,7 +152,7 @@ class JointedArm:
     def slide(
         self, gains: Gains, ground: Ground, ways: Array, *, into: ArrayLike = DOWN, seed: int = 0
     ) -> Array:
-        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 20).
+        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 21).
 
         Args:
             gains: with a table `slide`.
@@ -164,40 +164,68 @@ class JointedArm:
         Raises:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
-        check_mode(gains, self.inner.kind)
-        rows, ticks = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS))), 0
-        frame, loop = self._frame(), SlidingLoop(gains, into)
-        cell = cell_of(self.arm, self.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
-        engine = OnGround(self.arm, cell, self.place.q, ground, gains.arm, frame, seed)
-        tip = SimulatedArm(self.arm, gains.arm, self.place, cell, engine)
-        axes, origin = np.array(frame.axes), np.array(frame.origin)
+        run = JointedSlide(self, gains, ground, into, seed)
+        rows = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS)))
         for k, row in enumerate(rows):
-            if ticks >= len(ways):
+            if run.ticks >= len(ways):
                 return rows[:k]
-            reading = engine.reading
-            velocity = loop.update(reading, axes @ (tip.read().pose[:3, 3] - origin), ways[ticks])
-            ticks += int(loop.sliding or ticks > 0)
-            tip.write(Command(velocity=np.concatenate([velocity @ axes, np.zeros(3)])))
-            self._check_range(tip.truth.q, k * gains.arm.tick)
-            after = engine.slid
-            v, f = _three(velocity), _three(reading)
-            compiled_note(ground, loop.state, after.tip, v, f, float(after.mean), row)
-            row[13] = (1.0 if loop.sliding else 2.0) * min(ticks, 1)
+            run.tick(ways[run.ticks], row)
         return rows
 
-    def _frame(self) -> Frame:
+    def frame(self) -> Frame:
         """The surface's axes, and its first point before the tip."""
         n, axes = self.place.normal, self.place.axes
         at = self.place.pose[:3, 3]
         at = at + (self.place.place - n @ at) * n
         return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
 
-    def _check_range(self, q: Array, time: float) -> None:
+    def check_range(self, q: Array, time: float) -> None:
+        """Refuses joints at the end of their range, shape (n,), at a time [s]."""
         beyond = np.flatnonzero(~((q >= self.arm.lower) & (q <= self.arm.upper)))
         if len(beyond):
             raise InputError(
                 f"{self.arm.names[beyond[0]]} reached the end of its range at {time:.3f} s; make --length smaller"
             )
+
+
+class JointedSlide:
+    """A slide that goes on tick by tick.
+
+    Args:
+        at: the arm before the surface.
+        gains, ground, into, seed: as of `JointedArm.slide`.
+
+    Raises:
+        InputError: gains of another kind of arm.
+    """
+
+    def __init__(self, at: JointedArm, gains: Gains, ground: Ground, into: ArrayLike = DOWN, seed: int = 0):
+        check_mode(gains, at.inner.kind)
+        self._at, self.loop, self.ticks, self._k = at, SlidingLoop(gains, into), 0, 0
+        frame = at.frame()
+        cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
+        self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
+        self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
+        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
+
+    def tick(self, direction: ArrayLike, row: Array) -> None:
+        """A tick in a direction of the surface's axes; fills a row of `world.COLUMNS`.
+
+        Raises:
+            InputError: a joint reached the end of its range.
+        """
+        reading, loop = self.engine.reading, self.loop
+        seen = self._axes @ (self.tip.read().pose[:3, 3] - self._origin)
+        velocity = loop.update(reading, seen, direction)
+        self.ticks += int(loop.sliding or self.ticks > 0)
+        self.tip.write(Command(velocity=np.concatenate([velocity @ self._axes, np.zeros(3)])))
+        self._at.check_range(self.tip.truth.q, self._k * loop.gains.arm.tick)
+        self._k += 1
+        after = self.engine.slid
+        v, f = _three(velocity), _three(reading)
+        compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
+        row[20] = loop.desired
+        row[13] = (1.0 if loop.sliding else 2.0) * min(self.ticks, 1)
 
 
 def jointed_arm(name: str) -> JointedArm:

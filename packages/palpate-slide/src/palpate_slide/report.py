@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.files import write_text
+from palpate.files import RECORD, write_text
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
 from palpate.force.sliding.slide_state import SLIDING_TROUBLES
@@ -18,13 +18,17 @@ from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import plain, quantity
+from palpate.report.page import data_address
+from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, SETTLED, figures_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_UNITS = dict.fromkeys(("normal_force", "fx", "fy", "fz"), "N") | dict.fromkeys(("x", "y", "z"), "m")
+_UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
+    ("x", "y", "z"), "m"
+)
 _UNITS |= {"normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 
 
@@ -69,23 +73,28 @@ def sentence(summary: dict[str, Any]) -> str:
     f = summary["force"]
     if f is None:
         return "The surface was never touched, or the force was not held before a slide."
-    mu, n = summary["friction"], summary["normal"]
-    half = 0.5 * (mu["ci95"][1] - mu["ci95"][0])
-    held = "" if summary["end"] == "held" else "Not held: "
+    n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
     return (
-        f"{held}{plain(f['desired_N'], 3)} N within {100 * f['rms_share']:.2g} % rms over "
-        f"{quantity(summary['path_m'], 'm')}; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; "
-        f"friction {mu['value']:.2f} ± {half:.2g}."
+        f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
+        f"{1e3 * summary['path_m']:.3g} mm; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; friction {mu} "
+        f"\N{PLUS-MINUS SIGN} {half}."
     )
 
 
-def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Path, record: str) -> None:
-    """Writes the record, slide.png and report.html into a folder."""
+def _friction(summary: dict[str, Any]) -> tuple[str, str]:
+    """Friction and its half-width."""
+    low, high = summary["friction"]["ci95"]
+    digits = 2 if high - low > 0.01 else 3
+    return f"{summary['friction']['value']:.{digits}f}", f"{0.5 * (high - low):.{digits}f}"
+
+
+def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, Any], folder: Path) -> None:
+    """Writes the record, film.svg, slide.png and report.html into a folder."""
     from palpate.logs import write_record
 
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     units = {name: _UNITS.get(name, "1") for name in columns}
-    write_record(Record(columns, units, {"command": summary["command"]}), folder / record)
+    write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
     with style.ink():
         drawing = _drawn(rows, gains, summary)
         style.save(drawing, folder / "slide.png")
@@ -95,16 +104,20 @@ def write_report(rows: Array, gains: Gains, summary: dict[str, Any], folder: Pat
     ]
     if summary["end"] != "held":
         alerts.insert(0, {"tone": "fail", "title": "", "text": f"The force: {summary['end']}."})
-    caption = "Against the path. Grey: 95 % intervals; dashed: desired, or the truth of the simulation."
-    figures = [
-        {"panels": panels[:-1], "caption": caption},
-        {"panels": panels[-1:], "caption": "Speed along the path."},
+    caption = "Along the path. Grey: 95 % interval; dashed: desired, or the truth of the simulation."
+    films = {half: slide_film(rows, gains.arm.tick, ground, half) for half in ("", "surface", "force")}
+    write_text(folder / "film.svg", films[""])
+    told = {"surface": "The path over the surface, in real time.", "force": "Force and friction."}
+    pairs = [
+        {"source": data_address(films[half].encode(), "image/svg+xml"), "caption": words}
+        for half, words in told.items()
     ]
     answer = PageAnswer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",
-        alerts=alerts, cards={"": _cards(summary)}, figures=figures,
+        alerts=alerts, cards={"": _cards(summary)}, pairs=pairs, folds=_along(summary),
+        figures=[{"panels": panels[:4], "caption": caption}, {"panels": panels[4:], "caption": caption}],
         source=("The gains", gains.to_toml()),
     )  # fmt: skip
     write_text(folder / "report.html", answer_page(answer, room="slide", command=summary["command"]))
@@ -114,10 +127,9 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     f, n, truth = summary["force"], summary["normal"], summary["truth"]
     if f is None:
         return [Card("Contact", "none", tone="fail")]
-    mu, K = summary["friction"], summary["stiffness"]
+    K, (mu, half) = summary["stiffness"], _friction(summary)
     lost = summary["contact_lost"]
     low, high = (quantity(end, "N/m") for end in K["ci95"])
-    half = 0.5 * (mu["ci95"][1] - mu["ci95"][0])
     off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, most = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
     true = quantity(truth["stiffness"], "N/m")
@@ -125,34 +137,67 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
         Card("Normal", f"± {n['cone95_deg']:.2g}", "\N{DEGREE SIGN}", why=off),
-        Card("Friction", f"{mu['value']:.2f}", half=f"{half:.2g}", why=f"truth {truth['friction']:g}"),
+        Card("Friction", mu, half=half, why=f"truth {truth['friction']:g}"),
         Card("Stiffness", low, why=f"to {high}; truth {true}", colour="K"),
     ]
 
 
+def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
+    """The stiffness along the path of a dithered slide, folded."""
+    rows = [
+        [f"x {1e3 * p['x']:.3g}, y {1e3 * p['y']:.3g} mm", quantity(p["stiffness"], "N/m", p["half"])]
+        for p in summary.get("along", [])
+    ]
+    return [("Stiffness along the path", f"{len(rows)} places, for palpate map --table places.csv", rows)]
+
+
 def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
-    """Force error, normal, friction, stiffness and speed against the path."""
+    """Force error, speed, normal, friction and stiffness against the path; stretches where the slide was slower."""
     on = rows[:, COLUMNS.index("sliding")] > 0.0
     kept = rows[on] if on.any() else rows
     c = dict(zip(COLUMNS, kept[:: max(len(kept) // 2000, 1)].T, strict=True))
-    drawing, (force, normal, friction, stiffness, speed) = style.figure(5, height=1.7)
+    drawing, axes = style.figure(5, height=1.7)
     step = np.linalg.norm(np.diff(np.stack([c[a] for a in "xyz"], 1), axis=0), axis=1)
-    way, nothing = 1e3 * np.append(0.0, np.cumsum(step)), np.zeros(len(step) + 1)
-    truth, band, cone = summary["truth"], 0.05 * gains.force + nothing, np.degrees(CHI2_95 * c["cone"])
-    for axes, label, value, low, high, color in (
-        (force, "force error [N]", c["normal_force"] - gains.force, -band, band, style.F),
-        (normal, "normal's error [deg]", np.degrees(c["normal_error"]), nothing, cone, style.INK),
-        (friction, "friction [1]", c["mu"], *_interval(c, "mu"), style.INK),
-        (stiffness, "K [N/m]", c["stiffness"], *_interval(c, "stiffness"), style.K),
-        (speed, "speed [mm/s]", 1e3 * c["speed"], nothing, nothing, style.INK),
+    way = 1e3 * np.append(0.0, np.cumsum(step))
+    within = 0.1 * gains.force
+    truth, asked, cone = (
+        summary["truth"],
+        1e3 * summary["slide"]["speed_m_s"],
+        np.degrees(CHI2_95 * c["cone"]),
+    )
+    for panel, label, value, ends, known, color in (
+        (axes[0], "force error [N]", c["normal_force"] - c["desired"], (), (-within, within), style.F),
+        (axes[1], "speed [mm/s]", 1e3 * c["speed"], (), (asked,), style.INK),
+        (axes[2], "normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), style.INK),
+        (axes[3], "friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), style.INK),
+        (axes[4], "K [N/m]", c["stiffness"], _interval(c, "stiffness"), (truth["stiffness"],), style.K),
     ):  # fmt: skip
-        axes.plot(way, value, color=color, linewidth=1.2)
-        axes.fill_between(way, low, high, color=style.MEASURED, alpha=0.2, linewidth=0)
-        axes.set_ylabel(label)
-    friction.axhline(truth["friction"], **style.KNOWN)
-    stiffness.axhline(truth["stiffness"], **style.KNOWN)
-    speed.set_xlabel("path [mm]")
+        panel.plot(way, value, color=color, linewidth=1.2, label="estimate" if ends else "")
+        for i, end in enumerate(ends):
+            panel.plot(way, end, color=style.MEASURED, linewidth=1.0, label="" if i else "95 %")
+        for level in known:
+            panel.axhline(level, **style.KNOWN)
+        panel.set_ylabel(label)
+        settled = np.concatenate(
+            [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)] + [np.array(known)]
+        )
+        if len(settled):
+            low, high = float(settled.min()), float(settled.max())
+            low = 0.0 if panel in (axes[1], axes[2]) else low
+            panel.set_ylim(low - 0.08 * (high - low) - 1e-9, high + 0.08 * (high - low) + 1e-9)
+        for start, end in _slower(way, c["speed"], summary["slide"]["speed_m_s"]):
+            panel.axvspan(start, end, color=style.DOUBT, alpha=0.12, linewidth=0)
+    axes[-1].set_xlabel("path [mm]")
     return drawing
+
+
+def _slower(way: Array, speed: Array, asked: float) -> list[tuple[float, float]]:
+    """Stretches of the path on which the slide was slower than asked by a tenth, but for its beginning [mm]."""
+    slow = np.flatnonzero((speed < 0.9 * asked) & (way > 0.02 * way[-1]))
+    if not len(slow):
+        return []
+    cuts = np.flatnonzero(np.diff(slow) > 1)
+    return [(float(way[part[0]]), float(way[part[-1]])) for part in np.split(slow, cuts + 1)]
 
 
 def _interval(c: dict[str, Array], name: str) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law, part
-from palpate._vector import ZERO3, Vec3, exp, sqrt
+from palpate._vector import ZERO3, Vec3, exp, sin, sqrt
 from palpate.arrays import Array
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
@@ -41,10 +41,10 @@ from palpate_slide.ground import Ground, outside
 
 COLUMNS = (
     "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness",
-    "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true",
+    "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true", "desired",
 )  # fmt: skip
 """Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
-speed commanded along the surface [m/s], reading [N], friction as it acts."""
+speed commanded along the surface [m/s], reading [N], friction as it acts, desired force [N]."""
 
 
 @part
@@ -71,7 +71,7 @@ def contact(world, ground, tip, x, v, h):
     pen = -distance + n @ (x - where)
     if pen <= 0.0:
         return Carried(x, v, x, 0.0, 0.0, ZERO3, 0.0, 0.0)
-    K, b = ground.stiffness, ground.damping
+    K, b = ground.stiffness * max(1.0 + ground.grade * where.x, 0.05), ground.damping
     if world.torque == 0.0:
         depth = (series * pen + b / h * tip.depth) / (series + K + b / h)
         N = max(series * (pen - depth), 0.0)
@@ -99,6 +99,7 @@ class Course(NamedTuple):
         start: of the tip [m].
         directions: for each tick of the slide, shape (m, 3).
         desired: F_d [N].
+        dither: share of F_d by which it changes in a slide, and its frequency [Hz].
         noise: standard normal numbers, shape (n, 3).
         line: room for what is on its way, shape (delay + 1, 3).
         work: room of the law, shape (STATES,).
@@ -107,6 +108,7 @@ class Course(NamedTuple):
     start: Vec3
     directions: Array
     desired: float
+    dither: tuple[float, float]
     noise: Array
     line: Array
     work: Array
@@ -133,7 +135,7 @@ def slide_run(world, ground, control, s, course, out):
         control: a part as `OwnLaw`.
         s: its state, as it starts, shape (SIZE,) or longer.
         course: of the run.
-        out: shape (n, 20).
+        out: shape (n, 21).
     """
     h, ticks, samples = world.tick / world.steps, 0, 0.0
     line, x, y, z = course.line, ZERO3, ZERO3, ZERO3
@@ -145,7 +147,9 @@ def slide_run(world, ground, control, s, course, out):
         if ticks >= len(course.directions):
             return k
         seen, wanted = by_encoder(world, tip.x), vector_at(course.directions[ticks], 0)
-        velocity = control.step(s, course.work, course.desired, reading, seen, wanted)
+        angle = 6.283185307179586 * course.dither[1] * ticks * world.tick
+        desired = course.desired * (1.0 + course.dither[0] * sin(angle))
+        velocity = control.step(s, course.work, desired, reading, seen, wanted)
         ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
         command = command + world.tick * velocity
         pulled = world.torque * (world.stiffness * (command - seen) - world.second * tip.v)
@@ -164,6 +168,7 @@ def slide_run(world, ground, control, s, course, out):
                 reading = Vec3(world.c @ x, world.c @ y, world.c @ z) + world.d * f
                 reading = reading + world.noise * vector_at(course.noise[k], 0)
         note(ground, s, tip, velocity, reading, mean / world.steps, out[k])
+        out[k, 20] = desired
         out[k, 13] = (1.0 if s[PHASE] == SLIDE else 2.0) * min(ticks, 1)
     return len(out)
 
@@ -224,8 +229,9 @@ def simulate(
     into: ArrayLike = DOWN,
     seed: int = 0,
     control: Callable[[Sliding], Any] = OwnLaw,
+    dither: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """A slide from free motion on: rows of `COLUMNS`, shape (n, 20).
+    """A slide from free motion on: rows of `COLUMNS`, shape (n, 21).
 
     Args:
         gains: with a table `slide`.
@@ -234,6 +240,7 @@ def simulate(
         into: direction in which the law looks for the surface, shape (3,).
         seed: of the noise.
         control: makes what moves the tip out of the law's numbers.
+        dither: share of the desired force by which it changes in a slide, and the frequency [Hz].
     """
     law, arm = sliding(gains, into), gains.arm
     state = np.zeros(SIZE + SPARE)
@@ -242,7 +249,9 @@ def simulate(
     out = np.zeros((len(ways) + round(LONGEST * arm.rate), len(COLUMNS)))
     start = (GAP if law.into.z > 0.0 else -GAP) * law.into  # outside, however wrong it is
     noise = np.random.default_rng(seed).standard_normal((len(out), 3))
-    course = Course(start, ways, float(gains.force), noise, np.zeros((world.delay + 1, 3)), np.zeros(STATES))
+    course = Course(
+        start, ways, float(gains.force), dither, noise, np.zeros((world.delay + 1, 3)), np.zeros(STATES)
+    )
     return out[: compiled_slide(world, ground, control(law), state, course, out)]
 
 
@@ -275,7 +284,11 @@ def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
     if not len(judged):
         nan = float("nan")
         return SlideFigures(False, nan, nan, nan, True, nan, 0.0, 0.0, 0.0, False)
-    error = c["normal_force"][judged] / gains.force - 1.0
+    error = (c["normal_force"][judged] - c["desired"][judged]) / gains.force
+    dither = c["desired"][judged] / gains.force - 1.0
+    if dither.any():  # it is followed late: what it is of the error itself, and its rate, is none
+        both = np.column_stack([dither, np.gradient(dither)])
+        error = error - both @ np.linalg.lstsq(both, error, rcond=None)[0]
     true = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
     return SlideFigures(
         True, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()),

@@ -13,11 +13,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.figures import FigureOptions
-from palpate.cli.options.flags import FLAG
-from palpate.cli.options.names import QUIET, shipped_names
-from palpate.cli.options.plugins import PluginOptions
-from palpate.cli.options.values import FolderOptions, KnownOptions, print_names, source_of
+from palpate.cli.options.common import (
+    QUIET,
+    FigureOptions,
+    FolderOptions,
+    KnownOptions,
+    PluginOptions,
+    print_names,
+    shipped_names,
+    source_of,
+)
+from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import (
     COMPILING,
     confirmed,

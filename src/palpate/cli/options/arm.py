@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED
-from palpate.cli.options.values import span, vector, with_std
+from palpate.cli.options.values import FLAG, SIGNED, span, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import FLAG, SIGNED, in_si, in_si_if_given
-from palpate.cli.options.names import QUIET, LoopArm
-from palpate.cli.options.values import with_std
-from palpate.cli.options.written import WRITTEN, FileOptions
+from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
+from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -63,7 +61,7 @@ class SurfaceOptions:
     @property
     def range(self) -> tuple[float, float]:
         """Lowest and highest stiffness [N/m]."""
-        from palpate.cli.options.quantities import spread
+        from palpate.cli.options.values import spread
 
         return spread("--stiffness", str(self.stiffness), "stiffness")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.names import QUIET, Preset
+from palpate.cli.options.common import QUIET, Preset
 from palpate.errors import InputError, unknown
 from palpate.files import check_place, read_text, read_toml, write_text
 from palpate.files.ownership import MADE

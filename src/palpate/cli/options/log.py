@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.flags import SIGNED
+from palpate.cli.options.values import SIGNED
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
 

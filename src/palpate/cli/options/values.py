@@ -1,24 +1,171 @@
-"""Compound numbers of the command line: VALUE:STD, and x,y,z with a unit."""
+"""Values of options: flags and whole numbers, quantities with units (`3:8:N/mm`, `15:N`, `10%`), VALUE:STD, x,y,z."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass
-from math import isfinite
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Sequence
+from math import isfinite, isnan
+from typing import Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter, Token
 
-from palpate.cli._terminal import print_lines
-from palpate.cli.options.flags import FLAG
-from palpate.errors import InputError
-from palpate.text import printable
-from palpate.units import unit
+from palpate.errors import InputError, unknown
+from palpate.units import UNITS, unit
 
-if TYPE_CHECKING:
-    from palpate.bench.toml_parts import TomlFiles
+FACTORS: dict[str, dict[str, float]] = {
+    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3, "N/cm": 1e2},
+    "damping": {"N s/m": 1.0, "Ns/m": 1.0, "kN s/m": 1e3, "kNs/m": 1e3, "N s/mm": 1e3, "Ns/mm": 1e3},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "force rate": {"N/s": 1.0, "kN/s": 1e3},
+    **{
+        kind: {symbol: unit.factor for symbol, unit in UNITS.items() if unit.quantity == kind}
+        for kind in ("force", "length", "time", "velocity")
+    },
+}
+"""Units by quantity, and their factors into SI."""
+_LARGEST = {
+    "stiffness": 1e12,
+    "damping": 1e9,
+    "mass": 1e6,
+    "frequency": 1e7,
+    "force rate": 1e12,
+    "force": 1e9,
+    "length": 1e6,
+    "time": 1e9,
+    "velocity": 1e6,
+}
+"""In SI: no robot has more, and no calculation with its fourth power overflows."""
+_SMALLEST = 1e-15
+"""In SI, but for 0: the step of no sensor is finer."""
+
+
+def quantity(option: str, text: str, kind: str) -> float:
+    """`NUMBER` or `NUMBER:UNIT` in SI.
+
+    Args:
+        option: that it was given for, as in `--force`; errors name it.
+        text: the given text.
+        kind: of `FACTORS`.
+
+    Raises:
+        InputError: no number, no such unit, or a number that no robot has.
+    """
+    number, colon, symbol = text.partition(":")
+    return _in_range(
+        option, _number(option, text, number), _factor(option, symbol, kind) if colon else 1.0, kind
+    )
+
+
+def spread(option: str, text: str, kind: str) -> tuple[float, float]:
+    """`LOW:HIGH`, `LOW:HIGH:UNIT`, `VALUE` or `VALUE:UNIT` in SI; a value alone is both ends.
+
+    Raises:
+        InputError: no numbers, or no such unit.
+    """
+    parts = text.split(":")
+    factor = 1.0
+    if len(parts) > 1 and not _is_number(parts[-1]):
+        factor = _factor(option, parts.pop(), kind)
+    if len(parts) > 2:
+        raise InputError(f"{option} needs LOW:HIGH or LOW:HIGH:UNIT, got {text!r}")
+    low, high = (_number(option, text, part) for part in (parts[0], parts[-1]))
+    return _in_range(option, low, factor, kind), _in_range(option, high, factor, kind)
+
+
+def _in_range(option: str, number: float, factor: float, kind: str) -> float:
+    value, most = number * factor, _LARGEST[kind]
+    if not (value == 0 or _SMALLEST <= abs(value) <= most):
+        raise InputError(
+            f"{option} must be 0, or between {_SMALLEST:g} and {most:g} in SI units, got {value:g};"
+            f" no robot has such a {kind}"
+        )
+    return value
+
+
+def shares(option: str, text: str, names: tuple[str, ...]) -> dict[str, float]:
+    """`10%` for all parameters, or `K=2%,M=25%` for some; plain numbers are shares of 1.
+
+    Raises:
+        InputError: not of this form.
+    """
+    if "=" not in text:
+        return dict.fromkeys(names, _share(option, text))
+    found = {}
+    for part in text.split(","):
+        name, _, share = part.partition("=")
+        if name.strip() not in names:
+            raise unknown(f"parameter in {option}", name.strip(), names)
+        found[name.strip()] = _share(option, share)
+    return found
+
+
+def _share(option: str, text: str) -> float:
+    number = text.strip().removesuffix("%")
+    return _number(option, text, number) * (0.01 if text.strip().endswith("%") else 1.0)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(option: str, text: str, number: str) -> float:
+    if not _is_number(number) or not isfinite(float(number)):
+        raise InputError(f"{option} needs a number, or a number and a unit after a colon, got {text!r}")
+    return float(number)
+
+
+def _factor(option: str, symbol: str, kind: str) -> float:
+    if symbol.strip() not in FACTORS[kind]:
+        raise unknown(f"unit of {kind} in {option}", symbol.strip(), FACTORS[kind])
+    return FACTORS[kind][symbol.strip()]
+
+
+FLAG = Parameter(negative=())
+"""A switch without a `--no-` of its own."""
+SIGNED = Parameter(allow_leading_hyphen=True)
+"""A value that may begin with a minus: it is a number below zero, not another option."""
+
+
+def value_of(kind: Any, tokens: Sequence[Token]) -> Any:
+    """The value of any option or argument: a number must be one, and not beyond what the machine counts."""
+    from cyclopts import convert
+
+    try:
+        value = convert(kind, tokens)
+    except OverflowError:
+        raise InputError(f"it must be a finite number, got {tokens[0].value!r}") from None
+    if isinstance(value, float) and isnan(value):
+        raise InputError(f"it must be a number, got {tokens[0].value!r}")
+    return value
+
+
+def _whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    (token,) = tokens
+    if not token.value.isdecimal():
+        raise InputError(f"it must be a whole number, 0 or above, got {token.value!r}")
+    return int(token.value)
+
+
+WHOLE = Parameter(converter=_whole_number)
+"""A seed; the conversion of cyclopts would silently round 1.5."""
+
+
+def in_si(option: str, text: str, kind: str) -> float:
+    """`NUMBER` or `NUMBER:UNIT` in SI.
+
+    Raises:
+        InputError: not a number, or not a unit of this kind.
+    """
+    return quantity(option, text, kind)
+
+
+def in_si_if_given(option: str, text: str | None, kind: str) -> float | None:
+    """The same of an option that may be left out."""
+    return None if text is None else in_si(option, text, kind)
 
 
 def lag_of(text: str | None) -> tuple[float, float] | None:
@@ -103,51 +250,3 @@ def _numbers(words: list[str]) -> list[float] | None:
     except ValueError:
         return None
     return found if all(isfinite(value) for value in found) else None
-
-
-@Parameter(name="*", group=Group("Known names", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
-class KnownOptions:
-    """List or print, without a run."""
-
-    list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
-    "List the known names and stop."
-    print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
-    "Print the named file, to copy and edit, and stop."
-
-
-@Parameter(name="*", group=Group("Output", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
-class FolderOptions:
-    """The folder of results."""
-
-    out: Path | None = None
-    "Folder for results; when left out, one in runs/ with the name of the run."
-    replace: Annotated[bool, FLAG] = False
-    "Replace existing results."
-    json: Annotated[bool, FLAG] = False
-    "Print the summary as JSON and nothing else."
-
-
-def print_names(files: TomlFiles, title: Callable[[str], str]) -> None:
-    """Print the names that come with palpate, each with its title."""
-    width = 2 + max(map(len, files.names()))
-    for name in files.names():
-        print_lines(f"{name:<{width}}{title(name)}")
-
-
-def source_of(files: TomlFiles, name: str | None, verb: str, printed: bool) -> str | None:
-    """The text of the named file; None if it was only printed.
-
-    Raises:
-        InputError: no name, or an unknown one.
-    """
-    if name is None:
-        raise InputError(
-            f"no {files.kind} is named; name one (palpate {verb} --list lists them) or a TOML file"
-        )
-    source = files.source(name)
-    if not printed:
-        return source
-    sys.stdout.write(printable(source))
-    return None

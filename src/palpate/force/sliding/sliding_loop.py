@@ -22,7 +22,7 @@ from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
-from palpate.results import Readable
+from palpate.records import Readable
 
 CHI2_95 = sqrt(5.991)
 """Deviations within which two jointly normal numbers lie with 95 %."""

@@ -33,7 +33,7 @@ from palpate.report.look.assets import (
     text_of,
 )
 from palpate.report.page import data_address
-from palpate.report.svg import svg
+from palpate.report.style import svg
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

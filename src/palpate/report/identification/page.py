@@ -34,7 +34,7 @@ from palpate.report.identification.words import (
 )
 from palpate.report.numbers import plain, quantity, with_half
 from palpate.report.page import data_address, render
-from palpate.report.svg import svg
+from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:

@@ -1,16 +1,19 @@
-"""The page of many identifications: what they say together, a row each, and forest plots."""
+"""Many logs as a page and in Python: their forest plot, a card for each parameter, a row for each log."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
+from palpate.errors import InputError
 from palpate.identification.pooling import Pooled, PooledParameter
+from palpate.report import style
 from palpate.report.identification.page import TONES, picture, split
 from palpate.report.identification.words import CALLED, Source, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
-from palpate.report.many import forest
 from palpate.report.many.table import (
     POINT,
     LogRow,
@@ -20,16 +23,119 @@ from palpate.report.many.table import (
     quantities,
     quantities_with_number,
     sentence,
+    show,
 )
-from palpate.report.numbers import quantity
+from palpate.report.numbers import as_html, console_text, quantity
 from palpate.report.page import render
 from palpate.text import printable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+COLOURS = {POINT: style.K, "K": style.K, "B": style.B, "M": style.M}
+_ROW, _BESIDE = 0.31, 1.25
+"""Height of a log's row, and of what is above and below all of them [in]."""
+_LONGEST = 26
+"""Letters of a log's name that stand beside its row."""
+_LETTERS = 12
+_WIDE = 13.0
+_TICKS = 5
+"""Numbers under a panel at most: more run into each other where it is narrow."""
+
+
+def write_figure(rows: Sequence[LogRow], pooled: Pooled, path: Path, dpi: int | None = None) -> Path:
+    """Draw the forest plots and write them, whole or not at all."""
+    figure = draw_logs(rows, pooled)
+    return style.save(figure, path, dpi)
+
+
+def draw_logs(rows: Sequence[LogRow], pooled: Pooled) -> Figure:
+    """The sentence, and a forest plot of each quantity that is pooled, two beside each other."""
+    from matplotlib.figure import Figure
+
+    names = quantities_with_number(rows, pooled) or [POINT]
+    high = height(rows) * -(-len(names) // 2)
+    with style.ink():
+        figure = Figure(figsize=(_WIDE, high + 1.0), dpi=style.DPI, layout="constrained")
+        parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, high))
+        head, body = parts
+        text = fill(f"{sentence(rows, pooled)} {failures(rows)}".strip(), 125)
+        head.text(0.01, 0.95, text, fontsize=13, va="top", parse_math=False)
+        grid = body.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
+        for axis in grid[len(names) :]:
+            axis.set_axis_off()
+        for axis, name in zip(grid, names, strict=False):
+            forest(axis, rows, name, quantities(pooled).get(name))
+    return figure
+
+
+def one(rows: Sequence[LogRow], pooled: Pooled, name: str, width: int) -> Figure:
+    """One forest plot, so many pixels wide on a page."""
+    from matplotlib.figure import Figure
+
+    with style.ink(_LETTERS):
+        figure = Figure(figsize=(width / 72, height(rows)), dpi=style.DPI, layout="constrained")
+        forest(figure.subplots(), rows, name, quantities(pooled).get(name))
+    return figure
+
+
+def height(rows: Sequence[LogRow]) -> float:
+    """Of a forest plot [in]."""
+    return _ROW * (len(rows) + 1) + _BESIDE
+
+
+def forest(axis: Axes, rows: Sequence[LogRow], name: str, pooled: PooledParameter | None) -> None:
+    """A row a log, the first at the top; what is pooled at the bottom."""
+    unit = pooled.parameter.unit if pooled else "1"
+    colour = COLOURS.get(name, style.F)
+    called = "stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
+    style.panel(axis, called if unit == "1" else f"{called} [{unit}]")
+    axis.grid(visible=False, axis="y")
+    axis.locator_params(axis="x", nbins=_TICKS)
+    for i, row in enumerate(rows):
+        p, y = row.value_of(name), len(rows) - i
+        if p is None or p.value is None or p.ci95 is None:
+            axis.text(
+                0.01, y, "no number", transform=axis.get_yaxis_transform(), va="center", color=style.QUIET
+            )
+            continue
+        used = pooled is not None and i in pooled.logs
+        axis.plot(p.ci95, (y, y), color=colour, lw=2.2, alpha=1 if used else 0.35, solid_capstyle="butt")
+        axis.plot([p.value], [y], "o", ms=6, color=colour, mfc=colour if used else "none")
+    _together(axis, pooled)
+    axis.set_ylim(-0.7, len(rows) + 0.7)
+    axis.set_yticks(range(len(rows) + 1), ["pooled", *(_short(row) for row in reversed(rows))])
+    for label in axis.get_yticklabels():
+        label.set_parse_math(False)
+
+
+def _together(axis: Axes, pooled: PooledParameter | None) -> None:
+    """The mean as a diamond over its interval; the next press between brackets."""
+    if pooled is None or pooled.parameter.value is None or pooled.parameter.ci95 is None:
+        axis.text(0.01, 0, "no number", transform=axis.get_yaxis_transform(), va="center", color=style.QUIET)
+        return
+    low, high = pooled.parameter.ci95
+    axis.axvspan(low, high, color=style.INK, alpha=0.07, lw=0)
+    axis.fill(
+        [low, pooled.parameter.value, high, pooled.parameter.value], [0, 0.28, 0, -0.28], color=style.INK
+    )
+    if pooled.prediction95:
+        axis.plot(pooled.prediction95, (0, 0), color=style.INK, lw=1.1)
+        axis.plot(pooled.prediction95, (0, 0), ls="", marker="|", ms=12, color=style.INK)
+
+
+def _short(row: LogRow) -> str:
+    name = printable(row.source.title)
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 9]}…{name[-8:]}"
+
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
 _HALF, _NARROW = 560, 360
 
 
-def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
+def page_of_logs(rows: Sequence[LogRow], pooled: Pooled) -> str:
     """The page as HTML."""
     source = rows[0].source if rows else Source("")
     point = pooled.working_point
@@ -46,7 +152,7 @@ def page(rows: Sequence[LogRow], pooled: Pooled) -> str:
         place=place(rows, point) if point else "",
         cards=[_card(name, own, pooled) for name, own in quantities(pooled).items()],
         names=list(quantities(pooled)),
-        rows=[_row(row, pooled) for row in rows],
+        rows=[_log_row(row, pooled) for row in rows],
         figures=[_figure(rows, pooled, name) for name in quantities_with_number(rows, pooled)],
         json=json.dumps(json_of(rows, pooled), indent=1),
         source=Source("", source.options, None, source.command, source.made),
@@ -73,7 +179,7 @@ def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
     }
 
 
-def _row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
+def _log_row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
     found = row.found
     point = found.working_point if found else None
     values = [row.value_of(name) for name in quantities(pooled)]
@@ -97,4 +203,63 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
         f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
-    return picture(title, words, [forest.one(rows, pooled, name, width) for width in (_HALF, _NARROW)])
+    return picture(title, words, [one(rows, pooled, name, width) for width in (_HALF, _NARROW)])
+
+
+HEAD = ("pooled", "mean ± 95 %", "next press", "logs", "verdict", "why")
+
+
+def line(pooled: Pooled) -> str:
+    """Each quantity with its verdict."""
+    values = [f"{name} {_value(own)} {own.parameter.verdict}" for name, own in quantities(pooled).items()]
+    return printable(f"{pooled.count} logs; {', '.join(values) or 'nothing in common'}")
+
+
+def text(pooled: Pooled) -> str:
+    """The output of `palpate identify` for many logs."""
+    return console_text(lambda console: show(_rows(pooled), pooled, console))
+
+
+def html(pooled: Pooled) -> str:
+    """The sentence, and a row a quantity."""
+    rows = [HEAD, *(_row(name, own, pooled) for name, own in quantities(pooled).items())]
+    failed = failures(_rows(pooled))
+    return as_html(sentence(_rows(pooled), pooled), rows, [failed] if failed else [])
+
+
+def draw(pooled: Pooled) -> Figure:
+    """The forest plots of `palpate identify --figure`.
+
+    Raises:
+        InputError: no log gives anything a number.
+    """
+    rows = _rows(pooled)
+    if not quantities_with_number(rows, pooled):
+        raise InputError("none of these logs gives a number; there is nothing to draw")
+    return draw_logs(rows, pooled)
+
+
+def page(pooled: Pooled) -> str:
+    """The page of `palpate identify --report`."""
+    return page_of_logs(_rows(pooled), pooled)
+
+
+def _rows(pooled: Pooled) -> list[LogRow]:
+    """A row a log, by its name, or by its place."""
+    names = pooled.names or [f"log {i + 1}" for i in range(pooled.count)]
+    options = next((dict(found.options) for found in pooled.logs if found is not None), {})
+    made = "palpate.identification.pool(...).report(...)"
+    return [
+        LogRow(Source(name, options, command=made), found, "" if found else "it was not identified")
+        for name, found in zip(names, pooled.logs, strict=True)
+    ]
+
+
+def _row(name: str, own: PooledParameter, pooled: Pooled) -> tuple[str, ...]:
+    p = own.parameter
+    after = interval(own.prediction95, p.unit) or "-"
+    return name, _value(own), after, f"{len(own.logs)} of {pooled.count}", str(p.verdict), p.reason
+
+
+def _value(own: PooledParameter) -> str:
+    return "-" if own.parameter.value is None else formatted(own.parameter)

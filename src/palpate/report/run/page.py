@@ -21,7 +21,7 @@ from palpate.report.numbers import quantity
 from palpate.report.page import data_address, render
 from palpate.report.run.figures import drawings
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
-from palpate.report.svg import svg
+from palpate.report.style import svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
 

@@ -15,7 +15,7 @@ from palpate.report.identification.words import CALLED
 from palpate.report.look.assets import CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import data_address, render
-from palpate.report.svg import svg
+from palpate.report.style import svg
 from palpate_excitation import Design, Remedy
 from palpate_excitation.report.table import describe_remedy, describe_wave, half_widths_reached, percent
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli.options.flags import FLAG
-from palpate.cli.options.values import FolderOptions
+from palpate.cli.options.common import FolderOptions
+from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:

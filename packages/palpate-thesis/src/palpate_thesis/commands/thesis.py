@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter, validators
 
-from palpate.cli.options.figures import FigureOptions
-from palpate.cli.options.written import WRITTEN
+from palpate.cli.options.common import WRITTEN, FigureOptions
 from palpate.cli.toolkit import COMPILING, bar, console, place, print_lines, say, show_table
 from palpate.errors import InputError
 

@@ -1,24 +1,30 @@
-"""Output of `palpate tune` and `palpate certify`."""
+"""A tuned force loop: its lines on a terminal, its page, its views in Python and in a notebook."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, bounds, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.sliding.slide_proof import slide_proof
+from palpate.force.steps import BAND
 from palpate.force.tuning import RIGID, Tuning, surface_ends
-from palpate.report.numbers import quantity
+from palpate.report import style
+from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
+from palpate.report.figure_panels.panels import panels_of
+from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from matplotlib.figure import Figure
     from rich.console import Console
 
     from palpate.force import Certificate
@@ -178,3 +184,151 @@ def show_all(told: Tuning, console: Console) -> None:
     for code, text in told.warnings:
         console.print(f"{code}: {text}")
     console.print("not covered by a proof: " + "; ".join(UNCOVERED))
+
+
+def line(told: Tuning) -> str:
+    """The arm, the force, and whether anything is proved."""
+    proved = "proved" if told.proved else "nothing proved"
+    return printable(f"{told.gains.arm.title}, {told.gains.force:g} N, {proved}")
+
+
+def text(told: Tuning) -> str:
+    """Output of `palpate tune`."""
+    return console_text(lambda console: show(told, console))
+
+
+def html(told: Tuning) -> str:
+    """The same as a table."""
+    table = [("", f"A force loop for {told.gains.arm.title}"), *rows(told)]
+    return as_html("Tuning", table, [text for _, text in told.warnings])
+
+
+def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
+    """The page of `palpate tune --report`; `command` is what made it."""
+    gains = told.gains
+    answer = PageAnswer(
+        title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
+        sentence=tuning_sentence(told),
+        about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
+        f"{quantity(gains.theta, 's')}.",
+        alerts=[
+            {"tone": "warn", "title": "", "text": f"{text[0].upper()}{text[1:]}."}
+            for _, text in told.warnings
+        ],
+        cards={"": _cards(told)},
+        lower={"Margins on the stiffest surface": _margins(told)},
+        scale=_scale(told),
+        figures=[{"panels": panels_of(draw(told)), "caption": _touch_caption(told)}],
+        folds=[
+            ("All numbers", "and the proof's own statements", rows(told)),
+            ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
+        ],
+        source=("The gains", gains.to_toml()),
+    )
+    return answer_page(answer, room="tune", command=command)
+
+
+def tuning_sentence(told: Tuning) -> str:
+    """Whether it is proved, how high a first touch goes, and how soon it settles."""
+    bound, slowest = told.peak_bound, _slowest(told)
+    proved = "Proved stable." if told.proved else "Nothing is proved."
+    peak = f"The first touch peaks at {quantity(told.peak, 'N')}"
+    below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
+    settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
+    return f"{proved} {peak}{below}{settles}."
+
+
+def _ends(low: float, high: float) -> str:
+    """Both ends in three digits, each with its own unit: a bound is no value with an uncertainty."""
+    return f"{quantity(low, 'N/m')} to {quantity(high, 'N/m')}"
+
+
+def _slowest(told: Tuning) -> float:
+    return max(step.settling for step in told.steps)
+
+
+def _cards(told: Tuning) -> list[Card]:
+    gains, held = told.gains, told.surface_stiffness("held")
+    number, _, unit = _ends(*held).rpartition(" ") if held else ("", "", "")
+    cards = [
+        Card(
+            "Stable, proved", number, unit, why="stiffness of the surface, with constant gain",
+            tone="ok" if held else "fail", verdict="proved" if held else "nothing",
+        ),
+        Card("Approach", plain(1e3 * gains.approach, 3), "mm/s", why="at most, before a force is felt"),
+        Card("Gain", plain(1e3 * gains.gain, 3), "mm/s per N", why="on the stiffest surface"),
+    ]  # fmt: skip
+    known = told.known
+    if known is not None:
+        number, _, unit = quantity_between(*known.stiffness, "N/m").rpartition(" ")
+        why = "given" if known.source == "told" else f"from {known.source}"
+        cards.append(Card("Surface", number, unit, why=why, colour="K"))
+    return cards
+
+
+def _margins(told: Tuning) -> list[Card]:
+    at = told.margins
+    cards = [Card("Gain", f"× {plain(at.gain, 3)}", why="the gain may be so many times as high")]
+    if isfinite(at.phase):
+        cards.append(Card("Phase", f"{at.phase:.0f}°", why="until it rings for ever"))
+    if isfinite(at.delay):
+        cards.append(
+            Card("Delay", plain(1e3 * at.delay, 3), "ms", why="so much more lag before it rings for ever")
+        )
+    return cards
+
+
+def _scale(told: Tuning) -> dict[str, object]:
+    """Every bound on one axis: stiffness of the surface itself."""
+    extents = []
+    if told.known is not None:
+        low, high = told.known.stiffness
+        extents.append(Extent("this surface", low, high, "estimate", quantity_between(low, high, "N/m")))
+        if told.gains.cap > high:
+            upper = quantity(told.gains.cap, "N/m")
+            extents.append(
+                Extent(
+                    "assumed for its damping", high, told.gains.cap, "assumed", f"K + B/theta up to {upper}"
+                )
+            )
+    held, adapting = told.surface_stiffness("held"), told.surface_stiffness("adapting")
+    if held is not None:
+        extents.append(Extent("proved, constant gain", *held, "proved", _ends(*held)))
+    if adapting is not None and told.gains.arm.kind == "position":
+        extents.append(Extent("proved, while the gain adapts", 0.0, inf, "proved", "any constant stiffness"))
+    elif adapting is not None:
+        text = quantity_between(*adapting, "N/m")
+        extents.append(Extent("proved, while the gain adapts", *adapting, "proved", text))
+    low, high = told.exact
+    high = inf if high >= RIGID else high
+    unstable = f"unstable from {quantity(high, 'N/m')}" if isfinite(high) else "never unstable"
+    extents.append(Extent("stable, exact, without damping", low, high, "exact", unstable))
+    caption = "The dashed line is the stiffest surface that the gains are made for; at an arrowhead nothing bounds it."
+    return log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
+
+
+def draw(told: Tuning) -> Figure:
+    """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
+    with style.ink():
+        figure, (axis,) = style.figure(height=2.9)
+        axis.set(xlabel="time from the touch [s]", ylabel="force [N]")
+        force = told.gains.force
+        for step, name, colour in zip(
+            told.steps, ("softest", "stiffest"), (style.MEASURED, style.F), strict=True
+        ):
+            axis.plot(step.time, force * step.force, color=colour, linewidth=1.6, label=name)
+        axis.axhline(force, **style.KNOWN, label="desired")
+        axis.axhspan(force * (1.0 - BAND), force * (1.0 + BAND), color=style.MEASURED, alpha=0.2, linewidth=0)
+        if told.peak_bound is not None:
+            axis.axhline(told.peak_bound, color=style.INK, linewidth=1.6, label="proved: below")
+        longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
+        axis.set(
+            xlim=(0.0, max(2.5 * longest, 0.1)), ylim=(0.0, 1.15 * max(told.peak_bound or 0.0, told.peak))
+        )
+        style.legend(axis)
+    return figure
+
+
+def _touch_caption(told: Tuning) -> str:
+    over = 100.0 * float(np.max([told.overshoot, 0.0]))
+    return f"The first touch, its stiffness known: at most {plain(over, 2)} % over. Grey: within 5 % of the force."

@@ -1,0 +1,180 @@
+"""A slide that goes on as long as somebody watches, for the page of palpate-live; MuJoCo moves the arm's joints."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench.force_input import CONTACT
+from palpate.errors import InputError
+from palpate.force.gains import Gains
+from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.sliding_loop import Z_95
+from palpate.text import printable
+from palpate_live.pressing import scene_of
+from palpate_live.stability import OfArm
+from palpate_live.view import (
+    AT,
+    JOINTS,
+    LONGEST,
+    OVER,
+    STRIDE,
+    Happened,
+    Slider,
+    SourceState,
+    View,
+    check_ahead,
+)
+from palpate_live.view import COLUMNS as SHOWN
+from palpate_slide.ground import Ground
+from palpate_slide.jointed_arm import JointedArm, JointedSlide
+from palpate_slide.world import COLUMNS
+
+PLACE = {name: i for i, name in enumerate(COLUMNS)}
+FRICTION = 1.0
+"""Largest friction of the slider; above mu_max the law refutes its normal."""
+
+
+class WatchedSlide:
+    """An arm that slides around a circle.
+
+    Args:
+        at: the arm before the surface.
+        gains: with a table `slide`.
+        ground: the surface.
+        radius: of the circle [m].
+        into: direction in which the law looks for the surface, shape (3,).
+        seed: of the noise.
+
+    Raises:
+        InputError: an arm of more joints than are drawn, gains of another kind of arm.
+    """
+
+    # More than seven arguments: as of a slide, and the circle.
+    def __init__(self, at: JointedArm, gains: Gains, ground: Ground, radius: float, into: Any, seed: int = 0):
+        if at.arm.joints > JOINTS:
+            raise InputError(f"{at.arm.title} has {at.arm.joints} joints; at most {JOINTS} are drawn")
+        self._at, self._gains, self._ground, self._radius, self._into = at, gains, ground, radius, into
+        self._speed, self._tick = numbers_of(gains).speed, gains.arm.tick
+        self._series = gains.arm.series if gains.arm.kind == "position" else np.inf
+        self._stride = max(1, round(STRIDE * gains.arm.rate))
+        least, K = max(1.0, 10.0 * gains.arm.sensor.noise), ground.stiffness
+        sliders = (
+            Slider("force", "desired force", "N", least, 0.8 * gains.force_limit, gains.force),
+            Slider("speed", "speed along the surface", "mm/s", 0.0, 1e3 * self._speed, 1e3 * self._speed),
+            Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
+            Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
+        )  # fmt: skip
+        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
+        self.view = View(
+            title=printable(at.arm.title),
+            about=printable(f"{gains.arm.title}; the law of palpate tune --slide around a circle, MuJoCo"),
+            kind="simulation",
+            rate=float(gains.arm.rate),
+            stride=self._stride * self._tick,
+            sliders=sliders,
+            rest=tuple(float(v) for v in at.place.q),
+            scene=scene_of(at.arm, at.place),
+            quantities={"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")},
+        )
+        self.reset()
+
+    @property
+    def loop_asked(self) -> OfArm:
+        """The loop as it now is, for `palpate_live.stability`."""
+        return OfArm(self._gains, self.state.values["stiffness"], self._ground.damping)
+
+    def bones(self, row: Array) -> Array:
+        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
+        return self._at.arm.joint_places(row[AT["q1"] : AT["q1"] + self._at.arm.joints])
+
+    def reset(self, seed: int | None = None) -> None:
+        """To the beginning, the sliders where they stand."""
+        self.state.begin(seed)
+        self._run = JointedSlide(self._at, self._gains, self._surface, self._into, self.state.seed or 0)
+        self._run.loop.desired = self.state.values["force"]
+        self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))
+
+    def advance(self, seconds: float) -> Array:
+        """The rows of the time to come: one a stride."""
+        rows, until = [], self._k + round(seconds / self._tick)
+        while not self.state.ended and self._k + self._stride <= until:
+            for _ in range(self._stride):
+                if not self.state.ended:
+                    self._step()
+            rows.append(self._row())
+        return np.array(rows).reshape(-1, len(SHOWN))
+
+    def set(self, key: str, value: float) -> None:
+        """Moves a slider.
+
+        Raises:
+            InputError: none of that key, or a value out of range.
+        """
+        self.view.check(key, value)
+        self.state.values[key] = value
+        if key == "force":
+            self._run.loop.desired = value
+        self._run.engine.ground = self._surface
+
+    def seek(self, time: float) -> None:
+        """Runs on to a moment, as fast as it goes.
+
+        Raises:
+            InputError: it lies behind, or beyond a run's longest.
+        """
+        check_ahead(self._k * self._tick, time)
+        while self._k * self._tick < time - self.view.stride and not self.state.ended:
+            self.advance(min(1.0, time - self._k * self._tick))
+
+    @property
+    def _surface(self) -> Ground:
+        values = self.state.values
+        return self._ground._replace(
+            stiffness=values["stiffness"], friction=values["friction"], sticking=values["friction"]
+        )
+
+    def _step(self) -> None:
+        share, before = 1e-3 * self.state.values["speed"] / self._speed, self._run.ticks
+        try:
+            self._run.tick([share * cos(self._angle), share * sin(self._angle), 0.0], self._own)
+        except InputError as error:
+            self.state.ended = str(error)
+        self._k += 1
+        now = self._k * self._tick
+        if self._run.ticks and not before:
+            self.state.note(Happened(now, "slides"))
+        self._angle += self._own[PLACE["speed"]] * self._tick / self._radius
+        trouble = self._run.loop.trouble
+        if trouble and trouble != self.state.warning:
+            self.state.note(Happened(now, trouble.partition(":")[0], "fail"))
+        self.state.warning = trouble
+        if now >= LONGEST:
+            self.state.ended = OVER
+
+    def _row(self) -> Array:
+        own, values, row = self._own, self.state.values, np.full(len(SHOWN), np.nan)
+        n = own[PLACE["nx"] : PLACE["nz"] + 1]
+        slides = own[PLACE["sliding"]] == 1.0
+        known: dict[str, float] = {
+            "t": (self._k - 1) * self._tick,
+            "measured": float(own[PLACE["fx"] : PLACE["fz"] + 1] @ n),
+            "force": own[PLACE["normal_force"]],
+            "desired": values["force"] if slides else 0.0,
+            "depth": 1e3 * self._run.engine.slid.tip.depth,
+            "K_true": values["stiffness"],
+            "B_true": values["friction"],
+            "wall": self._at.place.place,
+            "phase": CONTACT if own[PLACE["normal_force"]] > 0.0 else 0.0,
+        }
+        if slides:
+            felt, std = own[PLACE["stiffness"]], own[PLACE["stiffness_std"]]
+            times = 1.0 / (1.0 - felt / self._series)  # encoders before a spring see the surface through it
+            known |= {"K": felt * times, "K_half": Z_95 * std * times**2}
+            known |= {"B": own[PLACE["mu"]], "B_half": Z_95 * own[PLACE["mu_std"]]}
+        row[[AT[name] for name in known]] = list(known.values())
+        row[AT["q1"] : AT["q1"] + self._at.arm.joints] = self._run.tip.truth.q
+        return row

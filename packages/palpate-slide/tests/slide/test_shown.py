@@ -1,0 +1,111 @@
+"""Slides as they are shown: the film, the page and the live page."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from palpate.errors import InputError
+from palpate.force import Gains, load_arm
+from palpate.force.gains import gains_for
+from palpate.force.slide_table import Slide
+from palpate.force.sliding.paths import directions
+from palpate_live.view import AT
+from palpate_slide.film import FRAMES, slide_film
+from palpate_slide.ground import Ground, ground_of, outside, surface_height
+from palpate_slide.jointed_arm import jointed_arm
+from palpate_slide.report import sentence, summarise, write_report
+from palpate_slide.watched import WatchedSlide
+from palpate_slide.world import COLUMNS, Vec3, simulate
+
+
+def tuned(arm: str = "ur5e", **others: float) -> Gains:
+    return replace(gains_for(load_arm(arm), 15.0, cap=4e4), slide=Slide(speed=0.03, mu_max=0.9, **others))
+
+
+@pytest.fixture(scope="module")
+def slid() -> tuple[np.ndarray, Gains, Ground]:
+    gains, ground = tuned(), ground_of("bowl", 0.12, 2e4, friction=0.4)
+    return simulate(gains, ground, directions("circle", 2.0, gains.arm.rate, 0.03, 0.04)), gains, ground
+
+
+@pytest.mark.parametrize("shape", ["plane", "sphere", "bowl", "cylinder", "saddle", "waves", "eggs"])
+def test_the_height_of_a_surface_is_on_it(shape: str) -> None:
+    ground = ground_of(shape, 0.12, 2e4)
+    for x, y in ((0.0, 0.0), (0.03, -0.02), (-0.05, 0.05)):
+        assert abs(outside(ground, Vec3(x, y, surface_height(ground, x, y)))[0]) < 1e-6
+    assert np.isnan(surface_height(ground_of("sphere", 0.1, 2e4), 0.2, 0.0))
+
+
+def test_a_film_moves_along_the_path(slid) -> None:
+    rows, gains, ground = slid
+    film = ElementTree.fromstring(slide_film(rows, gains.arm.tick, ground))
+    moving = [one for one in film.iter() if one.tag.endswith("animate")]
+    assert len(moving) == 10
+    frames = [one.get("values").split(";") for one in moving]
+    assert {len(one) for one in frames} == {FRAMES}
+    assert not any("nan" in value for one in frames for value in one)
+    gone = next(
+        values
+        for one, values in zip(moving, frames, strict=True)
+        if one.get("attributeName") == "stroke-dashoffset"
+    )
+    assert (float(gone[0]), float(gone[-1])) == (1.0, 0.0)
+
+
+def test_a_film_of_a_surface_that_was_never_touched_is_one(slid) -> None:
+    rows, gains, ground = slid
+    before = rows[:50]
+    assert not before[:, COLUMNS.index("normal_force")].any()
+    assert "did not slide" in slide_film(before, gains.arm.tick, ground)
+    summary = summarise(before, gains, ground)
+    assert summary["end"] == "no contact"
+    assert "never touched" in sentence(summary)
+
+
+def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:
+    rows, gains, ground = slid
+    summary = summarise(rows, gains, ground) | {"command": "palpate slide", "seed": 0}
+    write_report(rows, gains, ground, summary, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert '<p class="lead">15 N held within' in page
+    assert page.count('data-panels="') == 2
+    assert "image/svg+xml" in page
+
+
+def test_a_watched_slide_shows_what_it_does_and_takes_sliders() -> None:
+    pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
+    arm, gains = jointed_arm("fr3"), tuned("fr3")
+    gains = replace(gains, arm=arm.inner)
+    watched = WatchedSlide(arm, gains, ground_of("bowl", 0.15, 2e4, friction=0.3), 0.03, (0.0, 0.0, -1.0))
+    rows = watched.advance(0.2)
+    assert len(rows) == 40
+    assert np.diff(rows[:, AT["t"]]) == pytest.approx(0.005)
+    assert np.isfinite(rows[:, AT["q1"] : AT["q7"] + 1]).all()
+    watched.set("friction", 0.5)
+    watched.set("force", 10.0)
+    row = watched.advance(0.01)[-1]
+    assert (row[AT["B_true"]], row[AT["K_true"]]) == (0.5, 2e4)
+    assert watched.bones(row).shape == (9, 3)
+    for wrong in (("friction", 2.0), ("gain", 1.0)):
+        with pytest.raises(InputError):
+            watched.set(*wrong)
+    watched.reset(3)
+    assert watched.advance(0.01)[0, AT["t"]] < 0.01
+
+
+@pytest.mark.long
+def test_a_watched_slide_holds_the_force_around_its_circle() -> None:
+    pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
+    arm, gains = jointed_arm("fr3"), tuned("fr3")
+    watched = WatchedSlide(
+        arm, replace(gains, arm=arm.inner), ground_of("bowl", 0.15, 2e4, friction=0.3), 0.03, (0.0, 0.0, -1.0)
+    )
+    rows = watched.advance(5.0)
+    last = rows[-200:]
+    assert last[:, AT["force"]] == pytest.approx(15.0, rel=0.03)
+    assert (np.abs(last[:, AT["B"]] - 0.3) < last[:, AT["B_half"]]).mean() > 0.9
+    assert any(one.text == "slides" for one in watched.state.happened)

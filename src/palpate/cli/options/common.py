@@ -1,0 +1,253 @@
+"""Groups of options that several commands have: names, files to write, figures, consent to run code."""
+
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Group, Parameter
+
+from palpate.cli._terminal import confirmed, console, print_lines
+from palpate.cli.options.values import FLAG
+from palpate.errors import InputError
+from palpate.files import check_place
+from palpate.text import printable
+
+if TYPE_CHECKING:
+    from palpate.bench.toml_parts import TomlFiles
+
+
+QUIET = Parameter(show_choices=False)
+"""An option whose names are completed, and not listed in the help."""
+MODELS = (
+    "kelvin-voigt",
+    "kelvin-voigt-mass",
+    "standard-linear-solid",
+    "hunt-crossley",
+    "quasi-linear-viscoelastic",
+)
+"""Those of `palpate.identification.models`, which the help does not import."""
+
+
+def _known_names(*names: str) -> Any:
+    """One of these names, or another."""
+    return Literal[names] | str
+
+
+def shipped_names(*folders: str, package: Path = Path(__file__).parents[2]) -> Any:
+    """One of the names of the TOML files in some folders of a package, or another."""
+    files = [path for folder in folders for path in (package / folder).glob("*.toml")]
+    return _known_names(*sorted(path.stem for path in files))
+
+
+if TYPE_CHECKING:
+    Controller = str
+    Experiment = str
+    LoopArm = str
+    Model = str
+    Mode = str
+    Physics = str
+    Preset = str
+    SerialArm = str
+else:
+    Controller = _known_names("cautious", "hybrid", "proportional-integral", "impedance")
+    Experiment = shipped_names("bench/experiments", "bench/presses")
+    LoopArm = shipped_names("force/arms")
+    Model = _known_names(*MODELS)
+    Mode = _known_names("torque", "position")
+    Physics = _known_names("own", "mujoco")
+    Preset = shipped_names("logs/presets")
+    SerialArm = shipped_names("robots/serial/arms")
+
+
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+
+
+@Parameter(name="*", group=Group("Known names", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class KnownOptions:
+    """List or print, without a run."""
+
+    list_: Annotated[bool, FLAG, Parameter(name="--list")] = False
+    "List the known names and stop."
+    print_: Annotated[bool, FLAG, Parameter(name="--print")] = False
+    "Print the named file, to copy and edit, and stop."
+
+
+@Parameter(name="*", group=Group("Output", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class FolderOptions:
+    """The folder of results."""
+
+    out: Path | None = None
+    "Folder for results; when left out, one in runs/ with the name of the run."
+    replace: Annotated[bool, FLAG] = False
+    "Replace existing results."
+    json: Annotated[bool, FLAG] = False
+    "Print the summary as JSON and nothing else."
+
+
+def print_names(files: "TomlFiles", title: Callable[[str], str]) -> None:
+    """Print the names that come with palpate, each with its title."""
+    width = 2 + max(map(len, files.names()))
+    for name in files.names():
+        print_lines(f"{name:<{width}}{title(name)}")
+
+
+def source_of(files: "TomlFiles", name: str | None, verb: str, printed: bool) -> str | None:
+    """The text of the named file; None if it was only printed.
+
+    Raises:
+        InputError: no name, or an unknown one.
+    """
+    if name is None:
+        raise InputError(
+            f"no {files.kind} is named; name one (palpate {verb} --list lists them) or a TOML file"
+        )
+    source = files.source(name)
+    if not printed:
+        return source
+    sys.stdout.write(printable(source))
+    return None
+
+
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+
+
+# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+
+
+WRITTEN = Group("Output", sort_key=6)
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class JsonOption:
+    """An answer for programs."""
+
+    json: Annotated[bool, FLAG] = False
+    "Print one JSON object and nothing else."
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class ReportOption:
+    """A page with all results."""
+
+    report: Path | None = None
+    "Where to write a page with all results, an HTML file."
+
+    def page(self) -> Path | None:
+        """Path of the page, checked before any work is done."""
+        if self.report is not None:
+            check_place(self.report, "--report", ending=".html")
+        return self.report
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class FileOptions(JsonOption):
+    """A file of results."""
+
+    out: Path | None = None
+    "Where to write the result."
+    replace: Annotated[bool, FLAG] = False
+    "Replace the file at --out."
+
+    def check_new(self, path: Path | None, option: str = "--out", ending: str = "") -> None:
+        """Check a path before any work is done; an existing file is refused unless it is to be replaced.
+
+        Raises:
+            InputError: in one line.
+        """
+        if path is None:
+            return
+        check_place(path, option, ending=ending)
+        if path.exists() and not self.replace:
+            raise InputError(f"{path} exists; choose another place, or add --replace")
+
+
+@Parameter(name="*", group=WRITTEN)
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions(ReportOption, JsonOption):
+    """A figure, a page, an answer for programs."""
+
+    figure: Path | None = None
+    no_figure: Annotated[bool, FLAG] = False
+    "Write no figure."
+    json: Annotated[bool, FLAG] = False
+    "Print one JSON object and nothing else; a figure is written only if --figure is given."
+
+    def picture(self, default: str, endings: tuple[str, ...] = (".png",)) -> Path | None:
+        """Path of the figure, checked before any work is done."""
+        if self.no_figure or (self.figure is None and self.json):
+            return None
+        path = self.figure or Path(default)
+        ending = path.suffix.lower()
+        check_place(path, "--figure", ending=ending if ending in endings else endings[0])
+        return path
+
+
+DRAWN = Group("Figures", sort_key=4)
+
+
+@Parameter(name="*", group=DRAWN)
+@dataclass(frozen=True, kw_only=True)
+class FigureOptions:
+    """How figures are written."""
+
+    figures: Annotated[
+        tuple[str, ...], Parameter(negative=(), show_default=", ".join, consume_multiple=True)
+    ] = ("png",)
+    "Formats: png, svg, pdf, one or more."
+    dpi: int | None = None
+    "Of a PNG; 110 if not given."
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """Of the figures' files."""
+        return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
+
+    def check(self) -> None:
+        """Check that the figures can be written, before any work is done."""
+        from palpate.report.style import FORMATS, check_dpi
+
+        check_dpi(self.dpi)
+        for ending in self.endings:
+            if ending not in FORMATS:
+                raise InputError(
+                    f"--figures must be of {', '.join(kind[1:] for kind in FORMATS)}, got {ending[1:]!r}"
+                )
+
+
+@Parameter(name="*", group=Group("Your own code", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class PluginOptions:
+    """Consent to run code."""
+
+    plugins: Annotated[bool, FLAG] = False
+    """Import and run the code that the file names, kind = "module:Class", with your rights. Without it, a
+    question is asked at a terminal; elsewhere such a file is refused."""
+
+    @contextmanager
+    def consent(self, given: str = "") -> Iterator[None]:
+        """Within the block, names of code are imported if the user agrees.
+
+        Args:
+            given: a name on the command line itself, which is the user's own word.
+        """
+        from palpate.plugins import consent
+
+        with consent(lambda name: self.plugins or name == given or _asked(name)):
+            yield
+
+
+def _asked(name: str) -> bool:
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    return confirmed(
+        console(stderr=True), f"the file names code, {name}, which runs with your rights. Run it?"
+    )

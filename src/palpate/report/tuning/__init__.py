@@ -1,1 +1,0 @@
-"""A tuned force loop: its table, its page, its looks in Python."""
