@@ -307,5 +307,5 @@ def foreign(cell, body, touch, tip, setpoint, time, noise):
     return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 
 
-compiled_tick = kernel(tick, superword=True)
+compiled_tick = kernel(tick)
 compiled_foreign = kernel(foreign)
