@@ -6,8 +6,8 @@ The measurand is the certified model's least-squares parameters. By the GUM a st
 standard deviation, the root of s^2 (J^T J)^-1. By Monte Carlo the force is drawn again, the certified model's with
 normal noise of the certified residual standard deviation, each draw is fitted by Gauss and Newton, and the standard
 uncertainty is the standard deviation of the fits. Each row has the parameter whose ratio of the two is farthest from
-1, then the shares of draws in the 95 % intervals of the GUM, least and most over the parameters. The standard error of a
-ratio is 1/sqrt(2 draws).
+1, then the shares of draws in the 95 % intervals of the GUM, least and most over the parameters. The standard error of
+a ratio is 1/sqrt(2 draws).
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ def fits(problem: CertifiedProblem, draws: int) -> tuple[Array, Array, Array]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--draws", type=int, default=4000)
     parser.add_argument("--logs", default=".", help="regular expression of their names")
     asked = parser.parse_args()
@@ -89,8 +91,8 @@ def main() -> None:
         print(f"{problem.name:26}{name:>11}{ratios[j]:20.3f}{held.min():11.1%} to {held.max():.1%}")
     close = sum(w <= CLOSE for w in worst)
     print(
-        f"\n{close} of {len(worst)} logs within {CLOSE:.0%} in every parameter, {max(worst):.1%} off at most; {asked.draws} draws,"
-        f" standard error of a ratio {1.0 / np.sqrt(2.0 * asked.draws):.3f}"
+        f"\n{close} of {len(worst)} logs within {CLOSE:.0%} in every parameter, {max(worst):.1%} off at most;"
+        f" {asked.draws} draws, standard error of a ratio {1.0 / np.sqrt(2.0 * asked.draws):.3f}"
     )
 
 
