@@ -54,8 +54,8 @@ def test_what_encoders_do_not_see_grows_until_they_see_it():
     """Why presses on two engines drift apart where encoders are coarse: between two counts nobody holds the arm.
 
     It then falls like an inverted pendulum, and the last bit of a sum grows with it. The same arm on the same engine,
-    one joint moved by some ten picometres, drifts apart from itself in the same way, unless all counts happen to stay the
-    same: the larger the move, the likelier one of them does not.
+    one joint moved by some ten picometres, drifts apart from itself in the same way, unless all counts happen to stay
+    the same: the larger the move, the likelier one of them does not.
     """
 
     def apart(resolution, physics="own", nudge=0.0):
