@@ -178,7 +178,9 @@ def main() -> None:
     print("| engine | us a tick | times palpate's | times real time |\n|---|---|---|---|")
     for name, tick in costs.items():
         print(f"| {name} | {1e6 * tick:.1f} | {tick / ours:.1f} | {TICK / tick:.2f} |")
-    print(f"\nPressing with {FORCE:g} N: {mujoco_bench():.2f} N in MuJoCo, {numpy_bench():.2f} N in NumPy.")
+    print(
+        f"| force after it, {FORCE:g} N asked | {mujoco_bench():.2f} N in MuJoCo | {numpy_bench():.2f} N in NumPy | |"
+    )
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ ADVICE = {
     Code.UNIT_STATED: "None, if the file is right; else say the unit, as in --force force_mN:mN.",
     Code.TIME_DOUBTFUL: "Say the unit of the time, as --time t:ms, or give --rate.",
     Code.LINES_SKIPPED: "Look at these lines; if they are rows, correct them and identify again.",
-    Code.COLUMNS_SWAPPED: "Check --position and --force; exchange them if they are swapped.",
+    Code.COLUMNS_SWAPPED: "Check --position and --force-column; exchange them if they are swapped.",
     Code.FRAME_GUESS: "Say it with --wrench-frame.",
     Code.NORMAL_UNCERTAIN: "Give the contact's normal, or press harder along it and slide less.",
 }
