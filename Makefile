@@ -1,6 +1,6 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long lint format check bench live attack soak figures figures-fast trust laboratory claims docs pictures lock clean
+.PHONY: help demo test test-long test-all lint format check bench live attack soak figures figures-fast trust laboratory claims docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
@@ -31,6 +31,9 @@ test: .venv/dev.stamp ## set up and run the tests, on all cores
 
 test-long: .venv/dev.stamp ## run the tests that take long: Monte-Carlo, whole figures of the thesis
 	$(PYTEST) -m long
+
+test-all: .venv/dev.stamp ## run the tests of `make test` and of `make test-long`, in one go
+	$(PYTEST) -m "long or not long"
 
 lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff check

@@ -174,7 +174,7 @@ def mute(address, answers):
 def test_ctrl_c_ends_it_at_once_though_a_ur_accepts_and_never_answers(tmp_path, answers):
     """ur-rtde itself would hold the interpreter, and no Ctrl-C would be heard."""
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
-    address = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.44"
+    address = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.{44 + answers}"
     cell(tmp_path)
     words = ["press", "--wire", f"rtde:{address}", "--gains", "gains.toml", *WORDS, "--dry-run"]
     command = [sys.executable, "-m", "palpate", *words]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.cli import _streams
 from palpate.cli._program import command, print_answer
 from palpate.cli._terminal import print_lines, say
+from palpate.cli.options.common import PluginOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, task_of
 from palpate.errors import InputError
 
@@ -40,6 +41,7 @@ def press_over(
         InputError: a fault found before the arm moves.
     """
     from palpate.wires import checked, look, open_wire, recover
+    from palpate.wires.opening import name_of
 
     if options.recover is not None:
         print_lines(f"written: {recover(options.recover)}")
@@ -55,7 +57,8 @@ def press_over(
     assert asked.gains is not None
     order = checked(ForceLoop.load(asked.gains, options.certificate), replace(task, path=path), most)
     tool = asked.tool
-    arm = open_wire(str(options.wire))
+    with PluginOptions().consent(given=name_of(str(options.wire))[0] or ""):
+        arm = open_wire(str(options.wire))
     try:
         plan = _plan(arm, order, options.record)
         if not json:

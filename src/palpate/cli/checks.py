@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
+
 from palpate.cli._program import print_answer
 from palpate.cli._terminal import console, show_table
 from palpate.cli.options.common import JsonOption, PluginOptions
 from palpate.errors import InputError
 
+if TYPE_CHECKING:
+    from palpate.checks.check import Check
+
 
 def checks(
     name: str | None = None, /, *, own: PluginOptions | None = None, output: JsonOption | None = None
 ) -> int:
-    """Run palpate's conformance suite on your own controller, surface or identifier.
+    """Run palpate's conformance suite on your own controller, surface or identifier, or on the wire to your own robot.
 
     palpate checks student:Damped
+
+    palpate checks our_robot:OurWire?192.168.0.10
 
     Parameters
     ----------
     name
-        Your part, module:Class, or an experiment's TOML file that names some. The module is searched among the
+        Your part, module:Class, or an experiment's TOML file that names some; of a wire with ?WHERE behind it, its
+        robot switched on and at rest. The module is searched among the
         installed ones, beside the file and in the current folder. Its name here imports it; a name in a file only with
         --plugins.
     """
@@ -27,10 +36,10 @@ def checks(
             "nothing to check; give module:Class, as in student:Damped, or an experiment's TOML file"
         )
     from palpate.checks.check import outcomes
-    from palpate.checks.of_plugin import checks_of
 
-    with (own or PluginOptions()).consent(given=name):
-        found = {subject: list(outcomes(some)) for subject, some in checks_of(name).items()}
+    code = name.partition("?")[0]
+    with (own or PluginOptions()).consent(given=code):
+        found = {subject: list(outcomes(some)) for subject, some in _checks_of(name, code).items()}
     failed = sum(bool(one.failed) for some in found.values() for one in some)
     if output is not None and output.json:
         parts = {
@@ -48,3 +57,16 @@ def checks(
     total = sum(map(len, found.values()))
     screen.print(f"{failed} of {total} checks failed" if failed else f"all {total} checks hold")
     return 1 if failed else 0
+
+
+def _checks_of(name: str, code: str) -> dict[str, list[Check]]:
+    """The checks of a part, or of a wire with what is given to it, by what they are of."""
+    from palpate.checks.of_plugin import checks_of
+    from palpate.plugins import is_plugin, plugin
+
+    part: Any = plugin(code).value() if is_plugin(code) and not code.endswith(".toml") else None
+    if not all(hasattr(part, method) for method in ("read", "begin", "write", "stop")):
+        return checks_of(name)
+    for entry in entry_points(group="palpate.checks", name="wire"):
+        return {f"wire {name}": entry.load()(lambda: part(name.partition("?")[2]))}
+    raise InputError("the laws of a wire are those of palpate-rehearsal: pip install palpate[rehearsal]")

@@ -6,7 +6,6 @@
 - `.yaml`, ROS 2: the gravity compensation filter of control_toolbox (its parameters file: tool.mass, tool.CoG, which
   earlier releases call tool.pos, and tool.gravity_field), and gravity_compensation.CoG of the admittance controller of
   ros2_controllers, from the sensor.
-- `.toml`, palpate's own.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.contact_frame.free_motion import Vector
-from palpate.contact_frame.load import load_payload
 from palpate.contact_frame.signals_in_base import turn_of
 from palpate.contact_frame.tool_payload import Weighed
 from palpate.errors import InputError
@@ -39,12 +37,12 @@ class ToolLoad(NamedTuple):
     Args:
         mass: [kg].
         centre: of mass, from the flange or the sensor [m], shape (3,); None if the file has none.
-        axes: of the centre; palpate's own file counts from the point that the torque is about.
+        axes: of the centre.
     """
 
     mass: float
     centre: Array | None
-    axes: Literal["flange", "sensor", "own"] = "flange"
+    axes: Literal["flange", "sensor"] = "flange"
 
 
 class NumberOfLoad(NamedTuple):
@@ -139,7 +137,7 @@ def read_load(path: Path) -> ToolLoad:
     Raises:
         InputError: another kind of file, no load in it, or two that differ.
     """
-    kinds = {".script": _of_script, ".json": _of_json, ".yaml": _of_yaml, ".yml": _of_yaml, ".toml": _of_toml}
+    kinds = {".script": _of_script, ".json": _of_json, ".yaml": _of_yaml, ".yml": _of_yaml}
     if path.suffix not in kinds:
         raise InputError(
             f"{path}: a load file ends with .script (UR), .json (Franka), .yaml (ROS 2) or .toml"
@@ -193,11 +191,6 @@ def _of_yaml(path: Path) -> Iterator[ToolLoad]:
         places += place.values()
 
 
-def _of_toml(path: Path) -> Iterator[ToolLoad]:
-    payload = load_payload(path)
-    yield ToolLoad(payload.mass, None if payload.centre is None else np.array(payload.centre), "own")
-
-
 def _checked(path: Path, mass: Any, centre: Any, axes: Literal["flange", "sensor"] = "flange") -> ToolLoad:
     try:
         return ToolLoad(
@@ -233,8 +226,6 @@ def compare(found: Weighed, file: ToolLoad, flange: Vector, *, compensated: bool
 def _centre(found: Weighed, axes: str, flange: Vector) -> tuple[Array, Array]:
     """Centre of mass and the half-widths of its interval in the axes of a file [m], shape (3,) each."""
     centre = found.parameters["centre"]
-    if axes == "own":
-        return centre.value, centre.half
     turn = np.eye(3)
     if axes == "sensor" and found.payload is not None and found.payload.sensor_rpy is not None:
         turn = turn_of(found.payload.sensor_rpy)

@@ -1,4 +1,4 @@
-"""The process that holds a maker's library: `python -m palpate.wires.host KIND WHERE SOCKET`, started by `ApartWire`.
+"""The process that holds a maker's library, or a class of the user's: `python -m palpate.wires.host KIND WHERE SOCKET`.
 
 One thread reads the arm and hands its readings on; the other takes commands. If no command comes for twice the silence
 that the loop bears, or the loop's process has gone, the arm is brought to rest.
@@ -15,8 +15,9 @@ import threading
 from contextlib import suppress
 
 from palpate.errors import InputError
+from palpate.plugins import permit, plugin, reason
 from palpate.wires import realtime
-from palpate.wires.protocol import SILENCE, Hosted, LostError, SilentError
+from palpate.wires.protocol import SILENCE, LostError, SilentError, Wire
 
 _WAIT = 0.1
 """Between two looks of the reading thread at whether it is to end [s]."""
@@ -31,7 +32,7 @@ class Host:
         theirs: socket to the loop's process.
     """
 
-    def __init__(self, wire: Hosted, theirs: socket.socket):
+    def __init__(self, wire: Wire, theirs: socket.socket):
         self._wire, self._link = wire, theirs
         self._silence, self._moving = SILENCE, False
 
@@ -135,8 +136,12 @@ def prepare() -> None:
         os.dup2(2, 1)
 
 
-def open_hosted(kind: str, where: str) -> Hosted:
-    """The wire of an address, in this process."""
+def open_hosted(kind: str, where: str) -> Wire:
+    """The wire of an address, in this process; a kind `module:Class` was permitted in the loop's process."""
+    if ":" in kind:
+        permit(kind)
+        wire: Wire = plugin(kind).value()(where)
+        return wire
     if kind == "rtde":
         from palpate.wires.ur import RtdeWire
 
@@ -149,18 +154,23 @@ def open_hosted(kind: str, where: str) -> Hosted:
 def main() -> None:
     """Connect, say so, and serve until the loop's process has gone."""
     prepare()
-    kind, where, number = sys.argv[1:4]
+    kind, where, *path, number = sys.argv[1:]
+    sys.path += [folder for folder in path if folder not in sys.path]
     theirs = socket.socket(fileno=int(number))
     theirs.send(realtime.text(realtime.STARTED))
     try:
         wire = open_hosted(kind, where)
-        theirs.send(realtime.text(realtime.READY, f"{wire.title}\n{wire.watchdog}\n{wire.source}"))
+        theirs.send(
+            realtime.text(realtime.READY, f"{wire.title}\n{wire.watchdog}\n{getattr(wire, 'source', '')}")
+        )
         Host(wire, theirs).run()
         wire.close()
     except InputError as error:
         theirs.send(realtime.text(realtime.REFUSED, line(error)))
     except LostError as error:
         theirs.send(realtime.text(realtime.FAILED, line(error)))
+    except Exception as error:  # noqa: BLE001 - whatever a class of the user's raises
+        theirs.send(realtime.text(realtime.REFUSED, reason(error)))
     finally:
         os._exit(0)  # a maker's destructors may wait for a controller that has gone
 

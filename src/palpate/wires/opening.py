@@ -1,12 +1,18 @@
-"""From an address to a wire: KIND:WHERE, without any default."""
+"""From an address to a wire: KIND:WHERE without any default, or module:Class of one's own."""
 
 from __future__ import annotations
 
+import re
+import sys
+
 from palpate.errors import InputError, unknown
+from palpate.plugins import plugin
 from palpate.wires.protocol import Wire
 from palpate.wires.ros2 import FORM
 
 KINDS = {"sim": "sim:HOST:PORT", "rtde": "rtde:ADDRESS", "franka": "franka:ADDRESS", "ros2": FORM}
+_OWN = re.compile(r"([a-zA-Z_][\w.]*:[a-zA-Z_]\w*)(?:\?(.*))?")
+"""`module:Class?WHERE`: a class of the user's."""
 
 
 def open_wire(address: str) -> Wire:
@@ -16,13 +22,31 @@ def open_wire(address: str) -> Wire:
         InputError: an address that is none, a library that is missing, an arm that does not answer.
     """
     kind, colon, where = address.partition(":")
+    name, own = name_of(address)
+    if name is not None:
+        return _own(name, own)
     if kind not in KINDS:
-        raise unknown("wire", kind, KINDS)
+        raise unknown("wire", kind, [*KINDS, "module:Class"])
     if not colon or not where.strip():
         raise InputError(
             f"--wire needs the arm's address, as {KINDS[kind]}, got {address!r}; there is no default"
         )
     return _OPENERS[kind](where.strip())
+
+
+def name_of(address: str) -> tuple[str | None, str]:
+    """The code that an address names, `module:Class`, and what is given to it; None of a wire that palpate has."""
+    found = _OWN.fullmatch(address)
+    if found is None or address.partition(":")[0] in KINDS:
+        return None, ""
+    return found[1], found[2] or ""
+
+
+def _own(name: str, where: str) -> Wire:
+    from palpate.wires.apart import ApartWire
+
+    path = [folder for folder in (plugin(name).folder, *sys.path) if folder]
+    return ApartWire("host", [name, where, *path], f"{name} does not open its arm")
 
 
 def _sim(where: str) -> Wire:

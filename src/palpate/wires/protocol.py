@@ -149,12 +149,3 @@ class Wire(Protocol):
     def close(self) -> None:
         """Let go of the wire; never raises."""
         ...
-
-
-class Hosted(Wire, Protocol):
-    """A wire that `host` runs in a process of its own."""
-
-    @property
-    def source(self) -> str:
-        """Where its readings come from, as ` at /wrench`; may be empty."""
-        ...

@@ -15,7 +15,7 @@ from palpate.errors import InputError
 from palpate.wires.apart import ApartWire
 from palpate.wires.at_rest import turned
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError, Triple
-from palpate.wires.ros2_tool import JointTool, PoseTool, Tool, seconds
+from palpate.wires.ros2_tool import JointTool, PoseTool, seconds
 
 FORM = "ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=reaction"
 _KEPT = 32
@@ -129,7 +129,7 @@ class DdsWire:
 
         self._messages: Any = ros2_messages
         self._topics, self._domain = topics, domain
-        self._tool: Tool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
+        self._tool: JointTool | PoseTool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
         self._ends = _open(domain, topics, ros2_messages)
         self._last, self._silence = -1.0, _PATIENCE
         self._command: Any = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,25 +12,6 @@ from palpate.wires.protocol import LostError, Quaternion, Triple
 
 _NEARLY = 0.02
 """Smallest singular value of the Jacobian at which joints are still moved [m]: there 20 mm/s take a joint 1 rad/s."""
-
-
-class Tool(Protocol):
-    """The newest message of one kind."""
-
-    stamp: float | None
-    frame: str
-
-    def take(self, sample: Any) -> None:
-        """A message has come."""
-        ...
-
-    def place(self) -> tuple[Triple, Quaternion]:
-        """Position [m] and orientation in the arm's base, by the newest message."""
-        ...
-
-    def speeds(self, velocity: Triple) -> list[float]:
-        """Of the joints, by which the tool moves with this velocity [m/s] and does not turn [rad/s, m/s]."""
-        ...
 
 
 class PoseTool:

@@ -7,7 +7,6 @@ import secrets
 import socket
 import struct
 import time
-from typing import NamedTuple
 
 from palpate.errors import InputError
 from palpate.wires.protocol import SILENCE, Command, LostError, Sense, SilentError
@@ -19,14 +18,6 @@ _HEAD = struct.Struct("<8sBI")
 _STATE = struct.Struct("<Id13d")
 _MOVE = struct.Struct("<I3d")
 _WELCOME = struct.Struct("<d")
-
-
-class State(NamedTuple):
-    """A reading: its number, the arm's time [s], force [N], torque [N m], position [m], quaternion."""
-
-    number: int
-    time: float
-    values: tuple[float, ...]
 
 
 def pack(kind: int, session: int, body: bytes = b"") -> bytes:
@@ -49,12 +40,12 @@ def state(number: int, time: float, values: tuple[float, ...]) -> bytes:
     return _STATE.pack(number, time, *values)
 
 
-def read_state(body: bytes) -> State | None:
-    """A reading; None of a body that is none."""
+def read_state(body: bytes) -> tuple[int, float, tuple[float, ...]] | None:
+    """A reading's number, the arm's time [s], force, torque, position, quaternion; None of a body that is none."""
     if len(body) != _STATE.size:
         return None
     number, time, *values = _STATE.unpack(body)
-    return State(number, time, tuple(values))
+    return number, time, tuple(values)
 
 
 def move(number: int, velocity: tuple[float, float, float]) -> bytes:
@@ -175,12 +166,11 @@ class SimWire:
         found = unpack(data)
         if found is None or found[0] != STATE or found[1] != self._session:
             return None
-        state = read_state(found[2])
-        if state is None or state.number <= self._last or not math.isfinite(state.time):
+        number, stamp, v = read_state(found[2]) or (-1, math.nan, ())
+        if number <= self._last or not math.isfinite(stamp):
             return None
-        self._last = state.number
-        v = state.values
-        return Sense(received, state.time, v[0:3], v[3:6], v[6:9], v[9:13])  # type: ignore[arg-type]
+        self._last = number
+        return Sense(received, stamp, v[0:3], v[3:6], v[6:9], v[9:13])  # type: ignore[arg-type]
 
     def tare(self) -> None:
         """The simulated sensor has no zero of its own."""

@@ -146,7 +146,7 @@ class WireOptions:
     wire: str | None = None
     """rtde:ADDRESS of a UR, franka:ADDRESS, sim:HOST:PORT of a simulated arm in another process, or
     ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one
-    word. There is no default."""
+    word; or module:Class?WHERE, the wire to your own robot. There is no default."""
     dry_run: Annotated[bool, FLAG] = False
     "Read the arm, print the planned motion, and end: nothing moves."
     yes: Annotated[bool, FLAG] = False

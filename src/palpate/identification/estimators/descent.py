@@ -21,6 +21,9 @@ _ROUNDING = 1e-9
 _UNDAMPED = 1e-9
 """Damping from which a step is whole in every direction: a damped one gains little where parameters are confounded."""
 
+_FOURTH_ORDER = ((2 / 3, 1), (-2 / 3, -1), (-1 / 12, 2), (1 / 12, -2))
+"""Weights of a derivative, over the step, and their places in steps."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -99,8 +102,10 @@ class Descent:
             step = _damped_step(jacobian, residuals, len(point.theta), damping)
             trial = self.at(*_move(point, outer, step[len(point.theta) :]))
             gain = 1 - trial.cost / point.cost if point.cost else 0.0
-            if gain > -_ROUNDING:
-                point, damping = (trial if gain > 0 else point), max(damping / 10, _UNDAMPED)
+            if (
+                gain > -_ROUNDING
+            ):  # the gradient has more digits than the cost: what is rounding of it is taken
+                point, damping = trial, max(damping / 10, _UNDAMPED)
                 if gain < _CONVERGED and damping <= _UNDAMPED:
                     break
             else:
@@ -140,9 +145,11 @@ class Descent:
                 continue
             value = point.nonlinear[parameter.name]
             step = parameter.step * value if parameter.logarithmic else parameter.step
-            beside = ({**point.nonlinear, parameter.name: at} for at in (value + step, value - step))
-            up, down = (np.column_stack(self.model.columns(self.motion, b, point.lag)) for b in beside)
-            found.append((up - down) @ point.theta / (2 * parameter.step))
+            beside = [(w, {**point.nonlinear, parameter.name: value + k * step}) for w, k in _FOURTH_ORDER]
+            columns = (
+                w * np.column_stack(self.model.columns(self.motion, at, point.lag)) for w, at in beside
+            )
+            found.append(sum(columns) @ point.theta / parameter.step)
         return np.column_stack(found)
 
 
