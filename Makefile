@@ -56,7 +56,6 @@ bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold s
 	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
 	$(BIN)/python benchmarks/arms/tick.py
-	$(BIN)/python benchmarks/arms/first_press.py
 
 live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
 	$(BIN)/python benchmarks/live/measure.py

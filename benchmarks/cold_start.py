@@ -3,6 +3,7 @@
 Seconds of the processor stand beside those of the clock: they are what is left when nothing else runs.
 """
 
+import argparse
 import os
 import subprocess
 import sys
@@ -11,8 +12,19 @@ from pathlib import Path
 
 from compiling import LISTED, SPENT, listed
 
+import palpate.bench
+
 COLD, WARM, RUN = 10.0, 0.6, 2.0
 """Budgets [s]: to compile the whole tick, to load it from the cache, and for `palpate run` of ten seconds."""
+FIRST_PRESS, NEXT_PRESS = 12.0, 1.0
+"""Budgets of a press [s]."""
+PRESS = """
+import time
+from palpate.press.prepare import Question, prepared, surface_of
+wall, cpu = time.perf_counter(), time.process_time()
+prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
+print(time.perf_counter() - wall, time.process_time() - cpu)
+"""
 FIRST_CALL = """
 import time
 from palpate.bench import build, load
@@ -67,25 +79,43 @@ def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]
     return float(wall), float(cpu)
 
 
-def told(what: str, seconds: tuple[float, float], budget: float) -> None:
+def row(title: str, seconds: tuple[float, float], budget: float) -> str:
     wall, cpu = seconds
-    print(f"{what:58}{wall:7.2f} s{cpu:9.2f} s of the processor; the budget is {budget:g} s")
+    return f"| {title} | {wall:.2f} s | {cpu:.2f} s | {budget:g} s |"
 
 
 def main() -> None:
-    import palpate.bench
-
-    experiments = Path(palpate.bench.__file__).parent / "experiments"
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5, help="of what is not compiled")
+    parser.add_argument(
+        "--where", action="store_true", help="print the causes by stage and by function instead"
+    )
+    parser.add_argument("--brief", action="store_true", help="one loop, compiled and from the cache")
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         cache = {"NUMBA_CACHE_DIR": str(Path(folder) / "cache"), "MPLBACKEND": "Agg"}
-        for name in ("foam-hybrid", "foam-neural"):
+        if given.where:
+            print(listed(ran(WHERE, **cache), "the loop of foam-neural"))
+            return
+        print("| | clock | processor | wanted |\n|---|---|---|---|")
+        for name in ("foam-hybrid", "foam-neural")[: 1 if given.brief else 2]:
             code = FIRST_CALL.format(name=name)
-            told(f"the loop of {name}, compiled", child(code, **cache), COLD)
-            told(f"the loop of {name}, from the cache", min(child(code, **cache) for _ in range(5)), WARM)
-        anew = {**cache, "NUMBA_CACHE_DIR": str(Path(folder) / "another")}
-        print(listed(ran(WHERE, **anew), "the loop of foam-neural"))
-        ten = [child(TEN_SECONDS, str(experiments / "foam-hybrid.toml"), folder, **cache) for _ in range(5)]
-        told("palpate run, 10 s on the bench, with record and report", min(ten), RUN)
+            print(row(f"{name}, compiled", child(code, **cache), COLD))
+            again = min(child(code, **cache) for _ in range(given.repeats))
+            print(row(f"{name}, from the cache", again, WARM))
+        if given.brief:
+            return
+        for title, budget, repeats in (("first", FIRST_PRESS, 1), ("next", NEXT_PRESS, given.repeats)):
+            print(
+                row(
+                    f"`palpate press`, the {title}",
+                    min(child(PRESS, **cache) for _ in range(repeats)),
+                    budget,
+                )
+            )
+        experiment = Path(palpate.bench.__file__).parent / "experiments" / "foam-hybrid.toml"
+        ten = min(child(TEN_SECONDS, str(experiment), folder, **cache) for _ in range(given.repeats))
+        print(row("`palpate run`, ten seconds on the bench, with figures and report", ten, RUN))
 
 
 if __name__ == "__main__":

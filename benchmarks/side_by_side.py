@@ -7,6 +7,7 @@ friction, encoders, the sensor's chain, three estimators and a record as well.
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -161,20 +162,25 @@ def cost(run: Callable[[int], float], ticks: int, repeats: int) -> float:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5)
+    repeats = parser.parse_args().repeats
     bench = build(load("foam-hybrid"))
     numpy_bench, mujoco_bench = InNumPy(), InMuJoCo()
     engines = {
-        "palpate, compiled": (marching(bench.loop, bench.q, compiled_march), LONG, 9),
-        "MuJoCo, control loop in Python": (ticking(mujoco_bench), LONG, 5),
-        "the bench in NumPy, step by step": (ticking(numpy_bench), SHORT, 3),
-        "palpate, plain Python, for a debugger": (marching(bench.loop, bench.q, march), SHORT, 3),
+        "palpate, compiled": (marching(bench.loop, bench.q, compiled_march), LONG),
+        "MuJoCo under a control loop in Python": (ticking(mujoco_bench), LONG),
+        "the bench in NumPy, step by step": (ticking(numpy_bench), SHORT),
+        "palpate in plain Python, for a debugger": (marching(bench.loop, bench.q, march), SHORT),
     }
-    costs = {name: cost(*given) for name, given in engines.items()}
+    costs = {name: cost(run, ticks, repeats) for name, (run, ticks) in engines.items()}
     ours = costs["palpate, compiled"]
-    print(f"{'engine':40}{'us a tick':>10}{'ratio':>8}{'times real time':>17}")
+    print("| engine | us a tick | times palpate's | times real time |\n|---|---|---|---|")
     for name, tick in costs.items():
-        print(f"{name:40}{1e6 * tick:10.1f}{tick / ours:8.1f}{TICK / tick:17.2f}")
-    print(f"pressing with {FORCE:g} N: {mujoco_bench():.2f} N in MuJoCo, {numpy_bench():.2f} N in NumPy")
+        print(f"| {name} | {1e6 * tick:.1f} | {tick / ours:.1f} | {TICK / tick:.2f} |")
+    print(
+        f"| force after it, {FORCE:g} N asked | {mujoco_bench():.2f} N in MuJoCo | {numpy_bench():.2f} N in NumPy | |"
+    )
 
 
 if __name__ == "__main__":

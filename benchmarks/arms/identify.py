@@ -8,7 +8,7 @@ import argparse
 from itertools import product
 
 from palpate.press.engines import MODES
-from palpate.press.prepare import Question, prepared, surface_of
+from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.press.summary import summarise
 from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names
@@ -22,7 +22,7 @@ HEAD = (
 
 def pressed(arm: str, mode: str, stiffness: float, seed: int) -> dict:
     surface = surface_of(f"K={stiffness},B={DAMPING}")
-    pressing = prepared(Question(arm=arm, force=FORCE, surface=surface, mode=mode, seed=seed))
+    pressing = prepare_press(Question(arm=arm, force=FORCE, surface=surface, mode=mode, seed=seed))
     return summarise(pressing.run(), pressing.asked)
 
 

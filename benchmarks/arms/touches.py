@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.bench.force_input import CONTACT
 from palpate.force import gains
-from palpate.press.prepare import Question, prepared, surface_of
+from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.robots.serial.from_toml import names
 
 STIFFNESSES, DAMPING, FORCE, SECONDS = (5e3, 2e4, 6e4, 1e5, 2e5, 5e5), 50.0, 20.0, 1.0
@@ -21,7 +21,7 @@ def overshoot(arm: str, stiffness: float, seed: int) -> float:
     question = Question(
         arm=arm, force=FORCE, surface=surface, mode="position", seconds=SECONDS, probe=0.0, seed=seed
     )
-    record = prepared(question).run()
+    record = prepare_press(question).run()
     touched = int(np.argmax(record["phase"] == CONTACT))
     return max(float((record["force"] - FORCE)[touched:].max()), 0.0)
 

@@ -9,6 +9,7 @@ typedef struct { v3 length, mass, com, moment, limits, rotor; } arm_t;
 typedef struct { v3 sigma0, sigma1, sigma2, coulomb, fixed, stribeck; double asymmetry; } friction_t;
 typedef struct { double stiffness, damping, mass; } surface_t;
 typedef struct { double stiffness, damping, friction; } side_t;
+typedef struct { double mobility, frequency, damping; } mode_t;
 typedef struct { double bits, full_scale; } converter;
 typedef struct { double bits; v3 full_scale; } converter3;
 typedef struct { v3 theta; m3 P; double forgetting; } squares_t;
@@ -20,6 +21,8 @@ typedef struct {
     surface_t surface;
     side_t side;
     double wall;
+    mode_t mode;
+    double beyond;
     v3 counts, offset;
     biquad analog1, analog2;
     converter sensor;

@@ -5,8 +5,9 @@
 #include "arm.h"
 
 typedef struct { double deflection, rate; int contact; } surface_state;
-typedef struct { v3 q, qd, bristles; surface_state surface; double bend; } plant_state;
-typedef struct { double normal, tangential, penetration, rate; v3 friction; } touch_t;
+typedef struct { double bend, rate; } mode_state;
+typedef struct { v3 q, qd, bristles; surface_state surface; double bend; mode_state mode; } plant_state;
+typedef struct { double normal, tangential, penetration, inertial, rate; v3 friction; } touch_t;
 typedef struct { memory first, second; double computing, held; memory line_filter; double line; } sensor_state;
 
 INLINE double joint_friction(double s0, double s1, double s2, double coulomb, double fixed, double stribeck, double asymmetry,
@@ -47,29 +48,34 @@ INLINE touch_t plant_step(const numbers *n, plant_state *s, v3 torque, double dt
     arm_model model = model_of(&n->arm, d, s->qd);
     solver inertia = solver_of(model.M);
     v3 normal = model.J.r1, along = model.J.r2;
-    double p = dot(n->arm.length, d.c) - n->wall;
+    mode_state bent = s->mode;
+    double p = dot(n->arm.length, d.c) + bent.bend - n->wall, before = dot(normal, s->qd);
     touch_t felt;
     felt.friction = friction_step(&n->friction, &s->bristles, s->qd, dt);
     v3 drive = sub(sub(torque, model.h), felt.friction), per_normal = solved(inertia, normal);
-    double tip_mass = 1.0 / dot(normal, per_normal), force = 0.0, slide = 0.0;
+    double tip_mass = 1.0 / (dot(normal, per_normal) + n->mode.mobility), force = 0.0, slide = 0.0;
+    double springs_back = -n->mode.frequency * (2.0 * n->mode.damping * bent.rate + n->mode.frequency * bent.bend);
     if (s->surface.contact) {
-        double v = dot(normal, s->qd) - 0.5 * dt * model.Jdqd.x, B = n->surface.damping;
+        double v = before + bent.rate - 0.5 * dt * model.Jdqd.x, B = n->surface.damping;
         double elastic = n->surface.stiffness * p + B * v;
         double damping = (n->surface.stiffness * p + B * (v + 1e-3) - elastic) / 1e-3;
         double opposed = n->surface.mass + 0.5 * dt * damping, share = tip_mass / (tip_mass + opposed);
-        double a = dot(normal, solved(inertia, drive)) + model.Jdqd.x;
+        double a = dot(normal, solved(inertia, drive)) + model.Jdqd.x + springs_back;
         force = (elastic + opposed * a) * share;
         slide = slide_step(&n->side, &s->bend, dot(along, s->qd), force, dt);
         drive = add(drive, scale(slide, along));
-        a = dot(normal, solved(inertia, drive)) + model.Jdqd.x;
+        a = dot(normal, solved(inertia, drive)) + model.Jdqd.x + springs_back;
         force = (elastic + opposed * a) * share;
     }
     double pressed = force > 0.0 ? force : 0.0, impulse = 0.0;
     s->qd = add(s->qd, scale(dt, sub(solved(inertia, drive), scale(pressed, per_normal))));
     s->q = add(s->q, scale(dt, s->qd));
+    s->mode.rate += dt * (springs_back - n->mode.mobility * pressed);
+    s->mode.bend += dt * s->mode.rate;
     v3 t = absolute(s->q);
-    p = n->arm.length.x * cos(t.x) + n->arm.length.y * cos(t.y) + n->arm.length.z * cos(t.z) - n->wall;
-    double v = dot(normal, s->qd);
+    p = n->arm.length.x * cos(t.x) + n->arm.length.y * cos(t.y) + n->arm.length.z * cos(t.z);
+    p += s->mode.bend - n->wall;
+    double v = dot(normal, s->qd) + s->mode.rate;
     if (force < 0.0) {
         s->bend = 0.0;
         s->surface.contact = 0;
@@ -85,12 +91,14 @@ INLINE touch_t plant_step(const numbers *n, plant_state *s, v3 torque, double dt
             s->surface.rate = common;
             s->surface.contact = 1;
             s->qd = sub(s->qd, scale(impulse, per_normal));
+            s->mode.rate -= n->mode.mobility * impulse;
         }
     }
     felt.normal = pressed + impulse / dt;
     felt.tangential = -slide;
     felt.penetration = p;
-    felt.rate = dot(normal, s->qd);
+    felt.rate = dot(normal, s->qd) + s->mode.rate;
+    felt.inertial = n->beyond * ((felt.rate - before - bent.rate) / dt + model.Jdqd.x);
     return felt;
 }
 

@@ -237,7 +237,7 @@ static void tick(bench *b, long k, double noise, double *out) {
     for (int j = 0; j < steps; j++) {
         b->felt = plant_step(n, &b->plant, torque, dt);
         double rough = noise * (1.0 + n->roughness * fabs(b->felt.rate));
-        sensor_step(n, &b->sensor, b->felt.normal, k * steps + j, rough, b->sensor_code);
+        sensor_step(n, &b->sensor, b->felt.normal + b->felt.inertial, k * steps + j, rough, b->sensor_code);
     }
 }
 

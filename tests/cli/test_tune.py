@@ -414,6 +414,8 @@ def test_a_log_with_a_push_makes_a_servo_of_any_arm(capsys, elsewhere):
     assert told["theta_s"] == told["inner_loop"]["theta_s"]["ci95"][1]
     assert ForceLoop.load("gains.toml").gains.arm.kind == "servo"
     assert "--loop-from" in refused(capsys, "tune", *words, "--push", "f")
+    assert main(["certify", "gains.toml", "--stiffness", "8e4:1e5", "--damping-time", "0:0"]) == 1
+    assert "Not proved: the adapting gain; no proof covers that of a servo." in capsys.readouterr().out
 
 
 def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):

@@ -10,13 +10,14 @@ from scipy.integrate import solve_ivp
 from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
-from palpate.force.arm import Arm, Sensor, ServoLoop, parse_arm
+from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
 from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius
 from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.guard import Guarded
 from palpate.force.inner_loop import identify_inner_loop
+from palpate.force.known_surface import Known
 from palpate.force.law import lead_speed
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
@@ -162,6 +163,40 @@ def test_wrong_numbers_keep_the_approach_and_end_in_a_press(gains, theta, lag):
 
 def test_other_arms_have_no_lead(gains):
     assert lead_speed(gains.cautious()._replace(lead=0.0), 0.3, 0.1, 1e3, 0.05) == (0.1, 0.1)
+
+
+def test_its_encoders_show_the_surface_so_that_no_compliance_is_taken_off(gains):
+    """A position arm that gave way behind its encoders has its own spring in the estimate; a servo has not."""
+    known = Known(stiffness=(9e3, 1e4), value=9.5e3, in_series=True)
+    assert known.beyond(gains.arm) is known
+    assert known.beyond(load_arm("ur5e")).stiffness[1] > 1e4
+
+
+def test_the_approach_is_what_its_touch_bears(gains):
+    """On the stiffest surface the force within theta of the touch is at most F_d, the command going on."""
+    inner, K, v = gains.arm.inner, gains.cap, gains.approach
+
+    def motion(t, y):
+        return [
+            y[1],
+            (inner.stiffness * (inner.lag * v + v * t - y[0]) - inner.damping * y[1] - K * y[0]) / inner.mass,
+        ]
+
+    flow = solve_ivp(motion, (0.0, gains.theta), [0.0, v], rtol=1e-10, atol=1e-14, max_step=1e-4)
+    assert K * flow.y[0].max() == pytest.approx(gains.force, rel=1e-3)
+
+
+def test_its_command_leads_only_where_a_test_has_borne_the_surface_out(gains):
+    """A speed above three approaches is that of a tip whose surface was sure, and then rose as was foretold."""
+    rows = pressed(
+        world_of(gains.arm, noise=0.1), surface(400.0), gains.cautious(), 0.003, np.full(1500, 15.0), 0
+    )
+    force, speed, position = rows[:, 0], rows[:, 3], rows[:, 2]
+    first, full = (int(np.argmax(speed > n * gains.approach * 1.001)) for n in (1.0, 3.0))
+    assert force[first] > 2.0 * gains.level
+    assert full > first
+    assert force[full] - force[first] > 0.5 * 400.0 * (position[full] - position[first])
+    assert speed[full : full + 50].max() > 5.0 * gains.approach
 
 
 def test_it_is_read_from_a_file(gains):

@@ -15,8 +15,8 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
-from palpate.press.cell import Reading, WristSensor, sensed
-from palpate.press.prepare import Question, arm_of, prepared, surface_of
+from palpate.press.cell import Reading, WristSensor, read_sensor
+from palpate.press.prepare import Question, arm_of, prepare_press, surface_of
 from palpate.press.pressing import Cautious, press
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
@@ -32,7 +32,7 @@ def question(**changes):
 
 
 def asked(**changes):
-    pressing = prepared(question(**changes))
+    pressing = prepare_press(question(**changes))
     record = pressing.run()
     return record, summarise(record, pressing.asked)
 
@@ -79,18 +79,18 @@ def test_a_slow_touch_of_a_heavy_tip_is_not_taken_for_a_soft_surface():
     """In the noise for 30 ms: a start of the contact that is sought too coarsely has air before it, and is flat."""
     over = []
     for seed in (2, 9, 16, 36):
-        pressing = prepared(question(arm="iiwa14", mode="position", seconds=0.4, seed=seed))
+        pressing = prepare_press(question(arm="iiwa14", mode="position", seconds=0.4, seed=seed))
         over.append(float((pressing.run()["force"] - 20.0).max()))
     assert max(over) < 0.05 * 20.0
 
 
 def test_gains_for_a_tip_without_mass_say_what_to_add(tmp_path):
-    known = prepared(question(arm="ur5e", mode="position")).asked.gains
-    assert not any("under [inner]" in note for note in prepared(question(arm="ur5e")).asked.notes)
+    known = prepare_press(question(arm="ur5e", mode="position")).asked.gains
+    assert not any("under [inner]" in note for note in prepare_press(question(arm="ur5e")).asked.notes)
     inner = msgspec.structs.replace(known.arm.inner, mass=None)
     massless = msgspec.structs.replace(known, arm=msgspec.structs.replace(known.arm, inner=inner))
     (tmp_path / "gains.toml").write_text(massless.to_toml())
-    notes = prepared(question(arm="ur5e", gains=tmp_path / "gains.toml")).asked.notes
+    notes = prepare_press(question(arm="ur5e", gains=tmp_path / "gains.toml")).asked.notes
     assert [note for note in notes if "add mass = M, 3.7 kg here, under [inner]" in note and "\n" not in note]
 
 
@@ -140,7 +140,7 @@ def test_the_folder_and_what_is_printed(tmp_path, capsys):
 
 def simulated(arm="fr3", **changes):
     """A press that is over soon: the arm, its pilot, its place."""
-    asked = prepared(question(arm=arm)).asked
+    asked = prepare_press(question(arm=arm)).asked
     robot = replace(asked.arm, **changes)
     cell = cell_of(robot, asked.place, asked.surface, asked.gains.arm)
     one = SimulatedArm(robot, asked.gains.arm, asked.place, cell)
@@ -148,7 +148,7 @@ def simulated(arm="fr3", **changes):
 
 
 def test_it_ends_at_the_end_of_a_joints_range():
-    home = prepared(question()).asked.arm.home
+    home = prepare_press(question()).asked.arm.home
     one, pilot, place = simulated(lower=home - 1e-4, upper=home + 1e-4)
     record = press(one, pilot, place, Plan(20.0, 1.0))
     assert record.meta["end"] == "joint limit"
@@ -192,7 +192,7 @@ def test_a_commanded_pose_is_reached():
 
 
 def test_a_place_and_a_normal_of_ones_own():
-    pressing = prepared(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
+    pressing = prepare_press(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
     place = pressing.asked.place
     assert place.pose[:3, 2] == pytest.approx(np.array([0.3, 0.0, -1.0]) / np.sqrt(1.09), abs=1e-8)
     surface = place.pose[:3, 3] + 0.003 * place.normal
@@ -200,13 +200,13 @@ def test_a_place_and_a_normal_of_ones_own():
 
 
 def test_a_users_own_gains(tmp_path):
-    pressing = prepared(question(force=15.0))
+    pressing = prepare_press(question(force=15.0))
     path = tmp_path / "gains.toml"
     path.write_text(pressing.asked.gains.to_toml())
-    again = prepared(question(force=15.0, gains=path))
+    again = prepare_press(question(force=15.0, gains=path))
     assert again.asked.gains == pressing.asked.gains
     with pytest.raises(InputError, match="for a torque arm, and --mode says position"):
-        prepared(question(force=15.0, gains=path, mode="position"))
+        prepare_press(question(force=15.0, gains=path, mode="position"))
 
 
 def test_a_plan_is_steady_at_both_ends():
@@ -290,7 +290,7 @@ def test_a_sample_is_of_its_own_instant():
     reading, seen = Reading(ZERO3, 0.0, 0.0, 0.0), []
     for k in range(1, 400):
         before = reading.samples
-        reading = sensed(sensor, reading, slope * (k - 1) * step, k * step, np.zeros(8))
+        reading = read_sensor(sensor, reading, slope * (k - 1) * step, k * step, np.zeros(8))
         if reading.samples != before:
             seen.append((before, reading.value))
     assert [int(number) for number, _ in seen] == list(range(len(seen)))
@@ -320,7 +320,7 @@ def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
 
 
 def test_a_force_that_the_motors_cannot_give():
-    pressing = prepared(question(arm="panda"))
+    pressing = prepare_press(question(arm="panda"))
     with pytest.raises(InputError, match=r"takes \S+ N m of joint\d, which gives"):
         check_able(pressing.asked.arm, pressing.asked.place, 0.003, 1000.0)
 
@@ -347,7 +347,7 @@ def cell(damping=0.0):
 def test_a_users_own_model(tmp_path, physics):
     path = tmp_path / "cell.xml"
     path.write_text(cell())
-    pressing = prepared(question(arm=str(path), site="hand", physics=physics, seconds=0.6))
+    pressing = prepare_press(question(arm=str(path), site="hand", physics=physics, seconds=0.6))
     assert any("grip" in note for note in pressing.asked.notes)
     record = pressing.run()
     assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
@@ -357,8 +357,8 @@ def test_a_users_own_model(tmp_path, physics):
 def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
     path = tmp_path / "cell.xml"
     path.write_text(cell(damping=30.0))
-    pressing = prepared(question(arm=str(path), site="hand", physics="mujoco", seconds=0.4))
+    pressing = prepare_press(question(arm=str(path), site="hand", physics="mujoco", seconds=0.4))
     assert any("damping" in note for note in pressing.asked.notes)
     damped = pressing.run()
-    free = prepared(question(arm=str(path), site="hand", seconds=0.4)).run()
+    free = prepare_press(question(arm=str(path), site="hand", seconds=0.4)).run()
     assert damped["x"][1000] < free["x"][1000] - 1e-5  # the approach is slower

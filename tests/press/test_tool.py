@@ -9,7 +9,7 @@ import pytest
 from palpate.cli import main
 from palpate.contact_frame import Payload
 from palpate.errors import InputError
-from palpate.press.prepare import Question, prepared, surface_of
+from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
@@ -30,7 +30,7 @@ def changed(**fields):
 
 def pressing(tool=TOOL, **changes):
     asked = {"arm": "fr3", "force": 20.0, "surface": surface_of("K=5000,B=50"), "normal": (0.0, 0.0, -1.0)}
-    return prepared(Question(**{**asked, "payload": tool, "seconds": 4.0, **changes}))
+    return prepare_press(Question(**{**asked, "payload": tool, "seconds": 4.0, **changes}))
 
 
 def simulated(tool, physics="own", arm="ur5e", **changes):

@@ -25,10 +25,10 @@ class NotCompiled(Exception):
 
 
 class Kernel:
-    """A function that runs compiled; `plain` is the same function as it was written. See `kernel`."""
+    """A function that runs compiled; `plain` is the same function as it was written."""
 
-    def __init__(self, function: Callable[..., Any], superword: bool):
-        self.plain, self._superword = function, superword
+    def __init__(self, function: Callable[..., Any]):
+        self.plain = function
         self._waiting: Callable[[], None] | None = None
         self._dispatcher: Any = None
         functools.update_wrapper(self, function)
@@ -38,7 +38,7 @@ class Kernel:
         """The Numba dispatcher, made when first asked for; by one thread, or each would compile its own."""
         with _MAKING:
             if self._dispatcher is None:
-                self._dispatcher = _dispatcher(self.plain, self._superword, self._wait)
+                self._dispatcher = _dispatcher(self.plain, self._wait)
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
@@ -74,21 +74,15 @@ class Kernel:
         return not self.compiled.stats.cache_misses
 
 
-def kernel(function: Callable[..., Any], superword: bool = False) -> Kernel:
-    """Marks the entry of a compiled loop.
-
-    Args:
-        function: as it was written.
-        superword: let the compiler do neighbouring operations by one instruction, which suits much arithmetic of small
-            vectors and a loop without any takes longer to compile for. Each number stays the same to the last bit.
-    """
-    return Kernel(function, superword)
+def kernel(function: Callable[..., Any]) -> Kernel:
+    """Marks the entry of a compiled loop."""
+    return Kernel(function)
 
 
-def _dispatcher(function: Callable[..., Any], superword: bool, wait: Callable[[], None]) -> Any:
+def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
     import numba
 
-    dispatcher, lock = numba.njit(**entry(superword))(function), CompileLock(home_of(function))
+    dispatcher, lock = numba.njit(**entry())(function), CompileLock(home_of(function))
     compiling = dispatcher._compiler.compile
 
     def compiled(*words: Any) -> Any:

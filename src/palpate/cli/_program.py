@@ -164,12 +164,12 @@ def print_answer(found: Mapping[str, Any]) -> None:
     """
     from palpate import __version__
 
-    options = given()
+    options = given_options()
     head = {"command": command(), "version": __version__, "options": _plain(options)}
     print_json({**head, **({} if "files" in found else {"files": _files(options)}), **found})
 
 
-def given() -> dict[str, Any]:
+def given_options() -> dict[str, Any]:
     """All given options that differ from their defaults, by their names in the help."""
     words = list(EXPANDED.get())
     bound = program(*words[:1]).parse_args(words, print_error=False, exit_on_error=False)[1]

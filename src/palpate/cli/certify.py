@@ -188,7 +188,16 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
     _print(made, made.check(), output, output.out)
     kinds = {claim.kind for claim in made.claims}
     wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
-    return 0 if wanted <= kinds else 1
+    missing = wanted - kinds
+    if kinds and missing and not output.json:
+        names = {
+            "adapting": "the adapting gain",
+            "held": "the constant gain",
+            "one-sided": "contact lost and found",
+        }
+        why = "; no proof covers that of a servo" if gains.arm.kind == "servo" else ""
+        print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}{why}.")
+    return 1 if missing else 0
 
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:

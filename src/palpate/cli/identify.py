@@ -49,7 +49,7 @@ class ModelOptions:
     cutoff: float | None = None
     "Cut-off of the filters of all channels, in Hz; chosen if not given."
 
-    def known(self) -> dict[str, Any]:
+    def keywords(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
         known: dict[str, Any] = {}
         lag = lag_of(self.lag)

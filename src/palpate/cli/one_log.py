@@ -36,7 +36,7 @@ class Fitted(Protocol):
         """Largest half-width of an identified parameter, as a share of its value."""
         ...
 
-    def known(self) -> dict[str, Any]:
+    def keywords(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
         ...
 
@@ -85,8 +85,8 @@ class OneLog:
         from palpate.from_log import LogIdentifier
 
         return LogIdentifier(
-            self.source, self.frame.frame() or ContactFrame(), self.arm.arm(), self.arm.weighed(),
-            self.arm.robot_stiffness_from, self.pressed_by.shape(), self.pressed_by.ratio, self.fitted.known(),
+            self.source, self.frame.frame() or ContactFrame(), self.arm.arm(), self.arm.weighed_tool(),
+            self.arm.robot_stiffness_from, self.pressed_by.shape(), self.pressed_by.ratio, self.fitted.keywords(),
         )  # fmt: skip
 
     @property

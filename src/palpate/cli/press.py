@@ -139,11 +139,11 @@ def press(
 
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.force_input import DONE, INTERRUPTED
-    from palpate.press.prepare import prepared
+    from palpate.press.prepare import prepare_press
 
     question, folder = simulated.question(asked), simulated.folder
     with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
-        pressing = prepared(question)
+        pressing = prepare_press(question)
         start = "starting (the first run compiles, which takes some seconds)"
         with _terminal.simulation_progress(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)

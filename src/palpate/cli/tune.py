@@ -74,7 +74,7 @@ def tune(
     report = page.page()
     from palpate.force import tune as tuned
 
-    one, inner = arm.named(columns)
+    one, inner = arm.load(columns)
     theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
     told = tuned(
         one,

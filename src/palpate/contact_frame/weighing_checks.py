@@ -157,7 +157,7 @@ def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
 
     weights = np.sqrt(poses.count / poses.count.sum() / 3.0)[:, None]
 
-    def left(x: Array) -> Array:
+    def residual_of(x: Array) -> Array:
         shown = Rotation.from_rotvec(x[:3]).inv().apply(np.einsum("gji,j->gi", poses.turns, x[3:6]))
         return ((poses.signal - shown - x[6:9]) * weights).ravel()
 
@@ -171,7 +171,7 @@ def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
             start = np.r_[turn.as_rotvec(), fit[:3], turn.inv().apply(fit[3:6])]
             starts.append((_misfit(other, fit), start))
     nearest = sorted(starts, key=lambda one: one[0])[:_REFINED]
-    found = [least_squares(left, start, max_nfev=40) for _, start in nearest]
+    found = [least_squares(residual_of, start, max_nfev=40) for _, start in nearest]
     if not found:
         return None
     best = min(found, key=lambda one: one.cost)

@@ -17,9 +17,9 @@ UNCOVERED = (
     "limits of speed and torque",
     "loss of contact while the gain changes or within a tick, and of a torque arm",
     "readings between ticks (their age counts in whole ticks)",
-    "the adapting law of a servo",
+    "the adapting law of a servo, and other numbers of it than the file's",
     "the arm's compliance between encoders and tip together with damping of the surface; the tip's mass on it",
-    "a surface that curves, except by the range of its tangent stiffness",
+    "a surface's own mass; a surface that curves, except by the range of its tangent stiffness",
     "the peak on a surface that stiffens under the tip: the gain is the old one for a lag",
 )
 
@@ -57,8 +57,9 @@ def sentence(claim: Claim, gains: Gains) -> str:
     times = f"B/K from {claim.least:g} to {claim.most:.4g} s" if claim.most > 0.0 else "no damping (B = 0)"
     factor = f", or up to {claim.shares[1]:g} times that gain" if claim.shares[1] > 1.0 else ""
     if claim.kind == "held":
+        held = "the gain and the lead" if gains.arm.kind == "servo" else "the gain"
         return (
-            f"the gain held at that of the stiffest surface{factor}: every surface whose K + B/theta, as the measured "
+            f"{held} held at that of the stiffest surface{factor}: every surface whose K + B/theta, as the measured "
             f"position shows it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}, with {ages(claim, gains)}; K and "
             "B may change from tick to tick within a cell"
         )

@@ -244,7 +244,5 @@ def _list_guesses(path: Path, proposal: Proposal) -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
     guesses = "; ".join(proposal.guesses)
     if proposal.options is None:
-        return (
-            f"{path}: {guesses} (palpate topics {path} lists them; --time, --position and --force name them)"
-        )
+        return f"{path}: {guesses} (palpate topics {path} lists them; --time, --position and --force-column name them)"
     return f"{path}: {guesses}. If that is right: {proposal.command(path)}"

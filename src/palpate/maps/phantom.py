@@ -15,7 +15,7 @@ from palpate.errors import InputError
 from palpate.files import read_table, read_text
 from palpate.maps.presses import Presses
 from palpate.maps.result import MapRequest, MapResult, map_of
-from palpate.press.prepare import Pressing, Question, prepared
+from palpate.press.prepare import Pressing, Question, prepare_press
 from palpate.press.setting import GAP, place_of
 from palpate.press.summary import summarise
 
@@ -109,7 +109,7 @@ def palpate_phantom(
         raise InputError(
             f"a map of a phantom begins with {FIRST * FIRST} presses; ask for as many, got {count}"
         )
-    presser = prepared(replace(question, surface=KelvinVoigt(phantom.stiffness, phantom.damping, 0.0)))
+    presser = prepare_press(replace(question, surface=KelvinVoigt(phantom.stiffness, phantom.damping, 0.0)))
     steps = [(np.arange(FIRST) / (FIRST - 1.0)) * side for side in phantom.size]
     waiting = list(np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2))
     size = np.asarray(phantom.size)

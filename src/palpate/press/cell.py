@@ -142,7 +142,7 @@ def body_at(q: Array, motor: Array) -> Body:
 
 
 @law
-def sensed(sensor, reading, force, time, noise):
+def read_sensor(sensor, reading, force, time, noise):
     """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick.
 
     A sample is of its own instant k/sampling, between two steps: so the lag of the readings is known exactly. The force
@@ -160,7 +160,7 @@ def sensed(sensor, reading, force, time, noise):
 
 
 @law
-def driven(cell, body, setpoint):
+def apply_drive(cell, body, setpoint):
     """Fills the torque on the links: it is the set-point itself, or the springs' to motors or set-points."""
     for i in range(len(body.q)):
         if cell.elastic == 0.0:
@@ -270,7 +270,7 @@ def held_by(cell, body, tip):
 def measured_by(sensor, share, touch, surface, force, held, depth, time, noise):
     """The touch after a step that is this share of a tick; `held` is what the tool adds to the reading [N]."""
     felt = max(force, 0.0)
-    reading = sensed(sensor, touch.reading, felt + held, time, noise)
+    reading = read_sensor(sensor, touch.reading, felt + held, time, noise)
     return Touch(surface, reading, force, touch.mean + share * felt, depth)
 
 
@@ -284,7 +284,7 @@ def tick(cell, body, touch, setpoint, k, noise):
     sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
     touch = Touch(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
-        driven(cell, body, setpoint)
+        apply_drive(cell, body, setpoint)
         tip = chain_motion(cell.chain, body.q, body.qd, body.room)
         joint_rows(cell, body, tip)
         surface, force, depth = accelerations(cell, body, tip, touch)
@@ -300,12 +300,12 @@ def tick(cell, body, touch, setpoint, k, noise):
 @law
 def foreign(cell, body, touch, tip, setpoint, time, noise):
     """One step whose M, h and J another engine has filled in; that engine moves the arm."""
-    driven(cell, body, setpoint)
+    apply_drive(cell, body, setpoint)
     jacobian_rows(cell, body, tip)
     surface, force, depth = accelerations(cell, body, tip, touch)
     held = held_by(cell, body, tip)
     return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 
 
-compiled_tick = kernel(tick, superword=True)
+compiled_tick = kernel(tick)
 compiled_foreign = kernel(foreign)

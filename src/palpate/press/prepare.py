@@ -88,14 +88,14 @@ class Pressing:
             arm.tare()
             most = self.plan.force + SURE * loop.sensor.noise
             check_range(abs(arm.zero), most, loop.sensor.full_scale)
-        gains = fitted(asked.gains, resting.at_rest(), self.plan)
+        gains = fit_gains(asked.gains, resting.at_rest(), self.plan)
         pilot = pilot_of(asked.controller, arm, gains, asked.place, self.plan.force)
         record = press(arm, pilot, asked.place, self.plan, progress)
         meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
         return Record(record.columns, record.units, meta)
 
 
-def fitted(gains: Gains, shown: Array, plan: Plan) -> Gains:
+def fit_gains(gains: Gains, shown: Array, plan: Plan) -> Gains:
     """The gains for the noise of an arm at rest.
 
     Args:
@@ -111,7 +111,7 @@ def fitted(gains: Gains, shown: Array, plan: Plan) -> Gains:
     return fitting(gains, noise, len(shown)) or gains
 
 
-def prepared(question: Question) -> Pressing:
+def prepare_press(question: Question) -> Pressing:
     """Everything checked, nothing run.
 
     Raises:

@@ -130,7 +130,7 @@ class Design:
     @property
     def needed(self) -> float:
         """Seconds after which the same wave, repeated, would reach it; infinite if it never does."""
-        return needed(self.made, self.problem)
+        return seconds_needed(self.made, self.problem)
 
     def force(self, rate: float = 1000.0) -> tuple[Array, Array]:
         """Times [s] and desired force [N], both of shape (n,); while the touch settles, the wave is eased in."""
@@ -151,7 +151,7 @@ def design(problem: Problem) -> Design:
     seconds = min(_FIRST, problem.longest)
     for _ in range(_ROUNDS):
         made = make(problem, seconds)
-        before, seconds = seconds, _whole(problem, needed(made, problem))
+        before, seconds = seconds, _whole(problem, seconds_needed(made, problem))
         if before == seconds:
             break
     found = Design(problem, make(problem, seconds), seconds)
@@ -161,7 +161,7 @@ def design(problem: Problem) -> Design:
     return found
 
 
-def needed(made: Made, problem: Problem) -> float:
+def seconds_needed(made: Made, problem: Problem) -> float:
     """Seconds of a wave that reach the precision: more of them never give less information."""
     low, high = 1e-3, FOREVER
     if made.excess(high, problem.precision) > 1:
@@ -229,7 +229,7 @@ def _try_remedy(words: str, problem: Problem, seconds: float) -> Remedy:
     made = MAKERS[problem.kind](problem, seconds)
     enough = made.excess(seconds, problem.precision) <= 1
     limit = made.excess(FOREVER, problem.precision)
-    return Remedy(words, made.worst(seconds), enough, needed(made, problem), limit)
+    return Remedy(words, made.worst(seconds), enough, seconds_needed(made, problem), limit)
 
 
 def _excess(tried: Remedy, found: Design) -> float:

@@ -235,12 +235,12 @@ def _mujoco(contact: Contact, request: Request, out: Path) -> Exported:
             )
     numbers = {pair.probe: _pair_numbers(pair, contact) for pair in found}
 
-    def pressed(path: Path) -> list[Checked]:
+    def press_pairs(path: Path) -> list[Checked]:
         return [_pressed_pair(scenes.compile_scene(path), scene, pair, contact) for pair in found]
 
     return Exported(
         contact, request.target, scenes.xml(scene, found, contact, out.parent),
-        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compile_scene, check=pressed,
+        (*notes, *scenes.NOTES), {"pairs": numbers}, validate=scenes.compile_scene, check=press_pairs,
     )  # fmt: skip
 
 
@@ -281,7 +281,7 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         text = scenes.edit(scene, own, other, contact).decode()
         named = other.path[-1] if other else "palpate's sphere"
 
-    def pressed(path: Path) -> list[Checked]:
+    def press_pairs(path: Path) -> list[Checked]:
         from palpate_export.other_rigs import DrakeRig
 
         rig = DrakeRig(path, surface, probe, scenes.RIGID)
@@ -291,13 +291,15 @@ def _drake(contact: Contact, request: Request, _out: Path) -> Exported:
         return [_judge(named, press(rig, contact.stiffness.value, _force(contact)), contact, note)]
 
     numbers = {"point_contact_stiffness": contact.stiffness.value, "relaxation_time": contact.relaxation_time}
-    return Exported(contact, request.target, text, scenes.notes(probe is not None), numbers, check=pressed)
+    return Exported(
+        contact, request.target, text, scenes.notes(probe is not None), numbers, check=press_pairs
+    )
 
 
 def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
     from palpate_export import drake_scene as shapes
 
-    def pressed(path: Path) -> list[Checked]:
+    def press_pairs(path: Path) -> list[Checked]:
         from palpate_export.other_rigs import NewtonRig
 
         rig = NewtonRig(path)
@@ -306,7 +308,7 @@ def _newton(contact: Contact, request: Request, _out: Path) -> Exported:
         return [_judge("palpate's sphere", ways, contact, "SolverSemiImplicit, going in")]
 
     numbers = {"ke": contact.stiffness.value, "kd": contact.damping.value}
-    return Exported(contact, request.target, shapes.python(contact), shapes.NOTES, numbers, check=pressed)
+    return Exported(contact, request.target, shapes.python(contact), shapes.NOTES, numbers, check=press_pairs)
 
 
 def _spring(contact: Contact, request: Request, _out: Path) -> Exported:
@@ -314,12 +316,12 @@ def _spring(contact: Contact, request: Request, _out: Path) -> Exported:
     check_mass(contact, contact.source)
     text = xml(contact, request.name)
 
-    def pressed(_path: Path) -> list[Checked]:
+    def press_pairs(_path: Path) -> list[Checked]:
         found = press_plate(text, contact, request.name, _force(contact))
         return [_judge("palpate's sphere", found, contact, "of the plate's own displacement")]
 
     numbers = {"stiffness": contact.stiffness.value, "damping": contact.damping.value}
-    return Exported(contact, request.target, text, NOTES, numbers, check=pressed)
+    return Exported(contact, request.target, text, NOTES, numbers, check=press_pairs)
 
 
 _HALF = (0.05, 0.05, 0.005)

@@ -179,11 +179,11 @@ def _stability(shown: RowSource) -> Iterator[tuple[Any, Any, list[Any]]]:
         yield (lambda: None), (lambda: None), tell
         return
 
-    def told() -> None:
+    def tell_all() -> None:
         for one in tell:
             one()
 
-    own = Stability(told)
+    own = Stability(tell_all)
     try:
         yield (lambda: own.ask(shown.loop_asked)), (lambda: own.latest), tell
     finally:

@@ -14,7 +14,7 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.press.engines import series_of
-from palpate.press.prepare import Question, prepared
+from palpate.press.prepare import Question, prepare_press
 from palpate.press.pressing import JOINT_LIMIT, Cautious
 from palpate.press.setting import Place, cell_of
 from palpate.press.simulated_arm import SimulatedArm
@@ -60,7 +60,7 @@ class PressingArm:
     def __init__(self, name: str, seed: int = 0, waiting: Callable[[], None] | None = None):
         if seed < 0:
             raise InputError(f"the seed must be 0 or above, got {seed}")
-        asked = prepared(
+        asked = prepare_press(
             Question(arm=name, force=FORCE, surface=KelvinVoigt(STIFFNESS, DAMPING, 0.0), probe=0.0)
         ).asked
         if asked.arm.joints > JOINTS:

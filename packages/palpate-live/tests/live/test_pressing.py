@@ -7,7 +7,7 @@ import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
-from palpate.press.prepare import Question, prepared
+from palpate.press.prepare import Question, prepare_press
 from palpate_live.pressing import DAMPING, FORCE, STIFFNESS, PressingArm
 from palpate_live.view import AT
 
@@ -35,7 +35,7 @@ def test_its_rows_are_those_of_a_press(arm):
     shown = pressed(arm, 1.2)
     name = "fr3" if arm.view.rate == 1000.0 else "ur5e"
     surface = KelvinVoigt(STIFFNESS, DAMPING, 0.0)
-    record = prepared(Question(name, FORCE, surface, seconds=0.6, probe=0.0, seed=1)).run()
+    record = prepare_press(Question(name, FORCE, surface, seconds=0.6, probe=0.0, seed=1)).run()
     at = np.round(shown[:, AT["t"]] * arm.view.rate).astype(int)
     both = at < len(record)
     for column, own in (("force", "force"), ("q1", "q1"), ("q4", "q4")):

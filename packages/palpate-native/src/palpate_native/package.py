@@ -54,7 +54,7 @@ _MANIFEST = """<?xml version="1.0"?>
   <version>{version}</version>
   <description>A law of palpate in C: it {title}.</description>
   <maintainer email="nobody@example.org">who exported it</maintainer>
-  <license>the license of palpate</license>
+  <license>Apache-2.0</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <export>
     <build_type>ament_cmake</build_type>

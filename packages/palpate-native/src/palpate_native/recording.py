@@ -213,10 +213,16 @@ def _touches(
     force = force[(np.arange(ticks) // every) * every]
     force[rng.random(ticks) < RARE], x[rng.random(ticks) < 5.0 * RARE] = np.nan, np.nan
     x[rng.random(ticks) < RARE] += 1.0
-    gap = int(rng.integers(0, ticks))
+    begins, ends = np.sort(rng.integers(0, ticks, 2))
+    kind = rng.integers(0, 6)
+    if kind == 0:  # an encoder that is read every second tick for a while; at the end a tip at rest
+        x[:begins], x[ends:] = x[(np.arange(begins) // 2) * 2], x[ends]
+    elif kind == 1:  # at rest with a force that changes, from and to a jump
+        x[begins:ends] = x[begins] + 1.0
+    gap = 0 if kind == 2 else int(rng.integers(0, ticks))
     x[gap : gap + int(rng.integers(0, 60))] = np.nan
     out = np.zeros((ticks, 5))
-    fresh = bool(rng.random() < 0.2) or new
+    fresh = bool(rng.random() < 0.5) or new
     if fresh:
         state[:] = first
     out[0, 0], out[:, 1], out[:, 2] = float(fresh), x, force

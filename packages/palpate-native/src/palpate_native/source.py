@@ -7,11 +7,13 @@ import functools
 import inspect
 import io
 import re
+import sys
 import tokenize
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+import palpate
 from palpate.errors import InputError
 
 _DIRECTIVE = re.compile(r"#\s*(fmt|noqa|type|ruff|mypy)\b")
@@ -41,9 +43,9 @@ def place_of(function: Callable[..., Any]) -> str:
 
 
 def _short(file: str) -> str:
-    root = Path(__file__).resolve().parents[2]
     path = Path(file)
-    return path.relative_to(root).as_posix() if root in path.parents else file
+    roots = (Path(str(one.__file__)).resolve().parents[1] for one in (palpate, sys.modules[__package__]))
+    return next((path.relative_to(root).as_posix() for root in roots if root in path.parents), file)
 
 
 def syntax_of(function: Callable[..., Any]) -> ast.FunctionDef | ast.Lambda:

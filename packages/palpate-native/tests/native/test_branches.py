@@ -12,12 +12,18 @@ import pytest
 
 from palpate.force import guard
 from palpate.force.gains import load_gains
+from palpate.identifiers import ContactIdentifier
+from palpate_native import laws, recording
+from palpate_native.module import sources_of
 from palpate_native.replay import program, write_rows
 
-UNREACHABLE = {
+OPERATORS = {
     "floored": "test_the_operators_of_python_are_those_of_c takes each branch",
     "modulo": "test_the_operators_of_python_are_those_of_c takes each branch",
     "root": "the root of minus infinity, which no variance is; likewise",
+}
+IN_FORCE_LOOP = {
+    **OPERATORS,
     "law->locking > 0.0": "a switch that gains of palpate tune have on",
     "law->bounding > 0.0": "a switch that gains of palpate tune have on",
     "law->backing == 0.0": "a switch that gains of palpate tune have on",
@@ -28,40 +34,107 @@ UNREACHABLE = {
     "lead": "likewise",
     "state->law.stage.phase == 2.0": "there is no fourth phase",
 }
-"""Branches that no press takes, by their function or a piece of their line, and why."""
+IN_SQUARES = {
+    "stretch": "it is asked where a variance is above its first value, so the length of the axis is above zero",
+    "Vec3_matmul(v, even) > 1.0": "the three variances begin equal, so the condition before it is the stricter one",
+    "propagate_root": "a gain of zero: the regressor is zero, and such a sample is not propagated",
+    "!counts": "with a forgetting factor every sample counts; other policies have samples that do not",
+    "squares <= 0.0": "residuals of exactly zero, which noise leaves none of",
+}
+IN_IDENTIFIER = {
+    **OPERATORS,
+    "modulo_of_double": "as `modulo`",
+    "squares <= 0.0": IN_SQUARES["squares <= 0.0"],
+    "!(x > 0.0)": "test_the_logarithm_of_both_languages_is_right_to_a_unit_in_the_last_place takes it",
+    "x == 0.0 ? -INFINITY : NAN": "likewise",
+    "x == INFINITY": "likewise",
+    "numbers.at[GOOD] >= 0.0": "a jump from a position that was never accepted: the first is accepted",
+    "bend = !isnan(x0)": "a gap that begins behind the very first row",
+    "whole + state.at[AFTER] > track->numbers.at[RESOLVED]": "a row that is resolved has been passed by the row of now",
+    "far > 3.0 * contact.at[QUANTUM]": "so many readings stand at the highest only where the tip has moved that far",
+    "size > 0.0 ? v / sqrt(size) : 0.0": "a sample without rate and acceleration, in a contact",
+    "level < LEVELS_octave_sums": "2^21 samples of one contact, at which the highest octave ends",
+    "level == LEVELS_octave_sums": "likewise",
+    "own.at[TAIL] - own.at[HEAD] < most": "more samples wait than the queue has room for: its room is the longest wait",
+    "queue.at[k] >= state.at[SETTLING]": "a force of touch of zero, of which no settling is asked",
+}
+"""Branches that no recorded tick takes, by their function or a piece of their line, and why."""
+
+
+def contacts(touch, **options):
+    """An identifier as a law in C, with its recording."""
+    identifier = ContactIdentifier("butterworth3:120", 1000.0, 0.003, touch=touch, **options)
+    return laws.identifier_module(identifier), recording.of_identifier(identifier)
 
 
 @pytest.mark.long
 @pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("gcov")), reason="there is no gcc with gcov")
-def test_recorded_presses_take_every_branch_that_there_is_a_way_to(force, tmp_path):
-    more = "".join(f"palpate_force_{name}(&state);" for name in ("phase", "trouble"))
-    also = f"++ticks; palpate_force_estimate(gains, &state); {more}"
-    replay = program(force.module, force.recording.inputs).replace("++ticks;", also)
-    (tmp_path / "palpate_force.c").write_text(force.sources.source)
-    (tmp_path / "palpate_force.h").write_text(force.sources.header)
-    (tmp_path / "replay.c").write_text(replay)
-    write_rows(tmp_path / "press.bin", force.recording.presses(400_000, 1))
-    build = "gcc -std=c99 -O0 -ffp-contract=off --coverage -I. palpate_force.c replay.c -lm -o replay"
-    for words in (build, "./replay", "gcov -b -c replay-palpate_force.gcda"):
-        subprocess.run(words.split(), cwd=tmp_path, check=True, capture_output=True)
-    branches = list(branches_of((tmp_path / "palpate_force.c.gcov").read_text()))
-    left = {(place, line) for place, line, taken in branches if not taken}
-    reasons = {why for why in UNREACHABLE for place, line in left if why == place or why in line}
-    assert len(branches) > 300
-    assert [one for one in left if not any(why == one[0] or why in one[1] for why in UNREACHABLE)] == []
-    assert reasons == set(UNREACHABLE), "a branch that presses take is not called unreachable"
+@pytest.mark.parametrize(
+    ("law", "ticks", "least", "unreachable"),
+    [
+        ("force", 400_000, 300, IN_FORCE_LOOP),
+        ("squares", 20_000, 35, IN_SQUARES),
+        ("identifier", 100_000, 290, IN_IDENTIFIER),
+    ],
+)
+def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(
+    law, ticks, least, unreachable, request, tmp_path
+):
+    if law == "identifier":
+        cases = [contacts(None, sampling=480.0), contacts(None), contacts(2.0), contacts(0.0)]
+    else:
+        exported = request.getfixturevalue(law)
+        cases = [(exported.module, exported.recording)]
+    taken = {}
+    for module, recorded in cases:
+        for branch, here in branches_of(
+            report(module, recorded.inputs, recorded.presses(ticks, 1), tmp_path)
+        ):
+            taken[branch] = taken.get(branch, False) or here
+    left = {branch[:2] for branch, here in taken.items() if not here}
+    reasons = {why for why in unreachable for place, line in left if why == place or why in line}
+    assert len(taken) > least
+    assert [one for one in left if not any(why == one[0] or why in one[1] for why in unreachable)] == []
+    assert reasons == set(unreachable), "a branch that ticks take is not called unreachable"
+
+
+def report(module, inputs, presses, folder):
+    """The report of gcov on the C of a law that repeated some presses, each of its functions called at each tick."""
+    own, sources = module.name, sources_of(module)
+    calls = [
+        f"{entry.name}(gains, &state{''.join(map(place, entry.arguments))})" for entry in module.entries[1:]
+    ]
+    also = "".join(
+        f"(void){own}_{call}; " for call in [*calls, *(f"{word}(&state)" for word in module.words)]
+    )
+    for old in folder.glob("*.gc*"):
+        old.unlink()
+    (folder / f"{own}.c").write_text(sources.source)
+    (folder / f"{own}.h").write_text(sources.header)
+    (folder / "replay.c").write_text(program(module, inputs).replace("++ticks;", f"++ticks; {also}"))
+    write_rows(folder / "press.bin", presses)
+    build = f"gcc -std=c99 -O0 -ffp-contract=off --coverage -I. {own}.c replay.c -lm -o replay"
+    for words in (build, "./replay", f"gcov -b -c replay-{own}.gcda"):
+        subprocess.run(words.split(), cwd=folder, check=True, capture_output=True)
+    return (folder / f"{own}.c.gcov").read_text()
+
+
+def place(argument):
+    return f", (double[{argument.count}]){{0}}"
 
 
 def branches_of(text):
-    """Function, line, and whether it was taken, of each branch in a report of gcov."""
-    place = line = ""
+    """Function, line and number there of each branch in a report of gcov, and whether it was taken."""
+    function = line = ""
+    number = 0
     for row in text.splitlines():
         if row.startswith("function "):
-            place = row.split()[1]
+            function = row.split()[1]
         elif source := re.match(r"\s*[#\-\d*=]+:\s*\d+:(.*)", row):
-            line = source[1].strip()
+            line, number = source[1].strip(), 0
         elif branch := re.match(r"branch\s+\d+ (never executed|taken (\d+))", row):
-            yield place, line, bool(branch[2]) and branch[2] != "0"
+            number += 1
+            yield (function, line, number), bool(branch[2]) and branch[2] != "0"
 
 
 DECISIVE = {

@@ -22,7 +22,7 @@ from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
-from palpate.press.cell import Body, Cell, Reading, Touch, driven, sensed
+from palpate.press.cell import Body, Cell, Reading, Touch, apply_drive, read_sensor
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
 from palpate.press.setting import Place, cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
@@ -63,13 +63,13 @@ class Frame(NamedTuple):
 @law
 def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
     """Drives, contact and sensor after a step; fills the body's drive. `noise` has shape (3, 8)."""
-    driven(cell, body, setpoint)
+    apply_drive(cell, body, setpoint)
     x, v = frame.axes @ (tip.p - frame.origin), frame.axes @ tip.v
     after = contact(world, ground, before.tip, x, v, cell.step)
     f, sensor = after.force, cell.sensor
     return Slid(
-        after, sensed(sensor, before.x, f.x, time, noise[0]), sensed(sensor, before.y, f.y, time, noise[1]),
-        sensed(sensor, before.z, f.z, time, noise[2]), before.mean + after.normal / cell.steps,
+        after, read_sensor(sensor, before.x, f.x, time, noise[0]), read_sensor(sensor, before.y, f.y, time, noise[1]),
+        read_sensor(sensor, before.z, f.z, time, noise[2]), before.mean + after.normal / cell.steps,
     )  # fmt: skip
 
 

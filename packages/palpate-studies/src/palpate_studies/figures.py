@@ -124,7 +124,7 @@ def map_of(table: StudyRows, asked: Map, number: int) -> Drawn:
     """A map that a study asks for."""
     metric, x, y = metric_of(asked.metric), table.scale(asked.x), table.scale(asked.y)
 
-    def made() -> list[Heat]:
+    def heats() -> list[Heat]:
 
         panels = []
         for title, value, rows in table.panels(asked):
@@ -141,7 +141,7 @@ def map_of(table: StudyRows, asked: Map, number: int) -> Drawn:
     line = " The line is the stability boundary of the loop's linear model." if asked.bound else ""
     over = f"over {x.label} and {y.label}{restricted_to(asked)}"
     caption = f"{what}, {over}. Crosses: most runs were incomplete.{line}"
-    return Drawn(f"map{number}", caption, metric, made, heat_figure)
+    return Drawn(f"map{number}", caption, metric, heats, heat_figure)
 
 
 def cells(rows: DataFrame, asked: Map, metric: Metric, x: Scale, y: Scale) -> tuple[NDArray[Any], Mask]:
@@ -183,7 +183,7 @@ def clouds_of(table: StudyRows, metric: Metric) -> Drawn:
     drawn, others = [a for a in axes if a.drawn], [a for a in axes if not a.drawn and len(a.settings) <= FEW]
     kinds = others[0] if others else None
 
-    def made() -> list[Cloud]:
+    def clouds() -> list[Cloud]:
         return [
             Cloud(
                 Scale(a.title, (a.between(0.0), a.between(1.0)), logarithmic(a)),
@@ -195,7 +195,7 @@ def clouds_of(table: StudyRows, metric: Metric) -> Drawn:
 
     middle = "mean" if metric.words else "median"
     caption = f"{sentence(metric)}: every run, and the {middle} of each eighth of them."
-    return Drawn(f"clouds-{metric.name.replace(':', '-')}", caption, metric, made, clouds_figure)
+    return Drawn(f"clouds-{metric.name.replace(':', '-')}", caption, metric, clouds, clouds_figure)
 
 
 def points(table: StudyRows, metric: Metric, name: str, kinds: Axis | None) -> Iterator[Points]:

@@ -98,7 +98,7 @@ class ArmOptions:
     position_from: Literal["joints", "tip"] | None = None
     "joints: the position comes from joint encoders and does not contain the arm's deflection; tip: it does."
 
-    def weighed(self) -> Payload | None:
+    def weighed_tool(self) -> Payload | None:
         """The payload on the sensor, if it was weighed."""
         from palpate.contact_frame import load_payload
 
@@ -110,7 +110,7 @@ class ArmOptions:
 
         if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
             raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
-        hung = self.weighed()
+        hung = self.weighed_tool()
         return Arm(
             tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
             stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),

@@ -31,7 +31,7 @@ class ArmOptions:
     """Column of the measured force in that log, in which the tip is pushed once: it identifies a servo that
     yields."""
 
-    def named(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
+    def load(self, columns: ColumnOptions) -> tuple[Arm, InnerLoop | None]:
         """The arm, and notes on the identification of its inner loop."""
         from palpate.force import load_arm
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -57,7 +58,7 @@ ADVICE = {
     Code.UNIT_STATED: "None, if the file is right; else say the unit, as in --force force_mN:mN.",
     Code.TIME_DOUBTFUL: "Say the unit of the time, as --time t:ms, or give --rate.",
     Code.LINES_SKIPPED: "Look at these lines; if they are rows, correct them and identify again.",
-    Code.COLUMNS_SWAPPED: "Check --position and --force; exchange them if they are swapped.",
+    Code.COLUMNS_SWAPPED: "Check --position and --force-column; exchange them if they are swapped.",
     Code.FRAME_GUESS: "Say it with --wrench-frame.",
     Code.NORMAL_UNCERTAIN: "Give the contact's normal, or press harder along it and slide less.",
 }
@@ -121,9 +122,12 @@ def _loss(found: Identification, point: WorkingPoint) -> str:
 
 
 def place_of(found: Identification, point: WorkingPoint) -> str:
-    """`at 13 N, 2.4 mm deep and 0.57 Hz`."""
+    """`at 13 N, 2.4 mm deep and 0.57 Hz`; a depth that is zero but for rounding is the middle of the motion."""
     force, depth, frequency = facts_of(found, point)
     deep = " deep" if point.from_surface and point.depth_m > 0 else " from the middle of the motion"
+    reach = 0.0 if found.traces is None else float(abs(found.traces.fitted_position).max(initial=0.0))
+    if not point.from_surface and abs(point.depth_m) <= sys.float_info.epsilon * reach:
+        return f"at {force}, in the middle of the motion and at {frequency}"
     return f"at {force}, {depth}{deep} and {frequency}"
 
 

@@ -75,7 +75,7 @@ def names() -> list[str]:
     return sorted(f.name.removesuffix(".toml") for f in folder.iterdir() if f.name.endswith(".toml"))
 
 
-def named(name: str) -> SerialArm:
+def load_shipped(name: str) -> SerialArm:
     """An arm that comes with palpate.
 
     Raises:

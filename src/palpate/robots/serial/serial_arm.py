@@ -101,9 +101,9 @@ class SerialArm(Readable):
         Raises:
             InputError: no such arm.
         """
-        from palpate.robots.serial.from_toml import named
+        from palpate.robots.serial.from_toml import load_shipped
 
-        return named(name)
+        return load_shipped(name)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> SerialArm:
