@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.sliding.sliding_loop import SlidingLoop
+from palpate.force.sliding.sliding_loop import SlidingLoop, three
 
 SLOWER = 10.0
 """Half the time constant of the turning, in theta: below 10 it moves the normal that the force loop learns."""
@@ -42,21 +42,18 @@ class TurningTool:
         tared: ArrayLike | None = None,
     ):
         self.loop = loop
-        self._axis, self._centre, self._weight = (_vector(v) for v in (axis, centre, weight))
-        length = float(np.linalg.norm(self._axis))
+        self._axis, self._centre, self._weight = (
+            +three("a vector of the tool", v) for v in (axis, centre, weight)
+        )
+        length = np.linalg.norm(self._axis)
         if not length > 0.0:
             raise InputError("the tool's axis needs a length, got 0,0,0")
-        self._axis = self._axis / length
+        self._axis /= length
         self._rate = np.zeros(3)
-        self._tared = None if tared is None else _rotation(tared)
+        self._bias = np.zeros(3) if tared is None else _rotation(tared).T @ self._weight
 
     def update(
-        self,
-        force: ArrayLike,
-        position: ArrayLike,
-        rotation: ArrayLike,
-        direction: ArrayLike,
-        missed: float = 0.0,
+        self, force: ArrayLike, position: ArrayLike, rotation: ArrayLike, direction: ArrayLike
     ) -> Array:
         """Velocity of the tool's point [m/s] above its turning [rad/s] for this tick, in the base's axes, shape (6,).
 
@@ -65,14 +62,15 @@ class TurningTool:
             position: of the tool's point [m], shape (3,).
             rotation: of the tool, its axes in columns, shape (3, 3).
             direction: as for `SlidingLoop.update`.
-            missed: ticks that were lost since the last call.
         """
         R = _rotation(rotation)
         arm = R @ self._centre
-        rest = self._weight if self._tared is None else self._weight - R @ self._tared.T @ self._weight
-        velocity = self.loop.update(_vector(force) - rest, _vector(position) + arm, direction, missed)
+        rest = self._weight - R @ self._bias
+        velocity = self.loop.update(
+            three("force", force) - rest, three("position", position) + arm, direction
+        )
         if not self.loop.sliding:
-            self._rate = np.zeros(3)
+            self._rate *= 0.0
             return np.concatenate([velocity, self._rate])
         T, error = SLOWER * self.loop.gains.theta, np.cross(R @ self._axis, self.loop.normal)
         self._rate = _within(self._rate + self.loop.gains.arm.tick / (4.0 * T * T) * error)
@@ -81,19 +79,12 @@ class TurningTool:
 
 
 def _within(turning: Array) -> Array:
-    return turning * min(FASTEST / max(float(np.linalg.norm(turning)), 1e-12), 1.0)
-
-
-def _vector(values: ArrayLike) -> Array:
-    found = np.asarray(values, dtype=np.float64)
-    if found.shape != (3,):
-        raise InputError(f"a vector of the tool needs three numbers, got an array of shape {found.shape}")
-    return found
+    return turning / max(float(np.linalg.norm(turning)) / FASTEST, 1.0)
 
 
 def _rotation(values: ArrayLike) -> Array:
     R = np.asarray(values, dtype=np.float64)
-    if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < 1e-3 or np.linalg.det(R) < 0.0:
+    if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < 1e-3:
         raise InputError(
             "the tool's rotation needs a matrix of shape (3, 3) whose columns are perpendicular unit vectors"
         )
