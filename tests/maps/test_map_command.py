@@ -14,9 +14,10 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from palpate.cli import main
+from palpate.errors import InputError
 from palpate.logs.store import write_record
 from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
-from palpate.maps.presses import read_table
+from palpate.maps.presses import Presses, merge_presses, read_table
 from palpate.maps.result import MapRequest, map_of
 from palpate.records import Record
 
@@ -321,7 +322,7 @@ def test_an_arm_maps_a_phantom(tmp_path, capsys):
 
 
 def test_a_column_of_lines_and_a_folder_of_presses_are_read(table, tmp_path, capsys):
-    """Lines of a table share an error; records of two arms have two frames."""
+    """Lines of a table share an error; records of presses state their places."""
     rows = table.read_text(encoding="utf-8").splitlines()
     lines = [f"{row},{i // 11}" for i, row in enumerate(rows[1:])]
     wide = tmp_path / "lines.csv"
@@ -347,12 +348,12 @@ def test_a_column_of_lines_and_a_folder_of_presses_are_read(table, tmp_path, cap
         (0.02, 0.0, 0.1),
         (0.0, 0.02, 0.1),
     ]
-    write_record(
-        Record(columns, units, {"place_m": [0.0, 0.0, 0.1], "arm": "other"}),
-        tmp_path / "p2" / "record.parquet",
-    )
-    assert main(["map", folders[0], folders[2]]) == 2
-    error = capsys.readouterr().err
-    assert "'one'" in error
-    assert "'other'" in error
-    assert error.count("\n") == 1
+
+
+def test_places_in_two_frames_are_refused():
+    parts = [
+        Presses(np.zeros((1, 3)), np.ones(1), np.ones(1), [f"{arm}.bag"], frames={arm: f"{arm}.bag"})
+        for arm in ("world", "base")
+    ]
+    with pytest.raises(InputError, match=r"base.bag has its place in the frame 'base', world.bag in 'world'"):
+        merge_presses(parts)

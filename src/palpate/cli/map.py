@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 from pathlib import Path
 from time import sleep as wait
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -20,10 +19,10 @@ from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, quantity
 from palpate.errors import InputError
 from palpate.files import check_place, write_text
-from palpate.units import split_spec, unit
+from palpate.units import split_spec
 
 if TYPE_CHECKING:
     from palpate.maps.presses import Presses
@@ -88,17 +87,14 @@ class MapOptions:
             raise InputError(f"--common must be from 0 to 100 %, got {self.common:g}")
         if not 0 <= self.next <= 1000:
             raise InputError(f"--next must be from 0 to 1000, got {self.next}")
-        threshold = (
-            None if self.stiffer_than is None else _number("--stiffer-than", self.stiffer_than, "stiffness")
-        )
-        way = float("inf") if self.way is None else _number("--way", self.way, "length")
+        asked = self.stiffer_than
+        threshold = None if asked is None else _positive("--stiffer-than", asked, "stiffness")
+        way = float("inf") if self.way is None else _positive("--way", self.way, "length")
         start = None
         if self.start is not None:
             numbers, symbol = split_spec(self.start)
-            start = tuple(
-                _number("--start", f"{each}:{symbol or 'm'}", "length", least=None)
-                for each in numbers.split(",")
-            )
+            each = numbers.split(",")
+            start = tuple(quantity("--start", f"{number}:{symbol or 'm'}", "length") for number in each)
         goal = self.goal or ("interval" if threshold is None else "edge")
         half = None if self.until is None else self.until / 100.0
         return MapRequest(self.next, goal, threshold, half, self.common / 100.0, start, way)
@@ -116,7 +112,7 @@ class OutputOptions(ReportOption, JsonOption):
     ply: Path | None = None
     "Where to write the map as coloured points, for a viewer of point clouds."
     mcap: Path | None = None
-    "Where to write the map as it grew, for Foxglove and Lichtblick."
+    "Where to write the map as it grew, for Foxglove, Lichtblick and Rerun."
 
     def check(self) -> None:
         """Check every path before any work is done."""
@@ -304,16 +300,9 @@ def _show(result: MapResult, output: OutputOptions) -> None:
             show_place(screen, f"{kind}:", path)
 
 
-def _number(option: str, text: str, quantity: str, least: float | None = 0.0) -> float:
-    """A number with or without its unit, in SI units, above `least`."""
-    plain, symbol = split_spec(text)
-    known = unit(symbol) if symbol else unit({"stiffness": "N/m", "length": "m"}[quantity])
-    try:
-        value = float(plain) * known.factor
-    except ValueError:
-        raise InputError(f"{option} needs a number, as 2000 or 2:kN/m, got {text!r}") from None
-    if known.quantity != quantity:
-        raise InputError(f"{symbol!r} of {option} is a unit of {known.quantity}; it needs one of {quantity}")
-    if not isfinite(value) or (least is not None and value <= least):
-        raise InputError(f"{option} must be finite{'' if least is None else ' and above 0'}, got {text!r}")
+def _positive(option: str, text: str, kind: str) -> float:
+    """A number with or without its unit, in SI units, above 0."""
+    value = quantity(option, text, kind)
+    if value <= 0.0:
+        raise InputError(f"{option} must be above 0, got {text!r}")
     return value

@@ -279,7 +279,8 @@ class GaussianProcess:
         """Half-width of the central 95 % over the standard deviation, for fields that are not normal, as beside edges.
 
         The quantile of the deviations of values left out and of one unseen (conformal prediction; Vovk et al. 2005),
-        among which the normal distribution counts as so many values as have one outside.
+        among which the normal distribution counts as so many values as have one outside; at least that of the normal
+        distribution, since values that scatter less than they state tell nothing of the field between them.
         """
         found, normal = np.abs(self.likeliest.leave_one_out()), 1.0 / LEVEL
         allowed = LEVEL * (normal + len(found) + 1.0) - 1.0
@@ -287,7 +288,7 @@ class GaussianProcess:
         def excess(z: float) -> float:
             return float(2.0 * normal * norm.sf(z) + np.sum(found > z)) - allowed
 
-        return float(brentq(excess, 0.0, max(5.0, *found)))
+        return max(Z95, float(brentq(excess, 0.0, max(5.0, *found))))
 
     @cached_property
     def _reduction(self) -> Reduction:

@@ -42,7 +42,7 @@ class Presses:
         fields: further quantities of the presses by name, each (n,), NaN where a press has none.
         units: of the fields, SI.
         line: number of the line or log of each press, whose presses share an error (n,); None without.
-        frames: of the places, where logs name them, each with the first press in it; more than one is refused.
+        frames: of the places, where logs name them, each with a press in it; more than one is refused.
 
     Raises:
         InputError: the places are in two frames.

@@ -176,8 +176,7 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
 def _cards(result: MapResult) -> list[Card]:
     cards = [
         Card(
-            f"Lump {k + 1}", plain(float(f"{lump.stiffness:.3g}")), "N/m",
-            plain(float(f"{0.5 * (lump.ci95[1] - lump.ci95[0]):.2g}")),
+            f"Lump {k + 1}", _short(lump.stiffness, 3), "N/m", _short(0.5 * (lump.ci95[1] - lump.ci95[0])),
             f"at {place(lump.place)}; {_area(lump)}", "ok" if lump.is_sure else "warn",
             "stiffer" if lump.is_sure else "perhaps", "K",
         )
@@ -187,20 +186,18 @@ def _cards(result: MapResult) -> list[Card]:
     return [
         *cards,
         *([Card("To press yet", more[0], why=more[1])] if (more := further(result)) else []),
+        Card("Half-width", _short(100.0 * np.median(halves)), "%", why="of the interval, at the median place"),
         Card(
-            "Half-width",
-            plain(float(f"{100.0 * float(np.median(halves)):.2g}")),
-            "%",
-            why="of the interval, at the median place",
-        ),
-        Card(
-            "Press to press",
-            plain(float(f"{100.0 * result.repeat:.2g}")),
-            "%",
+            "Press to press", _short(100.0 * result.repeat), "%",
             why="at one place, 95 %, beyond their own intervals",
         ),
         Card("Presses", str(len(result.map)), why=f"{len(result.presses.refused)} refused"),
-    ]
+    ]  # fmt: skip
+
+
+def _short(value: Any, digits: int = 2) -> str:
+    """A number rounded to some digits."""
+    return plain(float(f"{value:.{digits}g}"))
 
 
 def _area(lump: Lump) -> str:
