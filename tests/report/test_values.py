@@ -39,7 +39,7 @@ def test_a_force_loop_says_its_phase_its_trouble_and_its_gains():
 
 def test_a_parameter_says_number_interval_and_verdict(found):
     assert repr(found.K) == "<Parameter: 5242 ± 62 N/m, identified>"
-    assert repr(found.M) == "<Parameter: -3.7 to 2.9 kg, not identifiable>"
+    assert repr(found.M) == "<Parameter: -2.5 to 2.2 kg, not identifiable>"
     assert "5236 ± 89 N/m" in repr(found.working_point)
 
 

@@ -7,6 +7,7 @@ from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
 from palpate.force.known_surface import Known, known_from
 from palpate.force.sliding.sliding_loop import SlidingLoop
+from palpate.force.sliding.turning_tool import TurningTool
 from palpate.force.tuning import Tuning, tune
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Known",
     "SlidingLoop",
     "Tuning",
+    "TurningTool",
     "certify",
     "known_from",
     "load_arm",

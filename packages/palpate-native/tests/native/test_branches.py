@@ -28,9 +28,9 @@ IN_FORCE_LOOP = {
     "law->bounding > 0.0": "a switch that gains of palpate tune have on",
     "law->backing == 0.0": "a switch that gains of palpate tune have on",
     "variance > 0.0 ? sqrt(variance) : UNKNOWN": "rounding leaves no variance",
-    "known->std.x == 0.0 ||": "the estimate is forgotten in free motion, so the second condition decides nothing",
+    "estimate->std.x == 0.0 ||": "the estimate is forgotten in free motion, so the second condition decides nothing",
     "stopped": "a tip that a servo moves; the recorded presses are those of a position arm",
-    "&& known->found.x > 0.0": "likewise: the last condition of a servo's touch",
+    "&& estimate->value.x > 0.0": "likewise: the last condition of a servo's touch",
     "lead": "likewise",
     "state->law.stage.phase == 2.0": "there is no fourth phase",
 }
@@ -94,7 +94,8 @@ def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(
     left = {branch[:2] for branch, here in taken.items() if not here}
     reasons = {why for why in unreachable for place, line in left if why == place or why in line}
     assert len(taken) > least
-    assert [one for one in left if not any(why == one[0] or why in one[1] for why in unreachable)] == []
+    strange = [one for one in left if not any(why == one[0] or why in one[1] for why in unreachable)]
+    assert not strange, "\n".join(map(str, strange))
     assert reasons == set(unreachable), "a branch that ticks take is not called unreachable"
 
 

@@ -141,7 +141,7 @@ def ground_of(
     low = [
         f"{name} of {value:g}"
         for name, value in numbers.items()
-        if not 0.0 <= value < inf and name not in {"height", "grade"}
+        if not (-1e3 if name in {"height", "grade"} else 0.0) <= value < inf
     ]
     if low or not radius > 0.0 or not stiffness > 0.0:
         raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")

@@ -181,6 +181,7 @@ def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
         settled = np.concatenate(
             [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)] + [np.array(known)]
         )
+        settled = settled[np.isfinite(settled)]
         if len(settled):
             low, high = float(settled.min()), float(settled.max())
             low = 0.0 if panel in (axes[1], axes[2]) else low

@@ -21,7 +21,7 @@ from palpate.force.gains import Gains
 
 MISALIGNED = radians(10.0)
 """Angle between the estimated and the true normal up to which a slide is proved [rad]."""
-WIDTHS = 2.2, 1.6, 1.25, 1.1
+WIDTHS = 2.2, 1.5, 1.2
 """Logarithmic widths of a cell that are tried, in units of that of m."""
 
 
@@ -101,7 +101,7 @@ def slide_proof_sentence(proof: dict[str, Any]) -> str:
         return f"no surface is proved with {said}"
     a, b = proof["felt_stiffness"]
     shares = [f"{one[0]:.3g} to {one[1]:.3g}" for one in proof["bound_share"]]
-    more = f"; with that of a press whose K_u is {' or '.join(shares)} times K, too" if shares else ""
+    more = f"; with K_u of {' or '.join(shares)} times K, too" if shares else ""
     return (
         f"proved stable in a slide, {said}: every surface without damping whose K, as the measured position shows it, "
         f"is {a:.4g} to {b:.4g} N/m, with the gain of the cap{more}"

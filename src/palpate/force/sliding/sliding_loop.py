@@ -199,8 +199,8 @@ class SlidingLoop(Readable):
             missed: ticks that were lost since the last call.
         """
         _slide.compiled(
-            self._numbers, self._state, self._work, self._desired, _three("force", force),
-            _three("position", position), _three("direction", direction), missed, self._velocity,
+            self._numbers, self._state, self._work, self._desired, three("force", force),
+            three("position", position), three("direction", direction), missed, self._velocity,
         )  # fmt: skip
         return self._velocity.copy()
 
@@ -251,7 +251,8 @@ class SlidingLoop(Readable):
         return SLIDING_TROUBLES[float(self._state[places.TROUBLE])]
 
 
-def _three(name: str, values: ArrayLike) -> Array:
+def three(name: str, values: ArrayLike) -> Array:
+    """Three numbers of a vector, or a refusal by its name."""
     given = np.ascontiguousarray(values, dtype=np.float64)
     if given.shape != (3,):
         raise InputError(

@@ -1,0 +1,91 @@
+"""A tool that is kept perpendicular to the surface while it slides: a second, slower loop about its spherical tip."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from palpate.arrays import Array
+from palpate.errors import InputError
+from palpate.force.sliding.sliding_loop import SlidingLoop, three
+
+SLOWER = 10.0
+"""Half the time constant of the turning, in theta: below 10 it moves the normal that the force loop learns."""
+FASTEST = 0.5
+"""Of the turning [rad/s]."""
+
+
+class TurningTool:
+    """Turns a tool's axis into the estimated normal, about the centre of its spherical tip.
+
+    The force loop works on that centre, which moves along a surface parallel to the touched one, with the same normal:
+    so turning about it moves nothing. The turning is a proportional and integral one, critically damped: it follows a
+    normal that turns evenly without an error. A flat tool's moment is not covered.
+
+    Args:
+        loop: holds the force.
+        axis: of the tool, into the surface when it is perpendicular, in the tool's axes, shape (3,).
+        centre: of the tip's sphere from the tool's point, in the tool's axes, shape (3,) [m].
+        weight: reading of the payload alone, without a tare, in the base's axes, shape (3,) [N].
+        tared: the tool's rotation when the sensor was tared, shape (3, 3); None for a sensor that was not.
+
+    Raises:
+        InputError: an axis without length, a vector that is not of three numbers, no rotation.
+    """
+
+    def __init__(
+        self,
+        loop: SlidingLoop,
+        axis: ArrayLike = (0.0, 0.0, 1.0),
+        centre: ArrayLike = (0.0, 0.0, 0.0),
+        weight: ArrayLike = (0.0, 0.0, 0.0),
+        tared: ArrayLike | None = None,
+    ):
+        self.loop = loop
+        self._axis, self._centre, self._weight = (
+            +three("a vector of the tool", v) for v in (axis, centre, weight)
+        )
+        length = np.linalg.norm(self._axis)
+        if not length > 0.0:
+            raise InputError("the tool's axis needs a length, got 0,0,0")
+        self._axis /= length
+        self._rate = np.zeros(3)
+        self._bias = np.zeros(3) if tared is None else _rotation(tared).T @ self._weight
+
+    def update(
+        self, force: ArrayLike, position: ArrayLike, rotation: ArrayLike, direction: ArrayLike
+    ) -> Array:
+        """Velocity of the tool's point [m/s] above its turning [rad/s] for this tick, in the base's axes, shape (6,).
+
+        Args:
+            force: reading [N], in the base's axes, shape (3,).
+            position: of the tool's point [m], shape (3,).
+            rotation: of the tool, its axes in columns, shape (3, 3).
+            direction: as for `SlidingLoop.update`.
+        """
+        R = _rotation(rotation)
+        arm = R @ self._centre
+        rest = self._weight - R @ self._bias
+        velocity = self.loop.update(
+            three("force", force) - rest, three("position", position) + arm, direction
+        )
+        if not self.loop.sliding:
+            self._rate *= 0.0
+            return np.concatenate([velocity, self._rate])
+        T, error = SLOWER * self.loop.gains.theta, np.cross(R @ self._axis, self.loop.normal)
+        self._rate = _within(self._rate + self.loop.gains.arm.tick / (4.0 * T * T) * error)
+        turning = _within(self._rate + error / T)
+        return np.concatenate([velocity - np.cross(turning, arm), turning])
+
+
+def _within(turning: Array) -> Array:
+    return turning / max(float(np.linalg.norm(turning)) / FASTEST, 1.0)
+
+
+def _rotation(values: ArrayLike) -> Array:
+    R = np.asarray(values, dtype=np.float64)
+    if R.shape != (3, 3) or not np.abs(R @ R.T - np.eye(3)).max() < 1e-3:
+        raise InputError(
+            "the tool's rotation needs a matrix of shape (3, 3) whose columns are perpendicular unit vectors"
+        )
+    return R

@@ -1,0 +1,94 @@
+"""A tool kept perpendicular while it slides: its turning, the centre of its tip, its weight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from palpate.errors import InputError
+from palpate.force import SlidingLoop, load_arm
+from palpate.force.gains import gains_for
+from palpate.force.slide_table import Slide
+from palpate.force.sliding import slide_state as places
+from palpate.force.sliding.slide_law import slide_from
+from palpate.force.sliding.turning_tool import TurningTool
+
+RADIUS, STIFFNESS, TICK = 0.15, 5e3, 0.002
+CENTRE = np.array([0.0, 0.0, -0.02])
+WEIGHT = np.array([0.0, 0.0, -12.0])
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+def turned(R: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """The rotation after a tick of turning."""
+    angle = float(np.linalg.norm(w)) * TICK
+    k = w / max(float(np.linalg.norm(w)), 1e-12)
+    cross = np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+    return (np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross) @ R
+
+
+def wiped(centre=CENTRE, weight=WEIGHT, ticks=5000) -> tuple[float, float]:
+    """Rms of the force error [share], and the tool's last angle to the normal [rad], in a bowl without friction."""
+    gains = replace(
+        gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9, slope=0.05)
+    )
+    tool = TurningTool(SlidingLoop(gains), centre=centre, weight=weight, tared=DOWN)
+    rng, R, middle = np.random.default_rng(0), DOWN, np.array([0.0, 0.0, RADIUS])
+    command = np.array([0.0, 0.0, 0.003]) - R @ CENTRE
+    tip, forces = command.copy(), []
+    for k in range(ticks):
+        away = tip + R @ CENTRE - middle
+        depth = max(float(np.linalg.norm(away)) - RADIUS, 0.0)
+        n = away / np.linalg.norm(away)
+        reading = STIFFNESS * depth * n + WEIGHT - R @ DOWN.T @ WEIGHT + rng.normal(0.0, 0.1, 3)
+        way = [np.cos(0.4 * k * TICK), np.sin(0.4 * k * TICK), 0.0]
+        twist = tool.update(reading, tip, R, way)
+        command = command + TICK * twist[:3]
+        tip, R = tip + TICK / 0.04 * (command - tip), turned(R, twist[3:])
+        if tool.loop.sliding:
+            forces.append(STIFFNESS * depth)
+    error = np.array(forces[250:]) / 10.0 - 1.0
+    return float(np.sqrt(np.mean(error**2))), float(np.arccos(np.clip(R[:, 2] @ n, -1.0, 1.0)))
+
+
+@pytest.mark.long
+def test_a_tool_turns_into_the_normal_while_the_force_is_held() -> None:
+    rms, angle = wiped()
+    assert rms < 0.01
+    assert angle < np.radians(3.0)
+
+
+@pytest.mark.long
+def test_a_weight_that_is_not_taken_off_is_a_force() -> None:
+    assert wiped(weight=np.zeros(3))[0] > 2.0 * wiped()[0]
+
+
+def test_turning_is_about_the_centre_of_the_tip() -> None:
+    gains = replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9))
+    turning, fixed = TurningTool(SlidingLoop(gains), centre=CENTRE), SlidingLoop(gains)
+    R = turned(DOWN, np.array([40.0, 25.0, 0.0]))
+    for loop in (turning.loop, fixed):
+        state = loop.state
+        state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
+        slide_from(loop.law, state, places.Vec3(0.0, 0.0, -1.0), 10.0, 2e4, 0.1, 0.12, 0.35, 0.3)
+    for k in range(5):
+        tip = np.array([1e-5 * k, 0.0, 0.0])
+        twist = turning.update([0.0, 0.0, -10.0], tip - R @ CENTRE, R, [1.0, 0.0, 0.0])
+        v = fixed.update([0.0, 0.0, -10.0], tip, [1.0, 0.0, 0.0])
+    assert np.linalg.norm(twist[3:]) > 0.05
+    assert twist[:3] + np.cross(twist[3:], R @ CENTRE) == pytest.approx(v, abs=1e-12)
+    assert twist[3:] @ np.cross(R[:, 2], turning.loop.normal) > 0.0
+
+
+def test_a_tool_that_is_none_is_refused() -> None:
+    loop = SlidingLoop(
+        replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9))
+    )
+    with pytest.raises(InputError, match="length"):
+        TurningTool(loop, axis=(0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="three numbers"):
+        TurningTool(loop, centre=(0.0, 0.02))
+    with pytest.raises(InputError, match="perpendicular"):
+        TurningTool(loop).update(np.zeros(3), np.zeros(3), np.ones((3, 3)), np.zeros(3))
+    assert not TurningTool(loop).update(np.zeros(3), np.zeros(3), np.eye(3), np.zeros(3))[3:].any()
