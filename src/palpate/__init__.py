@@ -27,7 +27,6 @@ The rooms, each `palpate.ROOM`:
     environments    surfaces: Kelvin-Voigt, Hunt-Crossley, standard linear solid
     instruments     encoders, force sensors, filters, each with its lag
     checks          the conformance suite of all parts, for your own too
-    analysis        force controllers of others: where they are stable
     report          figures, tables, pages
 
 Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
@@ -57,7 +56,6 @@ _HOME = {
 }
 
 _ROOMS = (
-    "analysis",
     "bench",
     "checks",
     "contact_frame",

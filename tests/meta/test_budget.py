@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=325, lines=58945, tokens=399619),
+    "src/palpate": Weight(files=328, lines=59527, tokens=403617),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=68, lines=10726, tokens=81142),
     "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2715, tokens=21005),

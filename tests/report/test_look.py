@@ -95,6 +95,7 @@ def test_no_colour_stands_anywhere_but_among_the_tokens(root):
         if path.suffix in (".py", ".js", ".css", ".html")
         and "vendor" not in path.parts
         and path.parts[-2:] != ("look", "assets.py")
+        and path.name != "load_files.py"  # a file of Franka has a colour of its own
         for code in codes.findall(path.read_text(encoding="utf-8"))
     ]
     assert strange == []

@@ -118,7 +118,7 @@ def _print(
 ) -> None:
     check = output.check
     if output.json:
-        answer = found.to_json()
+        answer = found.to_json() | {"check": None}
         if check is not None:
             numbers = [row._asdict() | {"agrees": row.agrees} for row in rows]
             agrees = bool(rows) and all(row.agrees for row in rows)
