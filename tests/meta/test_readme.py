@@ -34,7 +34,8 @@ def blocks(root, page: str, language: str) -> list[str]:
 def commands(root, page: str, first: str) -> list[str]:
     """Lines of code blocks, fenced or indented, that begin with the word; a fenced `text` is output."""
     text = (root / page).read_text(encoding="utf-8")
-    fenced = [line for name, body in FENCED.findall(text) if name not in ("python", "text") for line in body.splitlines()]
+    bodies = [body for name, body in FENCED.findall(text) if name not in ("python", "text")]
+    fenced = [line for body in bodies for line in body.splitlines()]
     lines = fenced + INDENTED.findall(FENCED.sub("", text))
     return [line.split(" #")[0].strip() for line in lines if line.split()[:1] == [first]]
 
