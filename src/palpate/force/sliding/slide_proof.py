@@ -21,7 +21,7 @@ from palpate.force.gains import Gains
 
 MISALIGNED = radians(10.0)
 """Angle between the estimated and the true normal up to which a slide is proved [rad]."""
-WIDTHS = 2.2, 1.5, 1.2
+WIDTHS = 2.2, 1.6, 1.25, 1.1
 """Logarithmic widths of a cell that are tried, in units of that of m."""
 
 
