@@ -197,7 +197,7 @@ def test_a_centre_is_turned_into_the_axes_of_the_sensor(elsewhere, capsys):
 
 
 @pytest.mark.long
-def test_a_right_load_file_agrees_with_95_logs_of_a_hundred(monkeypatch):
+def test_a_right_load_file_agrees_with_95_percent_of_logs(monkeypatch):
     from palpate.contact_frame import ContactFrame, compare, weigh
     from palpate.contact_frame.load_files import ToolLoad
 
@@ -208,4 +208,4 @@ def test_a_right_load_file_agrees_with_95_logs_of_a_hundred(monkeypatch):
         found = weigh(log_of(tool, six(), np.random.default_rng(seed)), frame)
         rows = compare(found, right, (0.0, 0.0, 0.0), compensated=False)
         held += all(row.agrees for row in rows)
-    assert held >= 88  # of 100 of 95 %, less is one case in a thousand
+    assert held >= 33  # of 40 of 95 %; less is one case in a thousand

@@ -224,8 +224,8 @@ def test_nobody_but_its_master_moves_an_arm_even_with_the_number_of_its_session(
             return heard
 
         heard = hear(master, greeting, None)
-        assert hear(stranger, down, heard).speed == 0.0
-        assert hear(master, down, heard).speed == 0.01
+        np.testing.assert_array_equal(hear(stranger, down, heard).velocity, 0.0)
+        np.testing.assert_array_equal(hear(master, down, heard).velocity, (0.0, 0.0, -0.01))
 
 
 def test_an_arm_rests_when_its_master_dies_and_its_record_is_recovered(folder, here, capsys):

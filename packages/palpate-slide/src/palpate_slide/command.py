@@ -240,6 +240,7 @@ def slide(
         summary: dict[str, Any] = with_author(
             {"command": printable(command()), **head, **summarise(rows, gains, ground)}
         )
+        summary["along"] = None
         if asked.dither:
             along = stiffness_along(rows, gains.arm, dither_frequency(gains))
             write_text(fresh / "places.csv", along.to_csv())

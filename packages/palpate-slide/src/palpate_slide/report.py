@@ -146,7 +146,7 @@ def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
     """The stiffness along the path of a dithered slide, folded."""
     rows = [
         [f"x {1e3 * p['x']:.3g}, y {1e3 * p['y']:.3g} mm", quantity(p["stiffness"], "N/m", p["half"])]
-        for p in summary.get("along", [])
+        for p in summary.get("along") or []
     ]
     return [("Stiffness along the path", f"{len(rows)} places, for palpate map --table places.csv", rows)]
 
