@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import queue
 import re
 import select
 import socket
@@ -51,13 +52,15 @@ def stand_in(module, address, *words):
             assert select.select([process.stdout], [], [], PATIENCE)[0]
             process.stdout.readline()
 
+            lines: queue.Queue[str] = queue.Queue()
+            threading.Thread(target=lambda: [*map(lines.put, process.stderr)], daemon=True).start()
+
             def refused(word):
                 """The next lines, up to one that has this word."""
-                while select.select([process.stderr], [], [], PATIENCE)[0]:
-                    line = process.stderr.readline()
-                    if word in line or not line:
-                        return line
-                raise AssertionError(f"nothing about {word}")
+                line = lines.get(timeout=PATIENCE)
+                while word not in line:
+                    line = lines.get(timeout=PATIENCE)
+                return line
 
             yield refused
             assert process.poll() is None, "the stand-in has died"

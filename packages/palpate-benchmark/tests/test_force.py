@@ -203,16 +203,10 @@ def test_recorded_presses_are_judged_as_simulated_ones(tmp_path):
         state += (wanted[k] * (t[k] >= 0.5) - state) / rate / 0.05
         force[k] = state
     columns = {"t": t, "force_sampled": force, "phase": (t >= 0.5) * 1.0}
-    meta = {
-        "title": "an arm",
-        "desired_N": 20.0,
-        "hold_s": hold,
-        "probe": 0.2,
-        "rate_Hz": rate,
-        "noise_N": 0.01,
-    }
+    about = {"title": "an arm", "desired_N": 20.0, "hold_s": hold, "probe": 0.2}
     write_record(
-        Record(columns, {"t": "s", "force_sampled": "N", "phase": "1"}, meta), tmp_path / "record.parquet"
+        Record(columns, {"t": "s", "force_sampled": "N", "phase": "1"}, {"wire": about}),
+        tmp_path / "record.parquet",
     )
     result = judge((tmp_path / "record.parquet",))
     (run,) = result.runs
@@ -241,13 +235,15 @@ def test_a_press_over_a_wire_is_judged_by_its_record(tmp_path, capsys):
     import sys
 
     arm = Path(tmp_path / "gains.toml")
-    assert main(["tune", "--stiffness", "1e3:2e4", "--arm", "ur5e", "--force", "5", "--out", str(arm)]) == 0
+    assert main(["tune", "--stiffness", "1e3:2e4", "--arm", "ur5e", "--force", "20", "--out", str(arm)]) == 0
     words = [
         sys.executable,
         "-m",
         "palpate_rehearsal.sim_arm",
         "--arm",
         "ur5e",
+        "--gap",
+        "0.0005",
         "--seconds",
         "60",
         "--port",
@@ -257,8 +253,9 @@ def test_a_press_over_a_wire_is_judged_by_its_record(tmp_path, capsys):
         try:
             line = process.stdout.readline()
             address = line.split()[-1]
-            press = ["press", "--wire", address, "--gains", str(arm), "--force", "5:N", "--normal", "0,0,-1"]
-            limits = ["--force-limit", "40:N", "--speed-limit", "20:mm/s", "--time-limit", "40:s"]
+            press = ["press", "--wire", address, "--gains", str(arm), "--force", "20:N", "--normal", "0,0,-1"]
+            press += ["--probe", "0.2"]
+            limits = ["--force-limit", "90:N", "--speed-limit", "20:mm/s", "--time-limit", "40:s"]
             code = main([*press, *limits, "--yes", "--record", str(tmp_path / "first")])
         finally:
             process.terminate()

@@ -34,12 +34,12 @@ def judge(paths: tuple[Path, ...]) -> ForceResult:
         InputError: no record of a press over a wire, one that met no surface, or records of several arms.
     """
     records = [_read(path) for path in paths]
-    titles, forces = ({r.meta[key] for r in records} for key in ("title", "desired_N"))
+    titles, forces = ({r.meta["wire"][key] for r in records} for key in ("title", "desired_N"))
     if len(titles) > 1 or len(forces) > 1:
         raise InputError(
             f"the records are of different arms or forces ({', '.join(map(str, [*titles, *forces]))}); judge each alone"
         )
-    rate = float(records[0].meta["rate_Hz"])
+    rate = _rate(records[0])
     runs = tuple(_run(record, path) for record, path in zip(records, paths, strict=True))
     own = OnSurface(np.nan, runs, records[0]["force_sampled"])
     title = str(titles.pop())
@@ -48,25 +48,36 @@ def judge(paths: tuple[Path, ...]) -> ForceResult:
 
 def _read(path: Path) -> Record:
     record = read_record(path / RECORD if path.is_dir() else path)
-    missing = {"desired_N", "hold_s", "probe", "rate_Hz", "noise_N", "title"} - set(record.meta)
-    if missing or "phase" not in record.columns:
+    about = record.meta.get("wire")
+    known = isinstance(about, dict) and {"desired_N", "hold_s", "probe", "title"} <= set(about)
+    if not known or "phase" not in record.columns or len(record) < 3:
         raise InputError(f"{path} is no record of palpate press --wire; record one with --record")
     return record
 
 
+def _rate(record: Record) -> float:
+    """Readings a second [Hz]."""
+    return 1.0 / float(np.median(np.diff(record["t"])))
+
+
+def _noise(force: Array) -> float:
+    """Standard deviation of a reading in free motion by second differences, which no drift changes [N]."""
+    return float(np.sqrt(np.mean(np.diff(force, 2) ** 2) / 6.0)) if len(force) > 2 else 0.0
+
+
 def _run(record: Record, path: Path) -> RunMetrics:
     force, phase, t = record["force_sampled"], record["phase"], record["t"]
-    rate, noise = float(record.meta["rate_Hz"]), float(record.meta["noise_N"])
+    rate, about = _rate(record), record.meta["wire"]
     if not (phase > 0.0).any():
         raise InputError(f"{path}: the press met no surface")
-    plan = Plan(float(record.meta["desired_N"]), float(record.meta["hold_s"]), float(record.meta["probe"]))
+    plan = Plan(float(about["desired_N"]), float(about["hold_s"]), float(about["probe"]))
     begin = int(np.argmax(phase > 0.0))
     since = t[begin:] - t[begin]
     held = since < plan.seconds
     force, before = force[begin:][held], force[:begin]
     wanted = np.array([plan.desired(s) for s in since[held]])
     first = since[held] < plan.seconds / 3.0
-    found = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * noise)
+    found = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))
     steps = _steps(force, wanted, rate)
     none = ForceStep(None, None, np.nan)
     down, up = ([s for s, lower in steps if lower is side] or [none] for side in (True, False))
