@@ -186,7 +186,9 @@ def test_confidently_wrong_is_far_off_or_many_half_widths():
     [
         pytest.param(
             "friction/held-steady",
-            marks=pytest.mark.xfail(strict=True, reason="friction that holds as a spring counts as stiffness"),
+            marks=pytest.mark.xfail(
+                strict=True, reason="friction that holds as a spring counts as stiffness"
+            ),
         ),
         "kelvin-voigt/payload",  # air beside a tool's inertia
         "kelvin-voigt/encoder",  # a motion of a few counts
