@@ -184,10 +184,10 @@ def output(command: str) -> str:
 
 
 def smoke(figure: Figure) -> str:
-    """What the small run prints; of a figure of times its words alone."""
+    """What the small run prints; of a figure of times its words alone, however wide its columns are."""
     with tempfile.TemporaryDirectory() as folder:
         text = output(f"{figure.script} {figure.smoke.replace('{tmp}', folder)}".strip()).replace(folder, "")
-    return re.sub(r"[-+]?\d[\d.e+-]*", "#", text) if figure.times else text
+    return re.sub(r" +", " ", re.sub(r"[-+]?\d[\d.e+-]*", "#", text)) if figure.times else text
 
 
 def smoke_file(figure: Figure) -> Path:
