@@ -169,7 +169,7 @@ def _of_json(path: Path) -> Iterator[ToolLoad]:
     except msgspec.DecodeError as error:
         raise InputError(f"{path} is no JSON file: {error}") from None
     if isinstance(file, dict) and "mass" in file:
-        yield _checked(path, file["mass"], file.get("centerOfMass"))
+        yield _load_from(path, file["mass"], file.get("centerOfMass"))
 
 
 def _of_yaml(path: Path) -> Iterator[ToolLoad]:
@@ -182,16 +182,16 @@ def _of_yaml(path: Path) -> Iterator[ToolLoad]:
         seen.add(id(place))
         tool, compensation = place.get("tool"), place.get("gravity_compensation")
         if isinstance(tool, dict) and "mass" in tool:
-            yield _checked(path, tool["mass"], tool.get("CoG", tool.get("pos")), "sensor")
+            yield _load_from(path, tool["mass"], tool.get("CoG", tool.get("pos")), "sensor")
         centre = compensation.get("CoG") if isinstance(compensation, dict) else None
         if isinstance(centre, dict) and "force" in centre:
             force = centre["force"]
             mass = abs(force) / GRAVITY if isinstance(force, int | float) else force
-            yield _checked(path, mass, centre.get("pos"), "sensor")
+            yield _load_from(path, mass, centre.get("pos"), "sensor")
         places += place.values()
 
 
-def _checked(path: Path, mass: Any, centre: Any, axes: Literal["flange", "sensor"] = "flange") -> ToolLoad:
+def _load_from(path: Path, mass: Any, centre: Any, axes: Literal["flange", "sensor"] = "flange") -> ToolLoad:
     try:
         return ToolLoad(
             float(mass), None if centre is None else np.array(centre, dtype=float).reshape(3), axes
