@@ -50,6 +50,8 @@ ALONE = (
 )
 """Of DDS, which is kept on the loopback."""
 DOMAIN = 20 + os.getpid() % 180
+ADDRESSES = (f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.{last}" for last in range(1, 255))
+"""Of the loopback, each given away once: a server of an earlier test may still hold its ports."""
 PATIENCE = 60.0
 """For which a process may take to start, or to end [s]."""
 LATE = re.compile(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import sys
 import threading
@@ -18,13 +17,12 @@ from palpate.cli import main
 from palpate.force import ForceLoop
 from palpate.logs import read_record
 from palpate.logs.read import read_run
-from wires.slow_cell import ALONE, DOMAIN, WORDS, child, slower_cell, while_it_presses
+from wires.slow_cell import ADDRESSES, ALONE, DOMAIN, WORDS, child, slower_cell, while_it_presses
 
-OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
 KINDS = {
     "sim": ("palpate_rehearsal.sim_arm", (), "{line}"),
-    "rtde": ("palpate_rehearsal.rtde_arm", ("--address", f"{OWN}.19"), "{line}"),
-    "franka": ("palpate_rehearsal.franka_arm", ("--address", f"{OWN}.20"), "{line}"),
+    "rtde": ("palpate_rehearsal.rtde_arm", ("--address", next(ADDRESSES)), "{line}"),
+    "franka": ("palpate_rehearsal.franka_arm", ("--address", next(ADDRESSES)), "{line}"),
     "ros2": (
         "palpate_rehearsal.ros2_arm", ("--domain", str(DOMAIN)),
         "{line}?wrench=/ft/wrench&pose=/tcp/pose&command=/command&as=twist&wrench-frame=tool&force-sign=reaction",

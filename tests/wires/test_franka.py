@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -22,7 +21,7 @@ from palpate.wires import LostError, open_wire, realtime
 from palpate.wires.at_rest import from_matrix_by_columns
 from palpate.wires.franka_driver import Driver, nearer
 from palpate.wires.protocol import Command
-from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
 pytest.importorskip("franky_sim", reason="franky-sim is not installed")
@@ -38,8 +37,8 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def address():
-    """Of the loopback, of its own for each process that tests."""
-    return f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.10"
+    """Of the loopback, of its own for each test."""
+    return next(ADDRESSES)
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 import subprocess
@@ -18,7 +17,7 @@ from palpate.errors import InputError
 from palpate.wires import Command, LostError, Sense, realtime
 from palpate.wires.host import Host
 from palpate.wires.protocol import SilentError
-from wires.slow_cell import PATIENCE, WORDS, cell
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, cell
 
 SENSE = Sense(1.0, 2.0, (3.0, 4.0, 5.0), (6.0, 7.0, 8.0), (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0))
 DOWN = Command((0.0, 0.0, -0.01), (0.1, 0.2, 0.3))
@@ -174,7 +173,7 @@ def mute(address, answers):
 def test_ctrl_c_ends_it_at_once_though_a_ur_accepts_and_never_answers(tmp_path, answers):
     """ur-rtde itself would hold the interpreter, and no Ctrl-C would be heard."""
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
-    address = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.{44 + answers}"
+    address = next(ADDRESSES)
     cell(tmp_path)
     words = ["press", "--wire", f"rtde:{address}", "--gains", "gains.toml", *WORDS, "--dry-run"]
     command = [sys.executable, "-m", "palpate", *words]

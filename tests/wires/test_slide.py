@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -24,7 +23,7 @@ from palpate.logs import read_record
 from palpate.wires import Limits, Rows, Task, checked, press
 from palpate.wires.order import Path as SlidePath
 from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
-from wires.slow_cell import PATIENCE, WORDS, arm, cell, child, relayed, wait_for_rows
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, wait_for_rows
 from wires.test_press import FakeWire
 
 PATH = SlidePath("back", 0.01, 6.0)
@@ -161,7 +160,7 @@ def test_it_slides_over_the_protocol_of_a_simulated_arm(folder, here, capsys):
 
 def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
-    address = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.7"
+    address = next(ADDRESSES)
     where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60", "--stiffness", "4000")
     with child("-m", "palpate_rehearsal.rtde_arm", *where) as (_, line):
         code = main(words_of(folder, line, "--yes", "--json"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -15,9 +14,9 @@ import pytest
 
 from palpate.force import ForceLoop
 from palpate.logs import read_record
-from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, while_it_presses
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, child, slower_cell, while_it_presses
 
-OWN = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
+ARM, OWN = next(ADDRESSES), next(ADDRESSES)
 LIBRARIES = {"rtde": "rtde_control", "franka": "franky_sim"}
 RELAY = Path(__file__).parent / "relay.py"
 
@@ -39,7 +38,7 @@ def spoiled_press(kind, fault, folder, where, *more):
         "-m",
         f"palpate_rehearsal.{kind}_arm",
         "--address",
-        f"{OWN}.30",
+        ARM,
         "--arm",
         folder / "arm.toml",
         "--seconds",
@@ -47,13 +46,13 @@ def spoiled_press(kind, fault, folder, where, *more):
     )
     with (
         child(*arm, "--gap", "0.002", *more) as (_, line),
-        child(RELAY, kind, f"{OWN}.31", f"{OWN}.30", fault) as (relay, _),
+        child(RELAY, kind, OWN, ARM, fault) as (relay, _),
     ):
-        assert line == f"{kind}:{OWN}.30"
+        assert line == f"{kind}:{ARM}"
         words = [
             "press",
             "--wire",
-            f"{kind}:{OWN}.31",
+            f"{kind}:{OWN}",
             "--gains",
             folder / "gains.toml",
             *WORDS,

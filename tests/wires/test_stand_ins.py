@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import queue
 import re
 import select
@@ -27,9 +26,8 @@ from palpate_rehearsal.rehearsal import Joints, ToolAxisArm
 from palpate_rehearsal.rtde_arm import RTDE, SCRIPT, Server
 from palpate_rehearsal.rtde_controller import SIMULATED, Controller
 from palpate_rehearsal.rtde_dictionary import INPUTS, OUTPUTS
-from wires.slow_cell import PATIENCE
+from wires.slow_cell import ADDRESSES, PATIENCE
 
-ADDRESS = f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}"
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "wires.md"
 
 
@@ -102,9 +100,9 @@ class Client:
 
 
 @pytest.fixture
-def ur(request):
+def ur():
     """A simulated UR in this process, on a thread, for two of its seconds; its address and its controller."""
-    address = f"{ADDRESS}.{30 + len(request.node.name) % 20}"
+    address = next(ADDRESSES)
     controller = Controller(ToolAxisArm(load_arm("ur5e"), surface(5000.0, 20.0), 0.002, (0.0, 0.0, 3.0), 0))
     server = Server(address, controller)
     thread = threading.Thread(target=server.serve, args=(2.0,))
@@ -234,7 +232,7 @@ def test_ur_rtde_reads_no_garbage_and_is_refused_by_name():
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
     from rtde_receive import RTDEReceiveInterface
 
-    address = f"{ADDRESS}.20"
+    address = next(ADDRESSES)
     with stand_in("rtde_arm", address) as refused:
         receive = RTDEReceiveInterface(address)  # asks for all variables
         q, pose = receive.getActualQ(), receive.getActualTCPPose()
@@ -257,7 +255,7 @@ def test_each_command_of_ur_rtde_is_simulated_or_refused_by_name():
     from rtde_control import RTDEControlInterface
     from rtde_receive import RTDEReceiveInterface
 
-    address = f"{ADDRESS}.21"
+    address = next(ADDRESSES)
     with stand_in("rtde_arm", address) as refused:
         ur_rtde(address, refused, REFUSED, False)
         ur_rtde(address, refused, SENT, True)
@@ -291,7 +289,7 @@ def franka_robot(address):
 
 
 def test_libfranka_is_refused_by_name_and_the_stand_in_lives():
-    library, connect = franka_robot(address := f"{ADDRESS}.22")
+    library, connect = franka_robot(address := next(ADDRESSES))
     with stand_in("franka_arm", address, "--gap", "0.05") as refused:
         mode = library.ControllerMode.JointImpedance
         robot = connect()
@@ -327,7 +325,7 @@ def test_libfranka_is_refused_by_name_and_the_stand_in_lives():
 
 @pytest.mark.long
 def test_a_motion_by_libfranka_moves_and_a_turning_one_is_a_reflex():
-    library, connect = franka_robot(address := f"{ADDRESS}.23")
+    library, connect = franka_robot(address := next(ADDRESSES))
 
     def drive(robot, ticks, *speeds):
         control = robot.start_cartesian_velocity_control(library.ControllerMode.JointImpedance)
@@ -389,7 +387,7 @@ def test_the_motions_of_franky_move_or_are_refused():
     pytest.importorskip("franky_sim", reason="franky-sim is not installed")
     if find_spec("franky") is None:
         pytest.skip("franky-control is not installed")
-    with stand_in("franka_arm", address := f"{ADDRESS}.24", "--gap", "0.05") as refused:
+    with stand_in("franka_arm", address := next(ADDRESSES), "--gap", "0.05") as refused:
         command = [sys.executable, "-c", FRANKY, address]
         said = subprocess.run(
             command, capture_output=True, text=True, timeout=PATIENCE, check=True

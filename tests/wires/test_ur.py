@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from palpate.cli import main
 from palpate.logs import read_record
 from palpate.wires import Command, open_wire
 from palpate.wires.at_rest import from_rotation_vector, turned
-from wires.slow_cell import WORDS, cell, child, wait_for_rows, while_it_presses
+from wires.slow_cell import ADDRESSES, WORDS, cell, child, wait_for_rows, while_it_presses
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
 
@@ -32,8 +31,8 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def address():
-    """Of the loopback, of its own for each process that tests."""
-    return f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.9"
+    """Of the loopback, of its own for each test."""
+    return next(ADDRESSES)
 
 
 @contextmanager
