@@ -9,9 +9,27 @@ from typing import Any
 
 import numpy as np
 
-from palpate_native.expressions import Value, number
 from palpate_native.source import constant_notes
-from palpate_native.structs import Structs, c_name, is_struct, members, plain
+from palpate_native.structs import Structs, c_name, is_struct, members
+
+
+def number(value: float | bool) -> str:
+    """A number as C reads it back, to the last bit."""
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return "NAN" if math.isnan(value) else repr(float(value))
+
+
+def initial(value: Any, kind: Any) -> str:
+    """A part's numbers as C initialises a struct with them."""
+    if not is_struct(kind):
+        return number(value)
+    inner = (initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True))
+    return "{" + ", ".join(inner) + "}"
 
 
 class Constants:
@@ -27,34 +45,16 @@ class Constants:
         self._names: dict[Any, str] = {}
         self.definitions: list[str] = []
 
-    def value(self, name: str, value: Any, function: Callable[..., Any]) -> Value | None:
-        """A number or a part that a module's name stands for; None if it is none of them."""
-        part = isinstance(value, tuple) and hasattr(value, "_fields")
-        if not part and (type(value) not in (int, float) or not math.isfinite(value)):
-            return None
-        import numba
-
-        kind, (module, note) = plain(numba.typeof(value)), _home(name, value, function)
-        text = f"{self._structs.name(kind)} NAME = {self.initial(value, kind)};"
-        return Value(self._define(name, module, text, note), kind, place="named")
-
-    def table(self, name: str, numbers: Any, function: Callable[..., Any]) -> str:
-        """The name of a table of numbers that a module holds, row by row."""
-        flat = np.asarray(numbers, dtype=np.float64).ravel()
-        rows = (", ".join(map(number, row.tolist())) for row in np.split(flat, range(6, len(flat), 6)))
-        text = f"double NAME[{len(flat)}] = {{" + "".join(f"\n    {row}," for row in rows) + "\n};"
-        note = constant_notes(function.__code__.co_filename).get(name, "")
-        return self._define(name, function.__module__, text, note)
-
-    def initial(self, value: Any, kind: Any) -> str:
-        """A part's numbers as C initialises a struct with them."""
-        if not is_struct(kind):
-            return number(value)
-        inner = (self.initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True))
-        return "{" + ", ".join(inner) + "}"
-
-    def _define(self, name: str, module: str, text: str, note: str) -> str:
+    def name(self, name: str, value: Any, kind: Any, function: Callable[..., Any]) -> str:
+        """The name of a number or a part; of a table of numbers, row by row, if it has no `kind`."""
+        if kind is not None:
+            text = f"{self._structs.name(kind)} NAME = {initial(value, kind)};"
+        else:
+            flat = np.asarray(value, dtype=np.float64).ravel()
+            rows = (", ".join(map(number, row.tolist())) for row in np.split(flat, range(6, len(flat), 6)))
+            text = f"double NAME[{len(flat)}] = {{" + "".join(f"\n    {row}," for row in rows) + "\n};"
         if (name, text) not in self._names:
+            module, note = _home(name, value, function)
             own = self._names[name, text] = self._claim(c_name(name), module.rpartition(".")[2])
             says = f"/* {note} */\n" if note else ""
             self.definitions.append(f"{says}static const {text.replace('NAME', own, 1)}")

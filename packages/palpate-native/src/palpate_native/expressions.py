@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ast
 import builtins
+import functools
 import inspect
 import math
 import operator
 from collections import ChainMap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -16,8 +17,10 @@ import numpy as np
 
 from palpate._jit.registry import parts, stored
 from palpate._jit.stored import kind_of
+from palpate_native.constants import number
+from palpate_native.normal_form import normal_form
 from palpate_native.source import refuse, syntax_of
-from palpate_native.structs import by_pointer, c_name, is_struct, members, plain, result_places, value_type
+from palpate_native.structs import by_pointer, c_name, is_struct, members, plain
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""
@@ -27,7 +30,6 @@ OPERATORS = {
     ast.Mod: ("modulo", operator.mod, ATOM), ast.FloorDiv: ("floored", operator.floordiv, ATOM),
     ast.Lt: ("<", operator.lt, ORDER), ast.LtE: ("<=", operator.le, ORDER), ast.Gt: (">", operator.gt, ORDER),
     ast.GtE: (">=", operator.ge, ORDER), ast.Eq: ("==", operator.eq, EQUAL), ast.NotEq: ("!=", operator.ne, EQUAL),
-    ast.In: ("==", operator.eq, EQUAL), ast.NotIn: ("==", operator.eq, EQUAL),
 }  # fmt: skip
 """Operators of two numbers: in C, in Python, and how tightly C binds them; a helper's name where C has none."""
 POWERS = {0.5: "root", 2: "square", 3: "cube"}
@@ -47,7 +49,7 @@ class Value(NamedTuple):
         rank: how tightly it binds.
         place: "" for a value, "named" for one that has an address, "pointer" for the address of a struct.
         fields: of a struct that is made here.
-        call: of a function that writes large structs, @ for the address of each.
+        call: of a function that writes a large struct, up to the address.
     """
 
     text: str
@@ -75,24 +77,6 @@ class Value(NamedTuple):
     def address(self) -> str:
         """Where a struct is."""
         return self.text if self.place == "pointer" else f"&{self._within(UNARY)}"
-
-
-def with_addresses(call: str, *addresses: str) -> str:
-    """A call of a function that writes structs, with their addresses."""
-    for address in addresses:
-        call = call.replace("@", address, 1)
-    return call
-
-
-def number(value: float | bool) -> str:
-    """A number as C reads it back, to the last bit."""
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
-    return "NAN" if math.isnan(value) else repr(float(value))
 
 
 class Expressions:
@@ -125,10 +109,9 @@ class Expressions:
         if alone:
             self._alone.add(id(node))
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
-        if method is None:
-            refuse(self.function, node, type(node).__name__, "use numbers, parts, arrays, operators and laws")
-        value: Value = method(node)
-        return value
+        remedy = "use numbers, parts, arrays, operators and laws"
+        self.need(method, node, type(node).__name__, remedy)
+        return method(node)  # type: ignore[misc,no-any-return]
 
     def truth(self, node: Any) -> Value:
         """The C of a condition."""
@@ -150,9 +133,8 @@ class Expressions:
         if isinstance(node, ast.Name) and node.id not in self.variables:
             own = dict(inspect.getclosurevars(self.function).nonlocals)
             names = ChainMap(own, self.function.__globals__, vars(builtins))
-            self.need(
-                node.id in names, node, f"the name {node.id!r}", "assign it before, at every way to here"
-            )
+            fault = f"the name {node.id!r}"
+            self.need(node.id in names, node, fault, "assign it before, at every way to here")
             return names[node.id]
         module = self.python_object(node.value) if isinstance(node, ast.Attribute) else None
         return getattr(module, node.attr) if isinstance(module, ModuleType) else None
@@ -169,22 +151,23 @@ class Expressions:
         if node.id in self.variables:
             return self.variables[node.id]
         found = self.python_object(node)
-        constant: Value | None = self.whole.constants.value(node.id, found, self.function)
-        return constant or self._literal(found, node)
+        part = isinstance(found, tuple) and hasattr(found, "_fields")
+        if not part and (type(found) not in (int, float) or not math.isfinite(found)):
+            return self._literal(found, node)
+        kind = self.whole.type_of(found)
+        return Value(self.whole.constants.name(node.id, found, kind, self.function), kind, place="named")
 
     def _attribute(self, node: ast.Attribute) -> Value:
         fixed = self.python_object(node)
         if fixed is not None:
             return self._literal(fixed, node)
-        part = self.expression(node.value)
+        part, name = self.expression(node.value), c_name(node.attr, field=True)
         fields = dict(members(part.type)) if is_struct(part.type) else {}
-        name = c_name(node.attr, field=True)
         if name in fields:
             return part.member(name, fields[name])
         getter = inspect.getattr_static(getattr(part.type, "instance_class", None), node.attr, None)
-        self.need(
-            isinstance(getter, property), node, f".{node.attr} of {part.type}", "use a field or a property"
-        )
+        found, fault = isinstance(getter, property), f".{node.attr} of {part.type}"
+        self.need(found, node, fault, "use a field or a property")
         return self._calling(getter.fget, [part], node)
 
     def _tuple(self, node: ast.Tuple) -> Value:
@@ -200,14 +183,15 @@ class Expressions:
         return Value(f"({self.whole.structs.name(kind)}){{{text}}}", kind, fields=tuple(fields))
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            place = self._field_number(node.slice)
-            return Value(f"{self.expression(node.value.value).at(ATOM)}.shape[{place}]", self.whole.integer)
-        table = None if isinstance(node.value, ast.Subscript) else self.python_object(node.value)
-        if isinstance(table, np.ndarray) or (type(table) is tuple and isinstance(node.value, ast.Name)):
-            name = self.whole.constants.table(ast.unparse(node.value), table, self.function)
+        of = node.value
+        if isinstance(of, ast.Attribute) and of.attr == "shape":
+            place = f"shape[{self._index(node.slice).text}]"
+            return Value(f"{self.expression(of.value).at(ATOM)}.{place}", self.whole.integer)
+        table = self.python_object(of)
+        if isinstance(table, np.ndarray | tuple) and not hasattr(table, "_fields"):
+            name = self.whole.constants.name(ast.unparse(of), table, None, self.function)
             return self._element(name, [str(n) for n in np.shape(table)], node)
-        base = self.expression(node.value)
+        base = self.expression(of)
         if is_struct(base.type):
             return self._field(base, node)
         if isinstance(node.slice, ast.Slice):
@@ -217,9 +201,8 @@ class Expressions:
 
     def _element(self, name: str, lengths: list[str], node: ast.Subscript) -> Value:
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        self.need(
-            len(indices) == len(lengths), node, "a row of a table", "index every dimension of the array"
-        )
+        whole, remedy = len(indices) == len(lengths), "index every dimension of the array"
+        self.need(whole, node, "a row of a table", remedy)
         place = self._index(indices[0])
         for index, length in zip(indices[1:], lengths[1:], strict=True):
             text = f"{place.at(PRODUCT)} * {length} + {self._index(index).at(PRODUCT)}"
@@ -240,37 +223,31 @@ class Expressions:
         stop = self._index(part.upper).at(SUM) if part.upper else f"{base}.shape[0]"
         return Value(f"({of}){{{base}.at + {start}, {{{stop} - {start}}}}}", array.type)
 
-    def _field_number(self, node: Any) -> int:
-        value = getattr(node, "value", None)
-        self.need(isinstance(value, int), node, f"the place {ast.unparse(node)}", "write the field's number")
-        return int(value)  # type: ignore[arg-type]
-
     def _field(self, base: Value, node: ast.Subscript) -> Value:
-        inner = members(base.type)
-        self.need(
-            value_type(base.type) == base.type, node, "a field of a tuple with parts", "unpack it into names"
-        )
-        if isinstance(node.slice, ast.Constant):
-            return base.member(*inner[self._field_number(node.slice)])
+        inner, place = members(base.type), self._index(node.slice)
+        if place.text.isdigit():
+            return base.member(*inner[int(place.text)])
         alike = all(kind == inner[0][1] for _, kind in inner)
         self.need(alike, node, "a field of a part by a variable", "name the field")
-        return self._call_of(self.whole.selector(base.type), [base, self._index(node.slice)], inner[0][1])
+        return self._call_of(self.whole.selector(base.type), [base, place], inner[0][1])
 
     def _binop(self, node: ast.BinOp) -> Value:
-        if isinstance(node.op, ast.Pow):
-            base, power = self.expression(node.left), getattr(node.right, "value", None)
-            good = base.type == self.whole.real and power in POWERS
-            self.need(good, node, f"the power {ast.unparse(node)}", "write a product, or ** 0.5 for a root")
-            return Value(f"{self.whole.helper(POWERS[power], base.type)}({base.at(CHOICE)})", base.type)  # type: ignore[index]
-        return self.operation(node.op, self.expression(node.left), self.expression(node.right), node)
+        if not isinstance(node.op, ast.Pow):
+            return self._operation(node.op, node.left, node.right, node)
+        base, power = self.expression(node.left), getattr(node.right, "value", None)
+        good = base.type == self.whole.real and power in POWERS
+        self.need(good, node, f"the power {ast.unparse(node)}", "write a product, or ** 0.5 for a root")
+        return self._call_of(self.whole.helper(POWERS[power], base.type), [base], base.type)  # type: ignore[index]
 
-    def operation(self, op: ast.operator | ast.cmpop, a: Value, b: Value, node: Any) -> Value:
+    def _compare(self, node: ast.Compare) -> Value:
+        return self._operation(node.ops[0], node.left, node.comparators[0], node)
+
+    def _operation(self, op: ast.operator | ast.cmpop, left: Any, right: Any, node: Any) -> Value:
         """Two values joined by an operator, each cast as Numba's signature has it."""
-        known = type(op) in OPERATORS
-        self.need(
-            known, node, f"the operator of {ast.unparse(node)}", "use + - * / // % ** @ and comparisons"
-        )
+        known, remedy = type(op) in OPERATORS, "use + - * / // % ** @ and comparisons"
+        self.need(known, node, f"the operator of {ast.unparse(node)}", remedy)
         sign, meaning, rank = OPERATORS[type(op)]
+        a, b = self.expression(left), self.expression(right)
         if is_struct(a.type) or is_struct(b.type):
             return self._calling_overload(meaning, [a, b], node)
         signature = self.whole.rules.signature(meaning, (a.type, b.type))
@@ -278,29 +255,8 @@ class Expressions:
         asked = (kind, kind) if kind == self.whole.real else signature.args
         a, b = (self.cast(x, of, node) for x, of in zip((a, b), asked, strict=True))
         if rank == ATOM:
-            return Value(f"{self.whole.helper(sign, kind)}({a.at(CHOICE)}, {b.at(CHOICE)})", kind)
+            return self._call_of(self.whole.helper(sign, kind), [a, b], kind)
         return Value(f"{a.at(max(rank, SUM))} {sign} {b.at(max(rank + 1, SUM))}", kind, rank)
-
-    def _compare(self, node: ast.Compare) -> Value:
-        inside = (part for middle in node.comparators[:-1] for part in ast.walk(middle))
-        calls = any(isinstance(part, ast.Call) for part in inside)
-        self.need(not calls, node, "a call between two comparisons", "assign it to a name first")
-        if isinstance(node.ops[0], ast.In | ast.NotIn):
-            values = getattr(node.comparators[0], "elts", [])
-            self.need(values, node, "in", "give a tuple of numbers")
-            ops, lefts, rights = node.ops * len(values), [node.left] * len(values), values
-            sign, rank = " || ", OR
-        else:
-            ops, lefts, rights = node.ops, [node.left, *node.comparators], node.comparators
-            sign, rank = " && ", AND
-        triples = zip(ops, lefts, rights, strict=False)
-        each = [self.operation(op, self.expression(a), self.expression(b), node) for op, a, b in triples]
-        if len(each) == 1 and rank == AND:
-            return each[0]
-        text = sign.join(one.at(EQUAL) for one in each)
-        if isinstance(node.ops[0], ast.NotIn):
-            return Value(f"!({text})", self.whole.boolean, UNARY)
-        return Value(text, self.whole.boolean, rank)
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
@@ -334,73 +290,63 @@ class Expressions:
         if callee is None and isinstance(node.func, ast.Attribute):
             part = self.expression(node.func.value)
             method = inspect.getattr_static(getattr(part.type, "instance_class", None), node.func.attr, None)
-            good = inspect.isfunction(method)
-            self.need(good, node, f".{node.func.attr}() of {part.type}", "call a method of a part, or a law")
-            return self._calling(method, [part, *self._arguments(method, node, 1)], node)
+            good, fault = inspect.isfunction(method), f".{node.func.attr}() of {part.type}"
+            self.need(good, node, fault, "call a method of a part, or a law")
+            return self._calling(method, self._arguments(method, node, [part]), node)
         if isinstance(callee, type) and callee in parts:
             from numba import types
 
-            values = self._arguments(callee, node, 0)
+            values = self._arguments(callee, node)
             kinds = tuple(value.type for value in values)
             made = self.whole.typing.resolve_function_type(types.NamedTupleClass(callee), kinds, {})
             return self.struct(values, plain(made.return_type), node)
         if callee in stored:
             return self._storage(*stored[callee], node)
         if inspect.isfunction(callee):
-            return self._calling_overload(callee, self._arguments(callee, node, 0), node)
+            return self._calling_overload(callee, self._arguments(callee, node), node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
+
+    def _arguments(self, callee: Any, node: ast.Call, known: Sequence[Value] = ()) -> list[Value]:
+        """Values of a call in the order of the function's parameters, `known` first, defaults where none is given."""
+        words = {str(word.arg): word.value for word in node.keywords}
+        bound = inspect.signature(callee).bind(*known, *node.args, **words)
+        bound.apply_defaults()
+        others = list(bound.arguments.values())[len(known) :]
+        return [
+            *known,
+            *(self.expression(x) if isinstance(x, ast.AST) else self._literal(x, node) for x in others),
+        ]
 
     def _storage(self, part: type, reads: bool, node: ast.Call) -> Value:
         """A part read from the beginning of an array; or the array's beginning as the part that is written there."""
-        values = [self.expression(one) for one in node.args]
-        name, kind = self.whole.storage(plain(kind_of(part)), reads), plain(kind_of(part))
+        values, kind = [self.expression(one) for one in node.args], plain(kind_of(part))
+        name = self.whole.storage(kind, reads)
         if reads:
             return self._call_of(name, values, kind)
         self.need(id(node) in self._alone, node, "writing a part in an expression", "write it in a statement")
         self.writes |= values[0].text not in self.scratch
         return self._call_of(name, values, self.whole.none)
 
-    def _arguments(self, callee: Any, node: ast.Call, known: int) -> list[Value]:
-        """Values of a call in the order of the function's parameters, defaults where none is given."""
-        starred = any(isinstance(one, ast.Starred) for one in node.args) or None in (
-            w.arg for w in node.keywords
-        )
-        self.need(not starred, node, "a starred argument", "name each argument")
-        parameters = list(inspect.signature(callee).parameters.values())[known:]
-        given: dict[Any, Any] = dict(zip((p.name for p in parameters), node.args, strict=False))
-        given.update({word.arg: word.value for word in node.keywords})
-        return [
-            self.expression(given[p.name]) if p.name in given else self._literal(p.default, node)
-            for p in parameters
-        ]
-
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
-        kinds, first = tuple(value.type for value in values), values[0] if values else None
-        casts = self.whole.kinds
-        if callee is abs and first and is_struct(first.type):
+        kinds, casts = tuple(value.type for value in values), self.whole.kinds
+        if callee is abs and is_struct(kinds[0]):
             return self._calling_overload(abs, values, node)
-        if callee is len and first:
-            return Value(f"{first.at(ATOM)}.shape[0]", self.whole.integer)
-        if callee in casts and first:
-            return self.cast(first, casts[callee], node)
+        if callee is len:
+            return Value(f"{values[0].at(ATOM)}.shape[0]", self.whole.integer)
+        if callee in casts:
+            return self.cast(values[0], casts[callee], node)
         if callee in (min, max):
             kind = self.whole.typing.unify_types(*kinds)
             name = self.whole.helper("larger" if callee is max else "smaller", kind)
-            text, *others = [self.cast(value, kind, node).at(CHOICE) for value in values]
-            for other in others:
-                text = f"{name}({text}, {other})"
-            return Value(text, kind)
-        remedy = (
-            "call palpate._jit.log, which C has too"
-            if "log" in ast.unparse(node.func)
-            else "call a law, or abs, max, sqrt"
-        )
+            each = (self.cast(value, kind, node) for value in values)
+            return functools.reduce(lambda a, b: self._call_of(name, [a, b], kind), each)
+        remedy = "call a law, or abs, max, sqrt; palpate._jit.elementary has log and exp"
         self.need(callee in FUNCTIONS, node, f"{ast.unparse(node.func)}()", remedy)
-        texts = [self.cast(value, self.whole.real, node).at(CHOICE) for value in values]
+        values = [self.cast(value, self.whole.real, node) for value in values]
         result = plain(self.whole.rules.signature(callee, kinds).return_type)
         own = self.whole.real if result != self.whole.boolean else result
-        return self.cast(Value(f"{FUNCTIONS[callee]}({', '.join(texts)})", own), result, node)
+        return self.cast(self._call_of(FUNCTIONS[callee], values, own), result, node)
 
     def _calling_overload(self, callee: Any, values: list[Value], node: Any) -> Value:
         kinds = tuple(value.type for value in values)
@@ -415,7 +361,7 @@ class Expressions:
         if isinstance(tree, ast.Lambda):
             inner = Expressions(self.whole, function)
             inner.variables = dict(zip(function.__code__.co_varnames, values, strict=False))
-            return inner.expression(tree.body)
+            return inner.expression(normal_form(tree.body))
         known = self.whole.function(function, tuple(value.type for value in values))
         fault = f"{function.__name__}(), which writes to an array, in an expression"
         self.need(not known.writes or id(node) in self._alone, node, fault, "assign its value to a name")
@@ -426,11 +372,9 @@ class Expressions:
     def _call_of(self, name: str, values: list[Value], kind: Any) -> Value:
         """A call in C; a large struct is written where the last argument points to."""
         texts = [value.address if by_pointer(value.type) else value.at(CHOICE) for value in values]
-        places = result_places(kind)
-        if not places:
-            return Value(f"{name}({', '.join(texts)})", kind)
-        call = f"{name}({', '.join([*texts, *('@' for _ in places)])})"
-        return Value(
-            with_addresses(call, *(f"&({self.whole.structs.name(one)}){{0}}" for _, one in places)),
-            kind, place="pointer", call=call,
-        )  # fmt: skip
+        call = f"{name}({', '.join(texts)}"
+        if not by_pointer(kind):
+            return Value(f"{call})", kind)
+        call = f"{call}, " if texts else call
+        new = f"&({self.whole.structs.name(kind)}){{0}}"
+        return Value(f"{call}{new})", kind, place="pointer", call=call)

@@ -57,8 +57,14 @@ class Translation:
         self._claimed: set[str] = set()
         self.constants = Constants(self.structs, self._claim)
         self._functions: dict[Any, Translated | None] = {}
-        self._helpers: dict[tuple[str, str], str] = {}
+        self._helpers: dict[str, str] = {}
         self.definitions: list[str] = []
+
+    def type_of(self, value: Any) -> Any:
+        """The type of a Python number or part."""
+        import numba
+
+        return plain(numba.typeof(value))
 
     def function(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> Translated:
         """The C function of a law or a method given arguments of such types.
@@ -98,38 +104,37 @@ class Translation:
 
     def helper(self, name: str, kind: Any) -> str:
         """The name of a function that stands for one of Python's operators."""
-        key = (name, self.structs.name(kind))
-        if key not in self._helpers:
-            own, found = self._claim(name, f"of_{key[1].removesuffix('_t')}"), OPERATORS[key]
-            self._helpers[key] = own
-            self.definitions.append(f"/* {found['says']} */\nstatic {key[1]} {own}{found['body'].rstrip()}")
-        return self._helpers[key]
+        of = self.structs.name(kind)
+        found = OPERATORS[name, of]
+        text = f"/* {found['says']} */\nstatic {of} NAME{found['body'].rstrip()}"
+        return self._once(name, f"of_{of.removesuffix('_t')}", text)
 
     def storage(self, kind: Any, reads: bool) -> str:
         """The name of a function that reads a part from the beginning of an array, or writes it there."""
         of = self.structs.name(kind)
-        key = (of, "read" if reads else "write")
-        if key not in self._helpers:
-            own = self._helpers[key] = self._claim(f"{'read' if reads else 'write'}_{of}", "again")
-            says = f"A {of} {'from' if reads else 'to'} the beginning of an array."
-            given, to, source = (f"{of} *to", "to", "a.at") if reads else (f"const {of} *v", "a.at", "v")
-            body = f"    memcpy({to}, {source}, sizeof({of}));\n" + ("    return to;\n" if reads else "")
-            kind_in_c = f"const {of} *" if reads else "void "
-            self.definitions.append(f"/* {says} */\nstatic {kind_in_c}{own}(array1 a, {given}) {{\n{body}}}")
-        return self._helpers[key]
+        if reads:
+            head, body = f"{of} from", f"memcpy(to, a.at, sizeof({of}));\n    return to;"
+            return self._once(f"read_{of}", "again", f"""/* A {head} the beginning of an array. */
+static const {of} *NAME(array1 a, {of} *to) {{\n    {body}\n}}""")
+        head, body = f"{of} to", f"memcpy(a.at, v, sizeof({of}));"
+        return self._once(f"write_{of}", "again", f"""/* A {head} the beginning of an array. */
+static void NAME(array1 a, const {of} *v) {{\n    {body}\n}}""")
 
     def selector(self, kind: Any) -> str:
         """The name of a function that gives a field of a struct by its place."""
         of, inner = self.structs.name(kind), self.structs.name(members(kind)[0][1])
-        if ("at", of) not in self._helpers:
-            own = self._helpers["at", of] = self._claim(f"{of}_at", "again")
-            dot, given = ("->", f"const {of} *v") if by_pointer(kind) else (".", f"{of} v")
-            *first, last = (f"v{dot}{field}" for field, _ in members(kind))
-            choices = "".join(f"i == {k} ? {field} : " for k, field in enumerate(first))
-            self.definitions.append(
-                f"static {inner} {own}({given}, int64_t i) {{\n    return {choices}{last};\n}}"
-            )
-        return self._helpers["at", of]
+        dot, given = ("->", f"const {of} *v") if by_pointer(kind) else (".", f"{of} v")
+        *first, last = (f"v{dot}{field}" for field, _ in members(kind))
+        choices = "".join(f"i == {k} ? {field} : " for k, field in enumerate(first))
+        text = f"static {inner} NAME({given}, int64_t i) {{\n    return {choices}{last};\n}}"
+        return self._once(f"{of}_at", "again", text)
+
+    def _once(self, name: str, beside: str, text: str) -> str:
+        """The name of a function that stands in the file once, written with NAME in its place."""
+        if text not in self._helpers:
+            self._helpers[text] = self._claim(name, beside)
+            self.definitions.append(text.replace("NAME", self._helpers[text], 1))
+        return self._helpers[text]
 
     def _claim(self, name: str, beside: str) -> str:
         """A name that nothing else of the file has: the name, that with another beside it, or with a number."""
