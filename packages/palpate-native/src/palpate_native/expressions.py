@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import ast
 import builtins
-import functools
 import inspect
 import math
 import operator
 from collections import ChainMap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from functools import reduce
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -17,10 +17,9 @@ import numpy as np
 
 from palpate._jit.registry import parts, stored
 from palpate._jit.stored import kind_of
-from palpate_native.constants import number
 from palpate_native.normal_form import normal_form
 from palpate_native.source import refuse, syntax_of
-from palpate_native.structs import by_pointer, c_name, is_struct, members, plain
+from palpate_native.structs import by_pointer, c_name, is_struct, members, number, plain
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""
@@ -38,16 +37,30 @@ FUNCTIONS = {
     math.isfinite: "isfinite", math.copysign: "copysign", abs: "fabs",
 }  # fmt: skip
 """Functions that C's library computes as Python's does, to the last bit: IEEE defines them."""
+REMEDIES = {
+    "name": "assign a number or a truth before, at every way to here",
+    "constant": "use a number or a truth",
+    "attribute": "use a field or a property of a part",
+    "subscript": "index each dimension by an integer from 0 on, int(...), or slice the only one, without a step",
+    "binop": "use + - * / // % @, ** 2, ** 3, or ** 0.5 for a root",
+    "unaryop": "use - of numbers and not of truths",
+    "boolop": "join truths; write a if b else c for another value",
+    "ifexp": "give both values one type",
+    "call": "call a law, or abs, max, sqrt, or palpate's log; in a statement of its own if it writes to an array",
+    "for": "count with range, by 1 or by -1, by a name that nothing else has",
+    "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
+}
+"""What the subset has instead, by the kind of syntax."""
 
 
 class Value(NamedTuple):
     """An expression in C.
 
     Args:
-        text: of it.
+        text: of it; that of a struct behind a pointer begins with *.
         type: Numba's.
         rank: how tightly it binds.
-        place: "" for a value, "named" for one that has an address, "pointer" for the address of a struct.
+        place: whether it has an address.
         fields: of a struct that is made here.
         call: of a function that writes a large struct, up to the address.
     """
@@ -55,28 +68,24 @@ class Value(NamedTuple):
     text: str
     type: Any
     rank: int = ATOM
-    place: str = ""
+    place: bool = False
     fields: tuple[Value, ...] = ()
     call: str = ""
 
     def at(self, rank: int) -> str:
         """The text where C binds as tightly as `rank`."""
-        text, own = (f"*{self._within(UNARY)}", UNARY) if self.place == "pointer" else (self.text, self.rank)
-        return text if own >= rank else f"({text})"
-
-    def _within(self, rank: int) -> str:
         return self.text if self.rank >= rank else f"({self.text})"
 
     def member(self, name: str, kind: Any) -> Value:
         """A field of the struct."""
-        pointer = self.place == "pointer"
-        text = f"{self._within(ATOM)}{'->' if pointer else '.'}{name}"
-        return Value(text, kind, ATOM, "named" if pointer else self.place)
+        pointer = self.text.startswith("*")
+        text = f"{self.text[1:]}->{name}" if pointer else f"{self.at(ATOM)}.{name}"
+        return Value(text, kind, place=self.place)
 
     @property
     def address(self) -> str:
         """Where a struct is."""
-        return self.text if self.place == "pointer" else f"&{self._within(UNARY)}"
+        return self.text[1:] if self.text.startswith("*") else f"&{self.at(UNARY)}"
 
 
 class Expressions:
@@ -93,39 +102,36 @@ class Expressions:
         self.scratch: set[str] = set()
         self.writes = False
         self._alone: set[int] = set()
-        self._condition: Any = None
 
-    def need(self, good: Any, node: Any, fault: str, remedy: str) -> None:
-        """Refuses a node of this function that is not as C needs it."""
-        if not good:
-            refuse(self.function, node, fault, remedy)
-
-    def expression(self, node: Any, alone: bool = False) -> Value:
-        """The C of an expression; a call `alone` in its statement may write to an array.
+    def need(self, good: Any, node: Any) -> None:
+        """Refuses a node of this function that is not as C needs it.
 
         Raises:
-            OutsideSubset: it has none.
+            OutsideSubset: it is not good.
         """
+        if not good:
+            remedy = REMEDIES.get(type(node).__name__.lower(), "use numbers, parts, arrays, operators and laws")
+            refuse(self.function, node, ast.unparse(node).split("\n")[0], remedy)
+
+    def expression(self, node: Any, alone: bool = False) -> Any:
+        """The C of an expression, or of a statement its lines; a call `alone` in its statement may write to an array."""
         if alone:
             self._alone.add(id(node))
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
-        remedy = "use numbers, parts, arrays, operators and laws"
-        self.need(method, node, type(node).__name__, remedy)
-        return method(node)  # type: ignore[misc,no-any-return]
+        self.need(method, node)
+        return method(node)  # type: ignore[misc]
 
     def truth(self, node: Any) -> Value:
         """The C of a condition."""
-        self._condition = node
         return self.cast(self.expression(node, alone=True), self.whole.boolean, node)
 
     def cast(self, value: Value, kind: Any, node: Any) -> Value:
         """A value as one of another type."""
         if value.type == kind:
             return value
-        same = is_struct(value.type) or is_struct(kind)
-        self.need(not same, node, f"{value.type} where {kind} is asked for", "give all branches one type")
-        if kind == self.whole.boolean:
-            return Value(f"{value.at(EQUAL + 1)} != 0", kind, EQUAL)
+        if value.fields:
+            return self._struct(value.fields, kind, node)
+        self.need(not is_struct(value.type) and not is_struct(kind) and kind != self.whole.boolean, node)
         return Value(f"({self.whole.structs.name(kind)}){value.at(UNARY)}", kind, UNARY)
 
     def python_object(self, node: Any) -> Any:
@@ -133,16 +139,15 @@ class Expressions:
         if isinstance(node, ast.Name) and node.id not in self.variables:
             own = dict(inspect.getclosurevars(self.function).nonlocals)
             names = ChainMap(own, self.function.__globals__, vars(builtins))
-            fault = f"the name {node.id!r}"
-            self.need(node.id in names, node, fault, "assign it before, at every way to here")
+            self.need(node.id in names, node)
             return names[node.id]
         module = self.python_object(node.value) if isinstance(node, ast.Attribute) else None
         return getattr(module, node.attr) if isinstance(module, ModuleType) else None
 
     def _literal(self, value: Any, node: Any) -> Value:
-        kinds = self.whole.kinds
-        self.need(type(value) in kinds, node, f"a {type(value).__name__}", "use a number or a truth")
-        return Value(number(value), kinds[type(value)], UNARY if number(value).startswith("-") else ATOM)
+        self.need(type(value) in self.whole.kinds, node)
+        rank = UNARY if number(value).startswith("-") else ATOM
+        return Value(number(value), self.whole.kinds[type(value)], rank)
 
     def _constant(self, node: ast.Constant) -> Value:
         return self._literal(node.value, node)
@@ -151,11 +156,10 @@ class Expressions:
         if node.id in self.variables:
             return self.variables[node.id]
         found = self.python_object(node)
-        part = isinstance(found, tuple) and hasattr(found, "_fields")
-        if not part and (type(found) not in (int, float) or not math.isfinite(found)):
+        if not hasattr(found, "_fields") and (type(found) not in (int, float) or not math.isfinite(found)):
             return self._literal(found, node)
-        kind = self.whole.type_of(found)
-        return Value(self.whole.constants.name(node.id, found, kind, self.function), kind, place="named")
+        name, kind = self.whole.constants.name(node.id, found, self.function)
+        return Value(name, kind, place=True)
 
     def _attribute(self, node: ast.Attribute) -> Value:
         fixed = self.python_object(node)
@@ -166,77 +170,73 @@ class Expressions:
         if name in fields:
             return part.member(name, fields[name])
         getter = inspect.getattr_static(getattr(part.type, "instance_class", None), node.attr, None)
-        found, fault = isinstance(getter, property), f".{node.attr} of {part.type}"
-        self.need(found, node, fault, "use a field or a property")
-        return self._calling(getter.fget, [part], node)
+        self.need(isinstance(getter, property), node)
+        return self._calling(getter.fget, [part], node, own=True)
 
     def _tuple(self, node: ast.Tuple) -> Value:
+        return self._made([self.expression(one, alone=True) for one in node.elts], None, node)
+
+    def _made(self, values: list[Value], cls: Any, node: Any) -> Value:
+        """A part, or a tuple, of its fields."""
         from numba import types
 
-        values = [self.expression(one, alone=True) for one in node.elts]
-        return self.struct(values, plain(types.Tuple([value.type for value in values])), node)
+        kinds = tuple(value.type for value in values)
+        return self._struct(values, plain(types.BaseTuple.from_types(kinds, cls)), node)
 
-    def struct(self, values: list[Value], kind: Any, node: Any) -> Value:
-        """A struct made of its fields."""
+    def _struct(self, values: Iterable[Value], kind: Any, node: Any) -> Value:
         fields = [self.cast(value, one, node) for value, (_, one) in zip(values, members(kind), strict=True)]
         text = ", ".join(one.at(CHOICE) for one in fields)
         return Value(f"({self.whole.structs.name(kind)}){{{text}}}", kind, fields=tuple(fields))
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        of = node.value
-        if isinstance(of, ast.Attribute) and of.attr == "shape":
-            place = f"shape[{self._index(node.slice).text}]"
-            return Value(f"{self.expression(of.value).at(ATOM)}.{place}", self.whole.integer)
-        table = self.python_object(of)
+        if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
+            array, place = self.expression(node.value.value), self._index(node.slice, node)
+            return Value(f"{array.at(ATOM)}.shape[{place.text}]", self.whole.integer)
+        table = self.python_object(node.value)
         if isinstance(table, np.ndarray | tuple) and not hasattr(table, "_fields"):
-            name = self.whole.constants.name(ast.unparse(of), table, None, self.function)
-            return self._element(name, [str(n) for n in np.shape(table)], node)
-        base = self.expression(of)
+            name, _ = self.whole.constants.name(ast.unparse(node.value), table, self.function)
+            return self._element(name, list(map(str, np.shape(table))), node)
+        base = self.expression(node.value)
         if is_struct(base.type):
             return self._field(base, node)
-        if isinstance(node.slice, ast.Slice):
-            return self._view(base, node.slice)
         lengths = [f"{base.at(ATOM)}.shape[{k}]" for k in range(base.type.ndim)]
-        return self._element(f"{base.at(ATOM)}.at", lengths, node)
+        if not isinstance(node.slice, ast.Slice):
+            return self._element(f"{base.at(ATOM)}.at", lengths, node)
+        part, of = node.slice, self.whole.structs.name(base.type)
+        self.need(part.step is None and base.type.ndim == 1, node)
+        start = self._index(part.lower, node).at(SUM + 1) if part.lower else "0"
+        stop = self._index(part.upper, node).at(SUM) if part.upper else lengths[0]
+        return Value(f"({of}){{{base.at(ATOM)}.at + {start}, {{{stop} - {start}}}}}", base.type)
 
     def _element(self, name: str, lengths: list[str], node: ast.Subscript) -> Value:
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        whole, remedy = len(indices) == len(lengths), "index every dimension of the array"
-        self.need(whole, node, "a row of a table", remedy)
-        place = self._index(indices[0])
-        for index, length in zip(indices[1:], lengths[1:], strict=True):
-            text = f"{place.at(PRODUCT)} * {length} + {self._index(index).at(PRODUCT)}"
+        self.need(len(indices) == len(lengths), node)
+        place, *others = (self._index(index, node) for index in indices)
+        for index, length in zip(others, lengths[1:], strict=True):
+            text = f"{place.at(PRODUCT)} * {length} + {index.at(PRODUCT)}"
             place = Value(text, self.whole.integer, SUM)
-        return Value(f"{name}[{place.at(CHOICE)}]", self.whole.real, ATOM, "named")
+        return Value(f"{name}[{place.text}]", self.whole.real, place=True)
 
-    def _index(self, node: Any) -> Value:
-        value = self.expression(node)
-        good = value.type == self.whole.integer and not value.text.startswith("-")
-        self.need(good, node, f"the index {ast.unparse(node)}", "use an integer from 0 on: int(...)")
+    def _index(self, index: ast.expr, node: ast.Subscript) -> Value:
+        value: Value = self.expression(index)
+        self.need(value.type == self.whole.integer and not value.text.startswith("-"), node)
         return value
 
-    def _view(self, array: Value, part: ast.Slice) -> Value:
-        good = part.step is None and array.type.ndim == 1
-        self.need(good, part, "this slice", "slice one dimension, without a step")
-        base, of = array.at(ATOM), self.whole.structs.name(array.type)
-        start = self._index(part.lower).at(SUM + 1) if part.lower else "0"
-        stop = self._index(part.upper).at(SUM) if part.upper else f"{base}.shape[0]"
-        return Value(f"({of}){{{base}.at + {start}, {{{stop} - {start}}}}}", array.type)
-
     def _field(self, base: Value, node: ast.Subscript) -> Value:
-        inner, place = members(base.type), self._index(node.slice)
+        """A field of a tuple by its place; by a variable one of several that are alike."""
+        inner, place = members(base.type), self._index(node.slice, node)
         if place.text.isdigit():
             return base.member(*inner[int(place.text)])
-        alike = all(kind == inner[0][1] for _, kind in inner)
-        self.need(alike, node, "a field of a part by a variable", "name the field")
-        return self._call_of(self.whole.selector(base.type), [base, place], inner[0][1])
+        self.need(all(kind == inner[0][1] for _, kind in inner), node)
+        tests = [Value(f"{place.at(ORDER)} == {k}", self.whole.boolean, EQUAL) for k in range(len(inner))]
+        pairs = list(zip(tests, (base.member(*one) for one in inner), strict=True))
+        return reduce(lambda other, pair: self._choice(*pair, other), pairs[-2::-1], pairs[-1][1])
 
     def _binop(self, node: ast.BinOp) -> Value:
         if not isinstance(node.op, ast.Pow):
             return self._operation(node.op, node.left, node.right, node)
         base, power = self.expression(node.left), getattr(node.right, "value", None)
-        good = base.type == self.whole.real and power in POWERS
-        self.need(good, node, f"the power {ast.unparse(node)}", "write a product, or ** 0.5 for a root")
+        self.need(base.type == self.whole.real and power in POWERS, node)
         return self._call_of(self.whole.helper(POWERS[power], base.type), [base], base.type)  # type: ignore[index]
 
     def _compare(self, node: ast.Compare) -> Value:
@@ -244,16 +244,15 @@ class Expressions:
 
     def _operation(self, op: ast.operator | ast.cmpop, left: Any, right: Any, node: Any) -> Value:
         """Two values joined by an operator, each cast as Numba's signature has it."""
-        known, remedy = type(op) in OPERATORS, "use + - * / // % ** @ and comparisons"
-        self.need(known, node, f"the operator of {ast.unparse(node)}", remedy)
+        self.need(type(op) in OPERATORS, node)
         sign, meaning, rank = OPERATORS[type(op)]
-        a, b = self.expression(left), self.expression(right)
-        if is_struct(a.type) or is_struct(b.type):
-            return self._calling_overload(meaning, [a, b], node)
-        signature = self.whole.rules.signature(meaning, (a.type, b.type))
+        values = [self.expression(left), self.expression(right)]
+        if any(is_struct(value.type) for value in values):
+            return self._calling(meaning, values, node)
+        signature = self.whole.rules.signature(meaning, tuple(value.type for value in values))
         kind = signature.return_type
         asked = (kind, kind) if kind == self.whole.real else signature.args
-        a, b = (self.cast(x, of, node) for x, of in zip((a, b), asked, strict=True))
+        a, b = (self.cast(x, of, node) for x, of in zip(values, asked, strict=True))
         if rank == ATOM:
             return self._call_of(self.whole.helper(sign, kind), [a, b], kind)
         return Value(f"{a.at(max(rank, SUM))} {sign} {b.at(max(rank + 1, SUM))}", kind, rank)
@@ -261,77 +260,57 @@ class Expressions:
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
             return Value(f"!{self.truth(node.operand).at(UNARY)}", self.whole.boolean, UNARY)
-        self.need(isinstance(node.op, ast.USub), node, "this sign", "leave it out")
+        self.need(isinstance(node.op, ast.USub), node)
         value = self.expression(node.operand)
         if is_struct(value.type):
-            return self._calling_overload(operator.neg, [value], node)
+            return self._calling(operator.neg, [value], node)
         return Value(f"-{value.at(ATOM)}", value.type, UNARY)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
         sign, rank = (" && ", AND) if isinstance(node.op, ast.And) else (" || ", OR)
-        condition = node is self._condition
-        values = [self.expression(one, alone=True) for one in node.values]
-        good = condition or all(value.type == self.whole.boolean for value in values)
-        self.need(good, node, f"{ast.unparse(node)} as a value", "write a if b else c")
-        texts = [self.cast(value, self.whole.boolean, node).at(EQUAL) for value in values]
-        return Value(sign.join(texts), self.whole.boolean, rank)
+        return Value(sign.join(self.truth(one).at(EQUAL) for one in node.values), self.whole.boolean, rank)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        test = self.truth(node.test)
-        a, b = self.expression(node.body, alone=True), self.expression(node.orelse, alone=True)
-        kind = a.type if a.type == b.type else plain(self.whole.typing.unify_types(a.type, b.type) or a.type)
-        a, b = self.cast(a, kind, node), self.cast(b, kind, node)
-        if by_pointer(kind):
-            return Value(f"{test.at(OR)} ? {a.address} : {b.address}", kind, CHOICE, "pointer")
-        return Value(f"{test.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", kind, CHOICE)
+        test, values = self.truth(node.test), [self.expression(x, alone=True) for x in (node.body, node.orelse)]
+        kind = self.whole.typing.unify_types(*(value.type for value in values))
+        return self._choice(test, *(self.cast(value, plain(kind), node) for value in values))
+
+    def _choice(self, test: Value, a: Value, b: Value) -> Value:
+        if by_pointer(a.type):
+            return Value(f"*({test.at(OR)} ? {a.address} : {b.address})", a.type, UNARY, place=True)
+        return Value(f"{test.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", a.type, CHOICE)
 
     def _call(self, node: ast.Call) -> Value:
         callee = self.python_object(node.func)
         if callee is None and isinstance(node.func, ast.Attribute):
             part = self.expression(node.func.value)
-            method = inspect.getattr_static(getattr(part.type, "instance_class", None), node.func.attr, None)
-            good, fault = inspect.isfunction(method), f".{node.func.attr}() of {part.type}"
-            self.need(good, node, fault, "call a method of a part, or a law")
-            return self._calling(method, self._arguments(method, node, [part]), node)
-        if isinstance(callee, type) and callee in parts:
-            from numba import types
-
-            values = self._arguments(callee, node)
-            kinds = tuple(value.type for value in values)
-            made = self.whole.typing.resolve_function_type(types.NamedTupleClass(callee), kinds, {})
-            return self.struct(values, plain(made.return_type), node)
+            callee = inspect.getattr_static(getattr(part.type, "instance_class", None), node.func.attr, None)
+            self.need(inspect.isfunction(callee), node)
+            return self._calling(callee, self._arguments(callee, node, part), node, own=True)
         if callee in stored:
-            return self._storage(*stored[callee], node)
+            (of, reads), values = stored[callee], [self.expression(one) for one in node.args]
+            kind = plain(kind_of(of))
+            name = self.whole.helper("read_TYPE" if reads else "write_TYPE", kind)
+            return self._call_of(name, values, kind if reads else self.whole.none, node, writes=not reads)
         if inspect.isfunction(callee):
-            return self._calling_overload(callee, self._arguments(callee, node), node)
+            return self._calling(callee, self._arguments(callee, node), node)
+        if callee in parts:
+            return self._made(self._arguments(callee, node), callee, node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
 
-    def _arguments(self, callee: Any, node: ast.Call, known: Sequence[Value] = ()) -> list[Value]:
+    def _arguments(self, callee: Any, node: ast.Call, *known: Value) -> list[Value]:
         """Values of a call in the order of the function's parameters, `known` first, defaults where none is given."""
-        words = {str(word.arg): word.value for word in node.keywords}
-        bound = inspect.signature(callee).bind(*known, *node.args, **words)
+        bound = inspect.signature(callee).bind(*known, *node.args, **{str(w.arg): w.value for w in node.keywords})
         bound.apply_defaults()
         others = list(bound.arguments.values())[len(known) :]
-        return [
-            *known,
-            *(self.expression(x) if isinstance(x, ast.AST) else self._literal(x, node) for x in others),
-        ]
-
-    def _storage(self, part: type, reads: bool, node: ast.Call) -> Value:
-        """A part read from the beginning of an array; or the array's beginning as the part that is written there."""
-        values, kind = [self.expression(one) for one in node.args], plain(kind_of(part))
-        name = self.whole.storage(kind, reads)
-        if reads:
-            return self._call_of(name, values, kind)
-        self.need(id(node) in self._alone, node, "writing a part in an expression", "write it in a statement")
-        self.writes |= values[0].text not in self.scratch
-        return self._call_of(name, values, self.whole.none)
+        others = [self.expression(x) if isinstance(x, ast.AST) else self._literal(x, node) for x in others]
+        return [*known, *others]
 
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
         kinds, casts = tuple(value.type for value in values), self.whole.kinds
         if callee is abs and is_struct(kinds[0]):
-            return self._calling_overload(abs, values, node)
+            return self._calling(abs, values, node)
         if callee is len:
             return Value(f"{values[0].at(ATOM)}.shape[0]", self.whole.integer)
         if callee in casts:
@@ -340,41 +319,46 @@ class Expressions:
             kind = self.whole.typing.unify_types(*kinds)
             name = self.whole.helper("larger" if callee is max else "smaller", kind)
             each = (self.cast(value, kind, node) for value in values)
-            return functools.reduce(lambda a, b: self._call_of(name, [a, b], kind), each)
-        remedy = "call a law, or abs, max, sqrt; palpate._jit.elementary has log and exp"
-        self.need(callee in FUNCTIONS, node, f"{ast.unparse(node.func)}()", remedy)
+            return reduce(lambda a, b: self._call_of(name, [a, b], kind), each)
+        self.need(callee in FUNCTIONS, node)
         values = [self.cast(value, self.whole.real, node) for value in values]
-        result = plain(self.whole.rules.signature(callee, kinds).return_type)
+        result = self.whole.rules.signature(callee, kinds).return_type
         own = self.whole.real if result != self.whole.boolean else result
         return self.cast(self._call_of(FUNCTIONS[callee], values, own), result, node)
 
-    def _calling_overload(self, callee: Any, values: list[Value], node: Any) -> Value:
-        kinds = tuple(value.type for value in values)
-        found: Any = self.whole.rules.implementation(callee, kinds)
-        name = getattr(callee, "__name__", callee)
-        self.need(found, node, f"{name} of {', '.join(map(str, kinds))}", "mark the function with @law")
-        return self._calling(found, values, node)
+    def _calling(self, callee: Any, values: list[Value], node: Any, own: bool = False) -> Value:
+        """A call of a function of Python, which is translated first; a lambda's expression stands in its place.
 
-    def _calling(self, function: Callable[..., Any], values: list[Value], node: Any) -> Value:
-        """A call of a function of Python, which is translated first; a lambda's expression stands in its place."""
+        Args:
+            callee: a law, an operator, or a part's own function.
+            values: of its arguments.
+            node: the call.
+            own: whether it is a part's own, which Numba compiles as it stands.
+        """
+        kinds = tuple(value.type for value in values)
+        function = callee if own else self.whole.rules.implementation(callee, kinds)
+        self.need(function, node)
         tree = syntax_of(function)
         if isinstance(tree, ast.Lambda):
             inner = Expressions(self.whole, function)
             inner.variables = dict(zip(function.__code__.co_varnames, values, strict=False))
-            return inner.expression(normal_form(tree.body))
-        known = self.whole.function(function, tuple(value.type for value in values))
-        fault = f"{function.__name__}(), which writes to an array, in an expression"
-        self.need(not known.writes or id(node) in self._alone, node, fault, "assign its value to a name")
-        arrays = [value for value in values if getattr(value.type, "ndim", 0) or is_struct(value.type)]
-        self.writes |= known.writes and any(value.text not in self.scratch for value in arrays)
-        return self._call_of(known.name, values, known.result)
+            value: Value = inner.expression(normal_form(tree.body))
+            return value
+        known = self.whole.function(function, kinds)
+        return self._call_of(known.name, values, known.result, node, known.writes)
 
-    def _call_of(self, name: str, values: list[Value], kind: Any) -> Value:
-        """A call in C; a large struct is written where the last argument points to."""
+    def _call_of(
+        self, name: str, values: list[Value], kind: Any, node: Any = None, writes: bool = False
+    ) -> Value:
+        """A call in C, of a function that `writes` to arrays; a large struct is written where the last argument points."""
+        if writes:
+            self.need(id(node) in self._alone, node)
+            arrays = [one for one in values if getattr(one.type, "ndim", 0) or is_struct(one.type)]
+            self.writes |= any(value.text not in self.scratch for value in arrays)
         texts = [value.address if by_pointer(value.type) else value.at(CHOICE) for value in values]
         call = f"{name}({', '.join(texts)}"
         if not by_pointer(kind):
             return Value(f"{call})", kind)
-        call = f"{call}, " if texts else call
+        call += ", " if texts else ""
         new = f"&({self.whole.structs.name(kind)}){{0}}"
-        return Value(f"{call}{new})", kind, place="pointer", call=call)
+        return Value(f"*{call}{new})", kind, UNARY, place=True, call=call)

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate_native.constants import initial, number
-from palpate_native.structs import by_pointer, is_struct, leaves, members, plain
+from palpate_native.structs import by_pointer, initial, is_struct, leaves, members, number, plain
 from palpate_native.translation import Translation
 
 LINES = 8

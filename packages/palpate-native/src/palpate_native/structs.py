@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+import numpy as np
+
 from palpate_native.source import field_notes, first_sentence
 
 LARGE = 4
@@ -24,6 +26,8 @@ _OF_ITS_LIBRARY = """
     nan NAN INFINITY I memcpy larger smaller square cube root modulo floored
 """
 
+_NUMBERS = {"inf": "INFINITY", "-inf": "-INFINITY", "nan": "NAN", "True": "true", "False": "false"}
+
 
 def plain(kind: Any) -> Any:
     """A Numba type without literals in it: the type of any such value."""
@@ -38,9 +42,7 @@ def plain(kind: Any) -> Any:
 
 def is_struct(kind: Any) -> bool:
     """Whether values of a type are structs in C."""
-    from numba import types
-
-    return isinstance(kind, types.BaseTuple)
+    return hasattr(kind, "types")
 
 
 def members(kind: Any) -> list[tuple[str, Any]]:
@@ -66,6 +68,20 @@ def c_name(name: str, field: bool = False) -> str:
     bare = name.strip("_") or "unnamed"
     taken = bare in _OF_THE_LANGUAGE.split() or (not field and bare in _OF_ITS_LIBRARY.split())
     return f"{bare}_" if taken or bare != name else bare
+
+
+def number(value: float | bool) -> str:
+    """A number as C reads it back, to the last bit."""
+    text = str(value) if isinstance(value, int | np.bool_) else repr(float(value))
+    return _NUMBERS.get(text, text)
+
+
+def initial(value: Any, kind: Any) -> str:
+    """A part's numbers as C initialises a struct with them."""
+    if not is_struct(kind):
+        return number(value)
+    inner = (initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True))
+    return "{" + ", ".join(inner) + "}"
 
 
 class Structs:
