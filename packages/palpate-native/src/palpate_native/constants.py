@@ -29,13 +29,8 @@ class Constants:
         """The C name and the type of a number, of a part, or of a table of numbers, row by row."""
         import numba
 
-        kind = plain(numba.typeof(value))
-        if hasattr(value, "_fields") or np.ndim(value) == 0:
-            text = f"{self._structs.name(kind)} {name} = {initial(value, kind)};"
-        else:
-            flat = np.asarray(value, dtype=np.float64).ravel()
-            rows = (", ".join(map(number, row.tolist())) for row in np.split(flat, range(6, len(flat), 6)))
-            text = f"double {name}[{len(flat)}] = {{" + "".join(f"\n    {row}," for row in rows) + "\n};"
+        kind = plain(numba.typeof(value if hasattr(value, "_fields") or np.ndim(value) == 0 else np.array(value, float)))
+        text = f"{self._structs.name(kind)} {name} = {initial(value, kind)};"
         if text not in self._names:
             module, note = _home(name, value, function)
             own = self._names[text] = self._claim(c_name(name), module.rpartition(".")[2])

@@ -144,27 +144,25 @@ class Expressions:
         module = self.python_object(node.value) if isinstance(node, ast.Attribute) else None
         return getattr(module, node.attr) if isinstance(module, ModuleType) else None
 
+    def _constant(self, node: ast.Constant) -> Value:
+        return self._literal(node.value, node)
+
     def _literal(self, value: Any, node: Any) -> Value:
         self.need(type(value) in self.whole.kinds, node)
         rank = UNARY if number(value).startswith("-") else ATOM
         return Value(number(value), self.whole.kinds[type(value)], rank)
 
-    def _constant(self, node: ast.Constant) -> Value:
-        return self._literal(node.value, node)
-
-    def _name(self, node: ast.Name) -> Value:
-        if node.id in self.variables:
+    def _name(self, node: Any) -> Value:
+        if isinstance(node, ast.Name) and node.id in self.variables:
             return self.variables[node.id]
-        found = self.python_object(node)
-        if not hasattr(found, "_fields") and (type(found) not in (int, float) or not math.isfinite(found)):
-            return self._literal(found, node)
-        name, kind = self.whole.constants.name(node.id, found, self.function)
-        return Value(name, kind, place=True)
+        found, name = self.python_object(node), getattr(node, "id", getattr(node, "attr", ""))
+        if isinstance(found, np.ndarray | tuple) or (type(found) in (int, float) and math.isfinite(found)):
+            return Value(*self.whole.constants.name(name, found, self.function), place=True)
+        return self._literal(found, node)
 
     def _attribute(self, node: ast.Attribute) -> Value:
-        fixed = self.python_object(node)
-        if fixed is not None:
-            return self._literal(fixed, node)
+        if self.python_object(node) is not None:
+            return self._name(node)
         part, name = self.expression(node.value), c_name(node.attr, field=True)
         fields = dict(members(part.type)) if is_struct(part.type) else {}
         if name in fields:
@@ -189,33 +187,26 @@ class Expressions:
         return Value(f"({self.whole.structs.name(kind)}){{{text}}}", kind, fields=tuple(fields))
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
-            array, place = self.expression(node.value.value), self._index(node.slice, node)
-            return Value(f"{array.at(ATOM)}.shape[{place.text}]", self.whole.integer)
-        table = self.python_object(node.value)
-        if isinstance(table, np.ndarray | tuple) and not hasattr(table, "_fields"):
-            name, _ = self.whole.constants.name(ast.unparse(node.value), table, self.function)
-            return self._element(name, list(map(str, np.shape(table))), node)
-        base = self.expression(node.value)
+        shape = isinstance(node.value, ast.Attribute) and node.value.attr == "shape"
+        base: Value = self.expression(node.value.value if shape else node.value)  # type: ignore[attr-defined]
         if is_struct(base.type):
             return self._field(base, node)
-        lengths = [f"{base.at(ATOM)}.shape[{k}]" for k in range(base.type.ndim)]
-        if not isinstance(node.slice, ast.Slice):
-            return self._element(f"{base.at(ATOM)}.at", lengths, node)
-        part, of = node.slice, self.whole.structs.name(base.type)
-        self.need(part.step is None and base.type.ndim == 1, node)
-        start = self._index(part.lower, node).at(SUM + 1) if part.lower else "0"
-        stop = self._index(part.upper, node).at(SUM) if part.upper else lengths[0]
-        return Value(f"({of}){{{base.at(ATOM)}.at + {start}, {{{stop} - {start}}}}}", base.type)
-
-    def _element(self, name: str, lengths: list[str], node: ast.Subscript) -> Value:
+        name, integer, ndim = base.at(ATOM), self.whole.integer, base.type.ndim
+        if shape:
+            return Value(f"{name}.shape[{self._index(node.slice, node).text}]", integer)
+        if isinstance(node.slice, ast.Slice):
+            part, of = node.slice, self.whole.structs.name(base.type)
+            self.need(part.step is None and ndim == 1, node)
+            start = self._index(part.lower, node).at(SUM + 1) if part.lower else "0"
+            stop = self._index(part.upper, node).at(SUM) if part.upper else f"{name}.shape[0]"
+            return Value(f"({of}){{{name}.at + {start}, {{{stop} - {start}}}}}", base.type)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        self.need(len(indices) == len(lengths), node)
+        self.need(len(indices) == ndim, node)
         place, *others = (self._index(index, node) for index in indices)
-        for index, length in zip(others, lengths[1:], strict=True):
-            text = f"{place.at(PRODUCT)} * {length} + {index.at(PRODUCT)}"
-            place = Value(text, self.whole.integer, SUM)
-        return Value(f"{name}[{place.text}]", self.whole.real, place=True)
+        for k, index in enumerate(others, 1):
+            text = f"{place.at(PRODUCT)} * {name}.shape[{k}] + {index.at(PRODUCT)}"
+            place = Value(text, integer, SUM)
+        return Value(f"{name}.at[{place.text}]", self.whole.real, place=True)
 
     def _index(self, index: ast.expr, node: ast.Subscript) -> Value:
         value: Value = self.expression(index)
@@ -327,14 +318,7 @@ class Expressions:
         return self.cast(self._call_of(FUNCTIONS[callee], values, own), result, node)
 
     def _calling(self, callee: Any, values: list[Value], node: Any, own: bool = False) -> Value:
-        """A call of a function of Python, which is translated first; a lambda's expression stands in its place.
-
-        Args:
-            callee: a law, an operator, or a part's own function.
-            values: of its arguments.
-            node: the call.
-            own: whether it is a part's own, which Numba compiles as it stands.
-        """
+        """A call of a function, which is translated first; of a part's `own`, or the one that Numba has for it."""
         kinds = tuple(value.type for value in values)
         function = callee if own else self.whole.rules.implementation(callee, kinds)
         self.need(function, node)

@@ -162,7 +162,9 @@ class _Writer:
         for name, (way, texts) in self.module.words.items():
             self._words(name, way, texts)
         default = f"{self.module.name}_default_gains"
-        table = self._tables(default)
+        fields = zip(self.module.gains, members(self.kind), strict=True)
+        values = ",\n    ".join(initial(value, kind) for value, (_, kind) in fields)
+        table = f"const {self.gains} {default} = {{\n    {values},\n}};"
         return Sources(self._header(default), self._source(table), self.numbers)
 
     def _declare(self, text: str, meaning: str, arguments: tuple[Argument, ...] = ()) -> None:
@@ -235,21 +237,6 @@ class _Writer:
             if text
         )
         self.functions.append(f'{head} {{\n{choices}    return "";\n}}')
-
-    def _tables(self, default: str) -> str:
-        """The gains as a constant, and the tables in them."""
-        tables, texts = [], []
-        for value, (name, kind) in zip(self.module.gains, members(self.kind), strict=True):
-            if not isinstance(value, np.ndarray):
-                texts.append(initial(value, kind))
-                continue
-            rows = ",\n    ".join(
-                ", ".join(number(float(x)) for x in row) for row in value.reshape(-1, value.shape[-1])
-            )
-            tables.append(f"static const double {name}[{value.size}] = {{\n    {rows},\n}};\n")
-            texts.append(f"{{(double *){name}, {{{', '.join(map(str, value.shape))}}}}}")
-        inner = ",\n    ".join(texts)
-        return "\n".join([*tables, f"const {self.gains} {default} = {{\n    {inner},\n}};"])
 
     def _header(self, default: str) -> str:
         guard = f"{self.module.name.upper()}_H"

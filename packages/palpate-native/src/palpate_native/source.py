@@ -31,16 +31,13 @@ def refuse(function: Callable[..., Any], node: ast.AST, fault: str, remedy: str)
     Raises:
         OutsideSubset: always.
     """
-    code = function.__code__
-    line = getattr(node, "lineno", code.co_firstlineno)
-    raise OutsideSubset(
-        f"{_short(code.co_filename)}:{line}: {function.__name__}: {fault} has no C here; {remedy}"
-    )
+    place = place_of(function, getattr(node, "lineno", 0))
+    raise OutsideSubset(f"{place}: {function.__name__}: {fault} has no C here; {remedy}")
 
 
-def place_of(function: Callable[..., Any]) -> str:
-    """File and line of a function, from the package's folder on."""
-    return f"{_short(function.__code__.co_filename)}:{function.__code__.co_firstlineno}"
+def place_of(function: Callable[..., Any], line: int = 0) -> str:
+    """File and line of a function, from the package's folder on; or another line of it."""
+    return f"{_short(function.__code__.co_filename)}:{line or function.__code__.co_firstlineno}"
 
 
 def _short(file: str) -> str:
@@ -67,10 +64,7 @@ def syntax_of(function: Callable[..., Any]) -> ast.FunctionDef | ast.Lambda:
 
 @functools.cache
 def _tree(file: str) -> ast.Module:
-    try:
-        return ast.parse(Path(file).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise OutsideSubset(f"{file} cannot be read; keep the law in a file") from error
+    return ast.parse(Path(file).read_text(encoding="utf-8"))
 
 
 @functools.cache

@@ -77,10 +77,15 @@ def number(value: float | bool) -> str:
 
 
 def initial(value: Any, kind: Any) -> str:
-    """A part's numbers as C initialises a struct with them."""
-    if not is_struct(kind):
+    """A value as C initialises a variable of its type with it."""
+    if is_struct(kind):
+        inner = [initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True)]
+    elif hasattr(kind, "ndim"):
+        table = np.asarray(value, dtype=float)
+        numbers = "".join(f"\n    {', '.join(map(number, row))}," for row in table.reshape(-1, table.shape[-1]).tolist())
+        inner = [f"(double *)(const double[]){{{numbers}\n}}", f"{{{', '.join(map(str, table.shape))}}}"]
+    else:
         return number(value)
-    inner = (initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True))
     return "{" + ", ".join(inner) + "}"
 
 
