@@ -47,7 +47,7 @@ REMEDIES = {
     "boolop": "join truths; write a if b else c for another value",
     "ifexp": "give both values one type",
     "call": "call a law, or abs, max, sqrt, or palpate's log; in a statement of its own if it writes to an array",
-    "for": "count with range, by 1 or by -1, by a name that nothing else has",
+    "for": "count with range by 1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
 }
 """What the subset has instead, by the kind of syntax."""
@@ -110,11 +110,13 @@ class Expressions:
             OutsideSubset: it is not good.
         """
         if not good:
-            remedy = REMEDIES.get(type(node).__name__.lower(), "use numbers, parts, arrays, operators and laws")
+            remedy = REMEDIES.get(
+                type(node).__name__.lower(), "use numbers, parts, arrays, operators and laws"
+            )
             refuse(self.function, node, ast.unparse(node).split("\n")[0], remedy)
 
     def expression(self, node: Any, alone: bool = False) -> Any:
-        """The C of an expression, or of a statement its lines; a call `alone` in its statement may write to an array."""
+        """The C of an expression, or the lines of a statement; a call `alone` there may write to an array."""
         if alone:
             self._alone.add(id(node))
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
@@ -157,7 +159,8 @@ class Expressions:
             return self.variables[node.id]
         found, name = self.python_object(node), getattr(node, "id", getattr(node, "attr", ""))
         if isinstance(found, np.ndarray | tuple) or (type(found) in (int, float) and math.isfinite(found)):
-            return Value(*self.whole.constants.name(name, found, self.function), place=True)
+            name, kind = self.whole.constant(name, found, self.function)
+            return Value(name, kind, place=True)
         return self._literal(found, node)
 
     def _attribute(self, node: ast.Attribute) -> Value:
@@ -219,9 +222,11 @@ class Expressions:
         if place.text.isdigit():
             return base.member(*inner[int(place.text)])
         self.need(all(kind == inner[0][1] for _, kind in inner), node)
-        tests = [Value(f"{place.at(ORDER)} == {k}", self.whole.boolean, EQUAL) for k in range(len(inner))]
-        pairs = list(zip(tests, (base.member(*one) for one in inner), strict=True))
-        return reduce(lambda other, pair: self._choice(*pair, other), pairs[-2::-1], pairs[-1][1])
+        *others, value = (base.member(*one) for one in inner)
+        for k in reversed(range(len(others))):
+            test = Value(f"{place.at(ORDER)} == {k}", self.whole.boolean, EQUAL)
+            value = self._choice(test, others[k], value)
+        return value
 
     def _binop(self, node: ast.BinOp) -> Value:
         if not isinstance(node.op, ast.Pow):
@@ -262,7 +267,10 @@ class Expressions:
         return Value(sign.join(self.truth(one).at(EQUAL) for one in node.values), self.whole.boolean, rank)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        test, values = self.truth(node.test), [self.expression(x, alone=True) for x in (node.body, node.orelse)]
+        test, values = (
+            self.truth(node.test),
+            [self.expression(x, alone=True) for x in (node.body, node.orelse)],
+        )
         kind = self.whole.typing.unify_types(*(value.type for value in values))
         return self._choice(test, *(self.cast(value, plain(kind), node) for value in values))
 
@@ -291,7 +299,9 @@ class Expressions:
 
     def _arguments(self, callee: Any, node: ast.Call, *known: Value) -> list[Value]:
         """Values of a call in the order of the function's parameters, `known` first, defaults where none is given."""
-        bound = inspect.signature(callee).bind(*known, *node.args, **{str(w.arg): w.value for w in node.keywords})
+        bound = inspect.signature(callee).bind(
+            *known, *node.args, **{str(w.arg): w.value for w in node.keywords}
+        )
         bound.apply_defaults()
         others = list(bound.arguments.values())[len(known) :]
         others = [self.expression(x) if isinstance(x, ast.AST) else self._literal(x, node) for x in others]
@@ -300,8 +310,6 @@ class Expressions:
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
         kinds, casts = tuple(value.type for value in values), self.whole.kinds
-        if callee is abs and is_struct(kinds[0]):
-            return self._calling(abs, values, node)
         if callee is len:
             return Value(f"{values[0].at(ATOM)}.shape[0]", self.whole.integer)
         if callee in casts:
@@ -334,7 +342,7 @@ class Expressions:
     def _call_of(
         self, name: str, values: list[Value], kind: Any, node: Any = None, writes: bool = False
     ) -> Value:
-        """A call in C, of a function that `writes` to arrays; a large struct is written where the last argument points."""
+        """A call in C; that of a large struct writes it where its last argument points to."""
         if writes:
             self.need(id(node) in self._alone, node)
             arrays = [one for one in values if getattr(one.type, "ndim", 0) or is_struct(one.type)]

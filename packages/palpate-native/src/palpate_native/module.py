@@ -258,7 +258,7 @@ class _Writer:
             "\n".join(f"#include <{one}.h>" for one in ("float", "math", "stddef", "string")),
             _IEEE,
             *self.whole.structs.definitions,
-            *self.whole.constants.definitions,
+            *self.whole.constants,
             *_one_copy(self.whole.definitions),
             table,
             *self.functions,

@@ -18,7 +18,7 @@ class _Rewriting(ast.NodeTransformer):
     def __init__(self) -> None:
         self._temporaries = 0
 
-    def visit_Compare(self, node: ast.Compare) -> ast.expr:  # noqa: N802 - as `ast` calls it
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
         """`a < b < c` as `a < b and b < c`; `a in (b, c)` as `a == b or a == c`."""
         self.generic_visit(node)
         inside = isinstance(node.ops[0], ast.In | ast.NotIn)
@@ -33,19 +33,20 @@ class _Rewriting(ast.NodeTransformer):
             return node
         return _placed(value, node)
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:  # noqa: N802
+    def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         """`a += b` as `a = a + b`."""
         self.generic_visit(node)
         before = copy.deepcopy(node.target)
         before.ctx = ast.Load()
         return self._assign(node.target, _placed(ast.BinOp(before, node.op, node.value), node), node)
 
-    def visit_Assign(self, node: ast.Assign) -> list[ast.stmt]:  # noqa: N802
+    def visit_Assign(self, node: ast.Assign) -> list[ast.stmt]:
         """`a = b = c` as two assignments, and `a, b = c, d`."""
         self.generic_visit(node)
         if len(node.targets) == 1:
             return self._assign(node.targets[0], node.value, node)
-        lines, value = [], node.value
+        lines: list[ast.stmt] = []
+        value = node.value
         if not isinstance(value, ast.Constant | ast.UnaryOp):
             lines, value = self._temporary(value)
         return [*lines, *(line for one in node.targets for line in self._assign(one, value, node))]
@@ -67,7 +68,9 @@ class _Rewriting(ast.NodeTransformer):
             if not isinstance(value, ast.Name):
                 lines, value = self._temporary(value)
             parts = [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(len(target.elts))]
-            pairs = [pair for pair in zip(target.elts, parts, strict=True) if getattr(pair[0], "id", "") != "_"]
+            pairs = [
+                pair for pair in zip(target.elts, parts, strict=True) if getattr(pair[0], "id", "") != "_"
+            ]
         return lines + [line for one, part in pairs for line in self._assign(one, _placed(part, node), node)]
 
     def _temporary(self, value: ast.expr) -> tuple[list[ast.stmt], ast.Name]:

@@ -88,6 +88,15 @@ def constant_notes(file: str) -> dict[str, str]:
     }
 
 
+def home_of(name: str, value: Any, function: Callable[..., Any]) -> tuple[str, str]:
+    """The module of ours that says what a constant is, and the sentence; or the function's."""
+    for module in [one for one in list(sys.modules.values()) if one.__name__.startswith("palpate")]:
+        note = constant_notes(str(module.__file__)).get(name) if vars(module).get(name) is value else None
+        if note:
+            return module.__name__, note
+    return function.__module__, ""
+
+
 def first_sentence(text: str) -> str:
     """The first paragraph of a docstring in one line, safe inside a C comment."""
     return " ".join(text.strip().split("\n\n")[0].split()).replace("*/", "* /").replace("/*", "/ *")

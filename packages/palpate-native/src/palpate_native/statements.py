@@ -6,11 +6,12 @@ import ast
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
+from palpate._jit.registry import parts
 from palpate_native.expressions import SUM, UNARY, Expressions, Value
 from palpate_native.normal_form import normal_form
 from palpate_native.source import comments_of, syntax_of
@@ -41,15 +42,17 @@ class FunctionBody(Expressions):
         self.name, self.kinds, self.result, body = "", kinds, result, self.tree.body
         self._comments = dict(comments_of(function.__code__.co_filename))
         self._uses, self._stores = _names(body), _names(body, ast.Store)
-        self._stores.update(one.arg for one in self.tree.args.args)
+        self._given = [one.arg for one in self.tree.args.args]
+        self._stores.update(self._given)
         self._blocks: dict[str, list[ast.stmt]] = {}
         self._block_now: list[ast.stmt] = body
         self._first: list[str] = []
+        self._homes: dict[str, Value] = {}
 
     def text(self) -> str:
         """The function in C."""
         parameters = []
-        for argument, kind in zip((one.arg for one in self.tree.args.args), self.kinds, strict=True):
+        for argument, kind in zip(self._given, self.kinds, strict=True):
             own, of = c_name(argument), self.whole.structs.name(kind)
             given = f"const {of} *{own}" if by_pointer(kind) else f"{of} {own}"
             value = _pointed(own, kind) if by_pointer(kind) else Value(own, kind, place=True)
@@ -59,6 +62,11 @@ class FunctionBody(Expressions):
                 self._first.append(f"(void){own};")
             parameters.append(given)
             self.variables[argument], self._blocks[argument] = value, self.tree.body
+        returns = [one.value for one in ast.walk(self.tree) if isinstance(one, ast.Return) and one.value]
+        if len(returns) == 1:
+            once = {name for name, times in _names(returns).items() if times == 1 and name not in self._given}
+            places = self._places(returns[0], _pointed("to", self.result))
+            self._homes = {name: place for name, place in places if name in once}
         lines, of = self._block(self.tree.body), f"{self.whole.structs.name(self.result)} "
         if by_pointer(self.result):
             parameters.append(f"{of}*to")
@@ -81,9 +89,6 @@ class FunctionBody(Expressions):
         comment = isinstance(node.value, ast.Constant)
         return [] if comment else [f"{self.expression(node.value, alone=True).text};"]
 
-    def _pass(self, node: ast.Pass) -> list[str]:
-        return []
-
     def _break(self, node: ast.Break | ast.Continue) -> list[str]:
         return [f"{type(node).__name__.lower()};"]
 
@@ -104,15 +109,15 @@ class FunctionBody(Expressions):
         call: Any = node.iter
         target, changes = getattr(node.target, "id", ""), _names(node.body, ast.Store)
         counts = isinstance(call, ast.Call) and self.python_object(call.func) is range and not node.orelse
-        self.need(counts and target and target not in {*changes, *self.variables}, node)
+        self.need(counts and len(call.args) < 3, node)
+        self.need(target and target not in {*changes, *self.variables}, node)
         values = [self.cast(self.expression(one), self.whole.integer, one) for one in call.args]
-        at, down, own = int(len(values) > 1), len(values) == 3, c_name(target)
-        self.need(not down or values[2].text == "-1", node)
+        at, own = int(len(values) > 1), c_name(target)
         self.variables[target] = Value(own, self.whole.integer, place=True)
         first, end = f"int64_t {own} = {values[0].text if at else '0'}", values[at].at(SUM)
         if re.search(r"[^-\w]", end) or changes[getattr(call.args[at], "id", "")]:
             first, end = f"{first}, {own}_end = {values[at].text}", f"{own}_end"
-        head = f"for ({first}; {own} {'>' if down else '<'} {end}; {'--' if down else '++'}{own}) {{"
+        head = f"for ({first}; {own} < {end}; ++{own}) {{"
         inner = self._block(node.body)
         del self.variables[target]
         return [head, *inner, "}"]
@@ -124,6 +129,18 @@ class FunctionBody(Expressions):
         if not by_pointer(self.result):
             return [f"return {value.text};"]
         return [*self._fill(_pointed("to", self.result), value), "return to;"]
+
+    def _places(self, node: Any, place: Value) -> Iterator[tuple[str, Value]]:
+        """Variables that are large fields of the struct that an expression makes, and their places in it."""
+        if isinstance(node, ast.Name) and by_pointer(place.type):
+            yield node.id, place
+        part = (
+            isinstance(node, ast.Call)
+            and self.function.__globals__.get(getattr(node.func, "id", "")) in parts
+        )
+        fields = getattr(node, "args" if part else "elts", [])
+        for one, field in zip(fields, members(place.type) if fields else [], strict=False):
+            yield from self._places(one, place.member(*field))
 
     def _fill(self, place: Value, value: Value) -> list[str]:
         """Writes a value into a place that it does not read: a large struct field by field, or by the function."""
@@ -152,9 +169,14 @@ class FunctionBody(Expressions):
         if known and (known.type, value.type) == (self.whole.real, self.whole.integer):
             value = self.cast(value, known.type, node)
         if known and known.type == value.type:
-            return self._store_again(known, value)
+            return self._store_again(name, known, value)
         self.need(not known or self._blocks[name] is self._block_now, node)
         of, large, block = self.whole.structs.name(value.type), by_pointer(value.type), self._block_now
+        home = self._homes.pop(name, None)
+        if home and home.type == value.type and not known:
+            self.variables[name], self._blocks[name] = _pointed(c_name(name), value.type), block
+            self._first.append(f"{of} *{c_name(name)} = {home.address};")
+            return self._fill(self.variables[name], value)
         place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type, place=True)
         self.variables[name], self._blocks[name] = place, block
         if not known and _names(block)[name] != self._uses[name]:
@@ -169,15 +191,15 @@ class FunctionBody(Expressions):
         text = value.text.removeprefix(f"({of})") if is_struct(value.type) else value.text
         return [f"{of} {place.text} = {text};"]
 
-    def _store_again(self, known: Value, value: Value) -> list[str]:
+    def _store_again(self, name: str, known: Value, value: Value) -> list[str]:
         """Assigns to a variable; an argument by pointer then points to a struct of the function's own."""
         if value.text == known.text:
             return []
-        name = known.text.removeprefix("*")
-        place = known if name == known.text else Value(f"{name}_", known.type, place=True)
-        reads = re.search(rf"(?<![\w>.]){re.escape(name)}\b", value.text)
+        own, given = known.text.removeprefix("*"), name in self._given and by_pointer(known.type)
+        place = Value(f"{own}_", known.type, place=True) if given else known
+        reads = re.search(rf"(?<![\w>.]){re.escape(own)}\b", value.text)
         lines = [f"{place.text} = {value.text};"] if reads else self._fill(place, value)
-        return lines if place is known else [*lines, f"{name} = &{place.text};"]
+        return [*lines, f"{own} = &{place.text};"] if given else lines
 
     def _stays(self, name: str, node: ast.expr) -> bool:
         """Whether a variable is never assigned again, nor that in which its struct has a place."""
@@ -189,7 +211,7 @@ class FunctionBody(Expressions):
         from numba import types
 
         size, name = node.value.args[0], getattr(target, "id", "")
-        lengths = [getattr(one, "value", None) for one in getattr(size, "elts", [size])]
+        lengths: Any = [getattr(one, "value", None) for one in getattr(size, "elts", [size])]
         self.need(all(type(n) is int for n in lengths), node)
         self.need(_names(self._block_now)[name] == self._uses[name] > 0, node)
         kind, own = types.Array(types.float64, len(lengths), "C"), c_name(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ VIEW = """/* View of numbers in memory of the caller, one behind the other{}. */
 typedef struct {{
     double *at;
     int64_t shape[{}];
-}} NAME;"""
+}}"""
 _OF_THE_LANGUAGE = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false
@@ -82,7 +82,9 @@ def initial(value: Any, kind: Any) -> str:
         inner = [initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True)]
     elif hasattr(kind, "ndim"):
         table = np.asarray(value, dtype=float)
-        numbers = "".join(f"\n    {', '.join(map(number, row))}," for row in table.reshape(-1, table.shape[-1]).tolist())
+        numbers = "".join(
+            f"\n    {', '.join(map(number, row))}," for row in table.reshape(-1, table.shape[-1]).tolist()
+        )
         inner = [f"(double *)(const double[]){{{numbers}\n}}", f"{{{', '.join(map(str, table.shape))}}}"]
     else:
         return number(value)
@@ -94,23 +96,19 @@ class Structs:
 
     Args:
         prefix: of the names of those in the header, as `palpate_force`.
+        claim: gives a name that nothing else in the file has.
     """
 
-    def __init__(self, prefix: str):
+    def __init__(self, prefix: str, claim: Callable[[str], str]):
         from numba import types
 
-        self.prefix = prefix
+        self._prefix, self._claim = prefix, claim
         self._names: dict[Any, str] = {
             types.float64: "double", types.int64: "int64_t", types.boolean: "bool", types.none: "void"
         }  # fmt: skip
         self._public: dict[str, str] = {}
         self.definitions: list[str] = []
         self.header: list[str] = []
-
-    @property
-    def names_in_use(self) -> set[str]:
-        """Names that types have."""
-        return set(self._names.values())
 
     def name(self, kind: Any, publish: bool = False, public: str = "") -> str:
         """The C name of a type; a struct is defined when it is first named.
@@ -125,35 +123,29 @@ class Structs:
         """
         kind = plain(kind)
         if kind not in self._names:
-            text, basis = self._struct(kind, publish) if is_struct(kind) else self._view(kind)
-            choices = (basis, *(f"{basis}{i}" for i in range(2, 999)))
-            short = self._names[kind] = next(one for one in choices if one not in self.names_in_use)
+            name, text = self._struct(kind, publish) if is_struct(kind) else self._view(kind)
+            short = self._names[kind] = self._claim(name)
             if publish:
-                own = self._public[short] = public or f"{self.prefix}_{short}"
-                self.header.append(text.replace("NAME;", f"{own};"))
-                text = f"typedef {own} NAME;"
-            self.definitions.append(text.replace("NAME;", f"{short};"))
+                own = self._public[short] = public or f"{self._prefix}_{short}"
+                self.header.append(f"{text} {own};")
+                text = f"typedef {own}"
+            self.definitions.append(f"{text} {short};")
         short = self._names[kind]
         return self._public.get(short, short) if publish else short
 
     def _view(self, kind: Any) -> tuple[str, str]:
-        from numba import types
-
-        if not isinstance(kind, types.Array) or kind.dtype != types.float64 or kind.layout != "C":
+        if getattr(kind, "layout", "") != "C" or self._names[kind.dtype] != "double":
             raise KeyError(kind)
         order = ["", ", row by row", ", table by table, row by row"][kind.ndim - 1]
-        return VIEW.format(order, kind.ndim), f"array{kind.ndim}"
+        return f"array{kind.ndim}", VIEW.format(order, kind.ndim)
 
     def _struct(self, kind: Any, publish: bool) -> tuple[str, str]:
-        fields = [(field, self.name(one, publish)) for field, one in members(kind)]
-        if not hasattr(kind, "fields"):
-            lines = [f"    {of} {field};" for field, of in fields]
-            basis = "_and_".join(self.name(one).removesuffix("_t") for _, one in members(kind))
-            says = ""
-        else:
-            cls = kind.instance_class
-            notes = {name: f" /* {note} */" for name, note in field_notes(cls).items()}
-            lines = [f"    {of} {field};{notes.get(field, '')}" for field, of in fields]
-            basis, text = c_name(cls.__name__), first_sentence(vars(cls).get("__doc__") or "")
-            says = "" if text.startswith(f"{cls.__name__}(") or not text else f"/* {text} */\n"
-        return f"{says}typedef struct {{\n" + "\n".join(lines) + "\n} NAME;", basis
+        cls: Any = getattr(kind, "instance_class", None)
+        notes = {field: f" /* {note} */" for field, note in field_notes(cls).items()} if cls else {}
+        fields = [
+            f"    {self.name(of, publish)} {field};{notes.get(field, '')}" for field, of in members(kind)
+        ]
+        text = first_sentence(vars(cls).get("__doc__") or "") if cls else ""
+        says = "" if not text or text.startswith(f"{cls.__name__}(") else f"/* {text} */\n"
+        inside = "_and_".join(self.name(of).removesuffix("_t") for _, of in members(kind))
+        return c_name(cls.__name__) if cls else inside, "\n".join([f"{says}typedef struct {{", *fields, "}"])

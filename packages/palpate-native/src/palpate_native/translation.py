@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.typing_rules import TypingRules
-from palpate_native.constants import Constants
-from palpate_native.source import place_of, refuse
+from palpate_native.source import home_of, place_of, refuse
 from palpate_native.statements import FunctionBody
-from palpate_native.structs import Structs, c_name, plain
+from palpate_native.structs import Structs, c_name, initial, plain
 
 _OPERATOR = re.compile(r"/\* .* \*/\nstatic (?:const )?(\w+) \*?(\w+)\((?:.+\n)+")
 OPERATORS = {
@@ -39,11 +38,12 @@ class Translation:
         self.real, self.integer = types.float64, types.int64
         self.boolean, self.none = types.boolean, types.none
         self.kinds = {bool: self.boolean, int: self.integer, float: self.real, np.float64: self.real}
-        self.structs = Structs(prefix)
-        self._claimed: set[str] = set()
-        self.constants = Constants(self.structs, self._claim)
+        self._taken: set[str] = set()
+        self.structs = Structs(prefix, self._claim)
+        self._constants: dict[str, str] = {}
         self._functions: dict[Any, FunctionBody] = {}
         self._helpers: dict[tuple[str, str], str] = {}
+        self.constants: list[str] = []
         self.definitions: list[str] = []
 
     def function(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> FunctionBody:
@@ -61,7 +61,12 @@ class Translation:
                 body.name = self._claim(c_name(name), names[0])
                 text = body.text()
             except KeyError as error:
-                refuse(function, body.tree, f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays")
+                refuse(
+                    function,
+                    body.tree,
+                    f"a value of type {error.args[0]}",
+                    "use numbers, truths, parts, float arrays",
+                )
             says = [*_docstring(function), place_of(function)]
             comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
             self.definitions.append(f"/* {comment} */\n{text}")
@@ -77,12 +82,25 @@ class Translation:
             self._helpers[name, of] = own
         return self._helpers[name, of]
 
-    def _claim(self, name: str, beside: str) -> str:
+    def constant(self, name: str, value: Any, function: Callable[..., Any]) -> tuple[str, Any]:
+        """The C name and the type of a number, a part, or a table of numbers that laws' modules name."""
+        import numba
+
+        table = not hasattr(value, "_fields") and np.ndim(value) > 0
+        kind = plain(numba.typeof(np.array(value, float) if table else value))
+        text = f"{self.structs.name(kind)} {name} = {initial(value, kind)};"
+        if text not in self._constants:
+            module, note = home_of(name, value, function)
+            own = self._constants[text] = self._claim(c_name(name), module.rpartition(".")[2])
+            says = f"/* {note} */\n" if note else ""
+            self.constants.append(f"{says}static const {text.replace(f' {name}', f' {own}', 1)}")
+        return self._constants[text], kind
+
+    def _claim(self, name: str, beside: str = "again") -> str:
         """A name that nothing else of the file has: the name, that with another beside it, or with a number."""
         choices = (name, f"{name}_{beside}", *(f"{name}_{beside}{k}" for k in range(2, 999)))
-        taken = {*self._claimed, *self.structs.names_in_use}
-        own = next(choice for choice in choices if choice not in taken)
-        self._claimed.add(own)
+        own = next(choice for choice in choices if choice not in self._taken)
+        self._taken.add(own)
         return own
 
 
