@@ -47,7 +47,7 @@ REMEDIES = {
     "boolop": "join truths; write a if b else c for another value",
     "ifexp": "give both values one type",
     "call": "call a law, or abs, max, sqrt, or palpate's log; in a statement of its own if it writes to an array",
-    "for": "count with range by 1, with a name that nothing else has",
+    "for": "count with range by 1 or by -1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
 }
 """What the subset has instead, by the kind of syntax."""

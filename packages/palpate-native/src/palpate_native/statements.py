@@ -48,6 +48,7 @@ class FunctionBody(Expressions):
         self._block_now: list[ast.stmt] = body
         self._first: list[str] = []
         self._homes: dict[str, Value] = {}
+        self._standing: set[tuple[str, str]] = set()
 
     def text(self) -> str:
         """The function in C."""
@@ -109,15 +110,15 @@ class FunctionBody(Expressions):
         call: Any = node.iter
         target, changes = getattr(node.target, "id", ""), _names(node.body, ast.Store)
         counts = isinstance(call, ast.Call) and self.python_object(call.func) is range and not node.orelse
-        self.need(counts and len(call.args) < 3, node)
-        self.need(target and target not in {*changes, *self.variables}, node)
+        self.need(counts and target and target not in {*changes, *self.variables}, node)
         values = [self.cast(self.expression(one), self.whole.integer, one) for one in call.args]
-        at, own = int(len(values) > 1), c_name(target)
+        at, down, own = int(len(values) > 1), len(values) == 3, c_name(target)
+        self.need(not down or values[2].text == "-1", node)
         self.variables[target] = Value(own, self.whole.integer, place=True)
         first, end = f"int64_t {own} = {values[0].text if at else '0'}", values[at].at(SUM)
         if re.search(r"[^-\w]", end) or changes[getattr(call.args[at], "id", "")]:
             first, end = f"{first}, {own}_end = {values[at].text}", f"{own}_end"
-        head = f"for ({first}; {own} < {end}; ++{own}) {{"
+        head = f"for ({first}; {own} {'>' if down else '<'} {end}; {'--' if down else '++'}{own}) {{"
         inner = self._block(node.body)
         del self.variables[target]
         return [head, *inner, "}"]
@@ -134,11 +135,8 @@ class FunctionBody(Expressions):
         """Variables that are large fields of the struct that an expression makes, and their places in it."""
         if isinstance(node, ast.Name) and by_pointer(place.type):
             yield node.id, place
-        part = (
-            isinstance(node, ast.Call)
-            and self.function.__globals__.get(getattr(node.func, "id", "")) in parts
-        )
-        fields = getattr(node, "args" if part else "elts", [])
+        callee = self.function.__globals__.get(getattr(getattr(node, "func", None), "id", ""))
+        fields = getattr(node, "args" if callee in parts else "elts", [])
         for one, field in zip(fields, members(place.type) if fields else [], strict=False):
             yield from self._places(one, place.member(*field))
 
@@ -147,7 +145,8 @@ class FunctionBody(Expressions):
         if value.call:
             return [f"{value.call}{place.address});"]
         if not (value.fields and by_pointer(value.type)):
-            return [f"{place.text} = {value.text};"]
+            stands = (value.text, place.text) in self._standing
+            return [] if stands else [f"{place.text} = {value.text};"]
         pairs = zip(members(value.type), value.fields, strict=True)
         return [line for field, one in pairs for line in self._fill(place.member(*field), one)]
 
@@ -176,6 +175,7 @@ class FunctionBody(Expressions):
         if home and home.type == value.type and not known:
             self.variables[name], self._blocks[name] = _pointed(c_name(name), value.type), block
             self._first.append(f"{of} *{c_name(name)} = {home.address};")
+            self._standing.add((f"*{c_name(name)}", home.text))
             return self._fill(self.variables[name], value)
         place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type, place=True)
         self.variables[name], self._blocks[name] = place, block

@@ -61,12 +61,8 @@ class Translation:
                 body.name = self._claim(c_name(name), names[0])
                 text = body.text()
             except KeyError as error:
-                refuse(
-                    function,
-                    body.tree,
-                    f"a value of type {error.args[0]}",
-                    "use numbers, truths, parts, float arrays",
-                )
+                fault, remedy = f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays"
+                refuse(function, body.tree, fault, remedy)
             says = [*_docstring(function), place_of(function)]
             comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
             self.definitions.append(f"/* {comment} */\n{text}")
