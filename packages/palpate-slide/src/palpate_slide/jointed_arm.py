@@ -7,6 +7,7 @@ one has the joints' inertia, their drive trains, a tip that tilts, and resolved 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,9 +25,9 @@ from palpate.force.simulated_press import world_of
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
 from palpate.press.cell import Body, Cell, Reading, Touch, apply_drive, read_sensor
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
+from palpate.press.sequence import PressSequence, Sample, SlidingDriver
 from palpate.press.setting import Place, cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.tool import Command
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
@@ -164,12 +165,13 @@ class JointedArm:
         Raises:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
-        run = JointedSlide(self, gains, ground, into, seed)
-        rows = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS)))
+        rate = gains.arm.rate
+        run = JointedSlide(self, gains, ground, lambda since: ways[round(since * rate)], into, seed)
+        rows = np.zeros((len(ways) + round(LONGEST * rate), len(COLUMNS)))
         for k, row in enumerate(rows):
-            if run.ticks >= len(ways):
+            if round(run.sequence.next_since * rate) >= len(ways):
                 return rows[:k]
-            run.tick(ways[run.ticks], row)
+            run.tick(row)
         return rows
 
     def frame(self) -> Frame:
@@ -188,44 +190,74 @@ class JointedArm:
             )
 
 
+class TipOnGround:
+    """The arm in the surface's axes, for a sequence.
+
+    Args:
+        arm: moved by `engine`.
+        engine: of arm and ground.
+        frame: of the surface.
+    """
+
+    def __init__(self, arm: SimulatedArm, engine: OnGround, frame: Frame):
+        self._arm, self._engine = arm, engine
+        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
+
+    def read(self) -> Sample:
+        """The readings at this tick."""
+        time, _, position, _ = self._arm.read()
+        return Sample(time, self._engine.reading, self._axes @ (position - self._origin))
+
+    def move(self, velocity: Array) -> None:
+        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
+        self._arm.move(velocity @ self._axes)
+
+
 class JointedSlide:
     """A slide that goes on tick by tick.
 
     Args:
         at: the arm before the surface.
+        direction: in the surface's axes, at a time since the slide began [s].
         gains, ground, into, seed: as of `JointedArm.slide`.
 
     Raises:
         InputError: gains of another kind of arm.
     """
 
-    def __init__(self, at: JointedArm, gains: Gains, ground: Ground, into: ArrayLike = DOWN, seed: int = 0):
+    # More than seven arguments: those of a slide, and the path.
+    def __init__(
+        self,
+        at: JointedArm,
+        gains: Gains,
+        ground: Ground,
+        direction: Callable[[float], ArrayLike],
+        into: ArrayLike = DOWN,
+        seed: int = 0,
+    ):
         check_mode(gains, at.inner.kind)
-        self._at, self.loop, self.ticks, self._k = at, SlidingLoop(gains, into), 0, 0
+        self._at, self.loop = at, SlidingLoop(gains, into)
         frame = at.frame()
         cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
         self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
         self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
-        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
+        arm = TipOnGround(self.tip, self.engine, frame)
+        driver = SlidingDriver(arm, self.loop, direction)
+        self.sequence = PressSequence(arm, driver, lambda _: self.loop.desired, gains.arm.tick)
 
-    def tick(self, direction: ArrayLike, row: Array) -> None:
-        """A tick in a direction of the surface's axes; fills a row of `world.COLUMNS`.
+    def tick(self, row: Array) -> None:
+        """A tick; fills a row of `world.COLUMNS`.
 
         Raises:
             InputError: a joint reached the end of its range.
         """
-        reading, loop = self.engine.reading, self.loop
-        seen = self._axes @ (self.tip.read().pose[:3, 3] - self._origin)
-        velocity = loop.update(reading, seen, direction)
-        self.ticks += int(loop.sliding or self.ticks > 0)
-        self.tip.write(Command(velocity=np.concatenate([velocity @ self._axes, np.zeros(3)])))
-        self._at.check_range(self.tip.truth.q, self._k * loop.gains.arm.tick)
-        self._k += 1
-        after = self.engine.slid
-        v, f = _three(velocity), _three(reading)
+        sample, desired, action = self.sequence.tick()
+        loop, after = self.loop, self.engine.slid
+        self._at.check_range(self.tip.truth.q, sample.time)
+        v, f = _three(action.velocity), _three(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
-        row[20] = loop.desired
-        row[13] = (1.0 if loop.sliding else 2.0) * min(self.ticks, 1)
+        row[20] = desired
+        row[13] = (1.0 if loop.sliding else 2.0) * (self.sequence.touch is not None)
 
 
 def jointed_arm(name: str) -> JointedArm:
