@@ -11,8 +11,8 @@ from palpate.cli._terminal import console, place
 from palpate.cli.one_log import read_found
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import (
-    ArmOptions,
     ColumnOptions,
+    LoopArmOptions,
     PressOptions,
     SlideTuningOptions,
     SurfaceOptions,
@@ -32,7 +32,7 @@ def tune(
     found: Path | None = None,
     /,
     *,
-    arm: ArmOptions,
+    arm: LoopArmOptions,
     press: PressOptions,
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,

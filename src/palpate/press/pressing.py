@@ -26,7 +26,7 @@ from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown
 from palpate.force import ForceLoop
 from palpate.force.gains import Gains
-from palpate.press.sequence import Action, CautiousDriver, Driver, Plan, PressSequence, Sample, Tick
+from palpate.press.sequence import Action, CautiousDriver, Plan, PressDriver, PressSequence, Tick, TipSample
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.records import Record
@@ -77,8 +77,8 @@ class ByTorque:
             return Impedance(_six(inner.mass), _six(damping), _six(_GIVING), target)
         raise unknown("controller", name, CONTROLLERS)
 
-    def step(self, sample: Sample, desired: float, since: float) -> Action:
-        """One tick, as `Driver` describes it."""
+    def step(self, sample: TipSample, desired: float, since: float) -> Action:
+        """One tick, as `PressDriver` describes it."""
         force = float(sample.force @ self._normal)
         if self._phase == CONTACT and force <= 0.0:
             self._phase = LOST
@@ -99,7 +99,7 @@ class ByTorque:
         return Action(self._phase, self._speed, self._speed * self._normal, 0.0)
 
 
-def driver_of(name: str, arm: SimulatedArm, gains: Gains, place: Place, force: float) -> Driver:
+def driver_of(name: str, arm: SimulatedArm, gains: Gains, place: Place, force: float) -> PressDriver:
     """The driver of that name.
 
     Raises:
@@ -161,7 +161,7 @@ class _Rows:
 
 
 def press(
-    arm: SimulatedArm, driver: Driver, place: Place, plan: Plan, progress: Progress | None = None
+    arm: SimulatedArm, driver: PressDriver, place: Place, plan: Plan, progress: Progress | None = None
 ) -> Record:
     """Approaches, touches, presses.
 
@@ -193,7 +193,7 @@ def press(
     return _record(arm, rows, ending)
 
 
-def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: Sample | None, time: float) -> Array:
+def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, time: float) -> Array:
     (_, force, position, _), action, truth = tick.sample, tick.action, arm.truth
     seen, pressing = place.axes @ position, action.phase == CONTACT
     true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else seen

@@ -62,7 +62,7 @@ def plan_for(force: float, seconds: float, probe: float, gap: float, speed: floa
     return Plan(force, seconds, probe, 1.0 + _PATIENCE * gap / speed)
 
 
-class Sample(NamedTuple):
+class TipSample(NamedTuple):
     """Readings of an arm at a tick, in its base's axes."""
 
     time: float  # by the arm's clock [s]
@@ -74,7 +74,7 @@ class Sample(NamedTuple):
 class MovableArm(Protocol):
     """An arm in a simulation, or on the other end of a wire."""
 
-    def read(self) -> Sample:
+    def read(self) -> TipSample:
         """The readings at this tick; waits for the tick if the arm has its own clock."""
         ...
 
@@ -94,10 +94,10 @@ class Action(NamedTuple):
     ended: str | None = None  # by a trouble that lasts
 
 
-class Driver(Protocol):
+class PressDriver(Protocol):
     """Moves the arm once a tick."""
 
-    def step(self, sample: Sample, desired: float, since: float) -> Action:
+    def step(self, sample: TipSample, desired: float, since: float) -> Action:
         """Presses with the desired force [N], or looks for the surface; `since` is the time since the touch [s]."""
         ...
 
@@ -105,7 +105,7 @@ class Driver(Protocol):
 class Tick(NamedTuple):
     """One tick of a sequence: readings, desired force [N], and result."""
 
-    sample: Sample
+    sample: TipSample
     desired: float
     action: Action
 
@@ -120,9 +120,9 @@ class PressSequence:
         tick: of the arm [s].
     """
 
-    def __init__(self, arm: MovableArm, driver: Driver, desired: Callable[[float], float], tick: float):
+    def __init__(self, arm: MovableArm, driver: PressDriver, desired: Callable[[float], float], tick: float):
         self._arm, self._driver, self._desired, self._tick = arm, driver, desired, tick
-        self.touch: Sample | None = None
+        self.touch: TipSample | None = None
         self._last = 0.0
 
     def _since(self, time: float) -> float:
@@ -207,8 +207,8 @@ class CautiousDriver:
         self._touched = False
         self.troubles = Troubles(loop.gains.theta, show)
 
-    def step(self, sample: Sample, desired: float, since: float) -> Action:
-        """One tick, as `Driver` describes it."""
+    def step(self, sample: TipSample, desired: float, since: float) -> Action:
+        """One tick, as `PressDriver` describes it."""
         loop, normal = self.loop, self._normal
         loop.desired = desired
         speed = loop.update(float(sample.force @ normal), float(normal @ sample.position), sample.missed)
@@ -243,8 +243,8 @@ class SlidingDriver:
         self._slid = False
         self.troubles = Troubles(loop.gains.theta, show)
 
-    def step(self, sample: Sample, desired: float, since: float) -> Action:
-        """One tick, as `Driver` describes it."""
+    def step(self, sample: TipSample, desired: float, since: float) -> Action:
+        """One tick, as `PressDriver` describes it."""
         loop = self.loop
         velocity = loop.update(sample.force, sample.position, self._direction(since), sample.missed)
         self._arm.move(velocity)

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from palpate._jit import Bound
+from palpate._jit import BoundKernel
 from palpate._vector import ZERO3, Mat3, Vec3, Vec6
 from palpate.arrays import Array
 from palpate.bench.given_motion import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
-from palpate.press.cell import Cell, Reading, Touch, body_at
+from palpate.press.cell import Reading, TouchState, Workcell, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
-from palpate.press.sequence import Sample
+from palpate.press.sequence import TipSample
 from palpate.press.setting import Place
 from palpate.press.tare import TARE
 from palpate.robots.serial.inverse import pose_error
@@ -72,7 +72,7 @@ class SimulatedArm:
         arm: SerialArm,
         loop: Arm,
         place: Place,
-        cell: Cell,
+        cell: Workcell,
         physics: str | Engine = "own",
         seed: int = 0,
         resolution: float = ENCODER,
@@ -85,7 +85,9 @@ class SimulatedArm:
         self._sag = sag
         self._body = body_at(place.q, place.q + sag)
         first = Reading(ZERO3, 0.0, 0.0, 0.0)
-        self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
+        self._touch = TouchState(
+            UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place
+        )
         by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._engine: Engine = by_name if isinstance(physics, str) else physics
         self._k, self.zero = 0, 0.0
@@ -96,10 +98,10 @@ class SimulatedArm:
         rest = place.q + sag if self._tip is None else arm.gravity_torque(place.q)
         self._line = deque([rest] * loop.delay_ticks)
 
-    def read(self) -> Sample:
+    def read(self) -> TipSample:
         """The readings at this tick."""
         force = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
-        return Sample(self._k * self.loop.tick, force, self.pose[:3, 3])
+        return TipSample(self._k * self.loop.tick, force, self.pose[:3, 3])
 
     @property
     def pose(self) -> Array:
@@ -147,7 +149,7 @@ class SimulatedArm:
             raise InputError("a controller of torques needs --mode torque")
         self._act(controller, task)
 
-    def change_surface(self, cell: Cell) -> None:
+    def change_surface(self, cell: Workcell) -> None:
         """Puts the surface of another cell in the place of this one's, such that it bears the force of this moment.
 
         Palpate's own physics alone can; MuJoCo keeps the step it began with.
@@ -221,7 +223,7 @@ class _TipLoop:
         n = arm.joints
         self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
-        self._laws: dict[type, Bound] = {}
+        self._laws: dict[type, BoundKernel] = {}
         self._n = n
 
     def towards(self, goal: Array) -> Task:
@@ -234,7 +236,7 @@ class _TipLoop:
         """Of the joints [N m], shape (n,)."""
         kind = type(controller)
         if kind not in self._states:
-            self._states[kind], self._laws[kind] = controller.start(), Bound(compiled_tip_torque)
+            self._states[kind], self._laws[kind] = controller.start(), BoundKernel(compiled_tip_torque)
         state = self._states[kind]
         torque = np.zeros(self._n)
         compiled_description(self._chain, q, qd, self._found)

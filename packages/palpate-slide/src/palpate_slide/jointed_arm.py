@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Bound, kernel, law, part
+from palpate._jit import BoundKernel, kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
@@ -23,9 +23,9 @@ from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
-from palpate.press.cell import Body, Cell, Reading, Touch, apply_drive, read_sensor
+from palpate.press.cell import Body, Reading, TouchState, Workcell, apply_drive, read_sensor
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
-from palpate.press.sequence import PressSequence, Sample, SlidingDriver
+from palpate.press.sequence import PressSequence, SlidingDriver, TipSample
 from palpate.press.setting import Place, cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.robots.serial.chain import Tip
@@ -92,18 +92,20 @@ class OnGround(ByMuJoCo):
 
     # More than seven arguments: arm and surface.
     def __init__(
-        self, arm: SerialArm, cell: Cell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
+        self, arm: SerialArm, cell: Workcell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
     ):
         super().__init__(arm, cell, q)
         none = Reading(ZERO3, 0.0, 0.0, 0.0)
-        self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), Bound(compiled_slid)
+        self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), BoundKernel(compiled_slid)
         # the links' place is known here, and no spring lies between it and the surface
         world = world_of(inner, noise=0.0)._replace(torque=1.0)
         self.ground, self._world, self._frame = ground, world, frame
         self._axes, self._noise = np.array(frame.axes), np.zeros((3, 8))
         self._generator = np.random.default_rng(seed)
 
-    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+    def tick(
+        self, cell: Workcell, body: Body, touch: TouchState, setpoint: Array, k: int, noise: Array
+    ) -> TouchState:
         """One tick, as `Engine` describes it; noise is drawn for three axes here."""
         self.slid = self.slid._replace(mean=0.0)
         self._noise = self._generator.standard_normal((3, 8))
@@ -115,8 +117,15 @@ class OnGround(ByMuJoCo):
         return np.array([axis.value for axis in (self.slid.x, self.slid.y, self.slid.z)])
 
     def _contact(
-        self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
-    ) -> Touch:
+        self,
+        cell: Workcell,
+        body: Body,
+        touch: TouchState,
+        tip: Tip,
+        setpoint: Array,
+        time: float,
+        noise: Array,
+    ) -> TouchState:
         self.slid = self._law(
             cell, self._world, self.ground, self._frame, body, self.slid, tip, setpoint, time, self._noise
         )
@@ -131,7 +140,7 @@ class OnGround(ByMuJoCo):
         v = J @ data.qvel
         return Tip(_three(at), _UPRIGHT, _three(v), ZERO3, ZERO3, ZERO3)
 
-    def _load(self, body: Body, touch: Touch) -> Array:
+    def _load(self, body: Body, touch: TouchState) -> Array:
         return np.asarray((self._axes @ self._J[:3, self._dofs]).T @ np.array(self.slid.tip.force))
 
 
@@ -203,10 +212,10 @@ class TipOnGround:
         self._arm, self._engine = arm, engine
         self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
 
-    def read(self) -> Sample:
+    def read(self) -> TipSample:
         """The readings at this tick."""
         time, _, position, _ = self._arm.read()
-        return Sample(time, self._engine.reading, self._axes @ (position - self._origin))
+        return TipSample(time, self._engine.reading, self._axes @ (position - self._origin))
 
     def move(self, velocity: Array) -> None:
         """Moves the tip for a tick with a velocity [m/s], shape (3,)."""

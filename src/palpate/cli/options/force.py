@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*", group=Group("The arm", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
-class ArmOptions:
+class LoopArmOptions:
     """The arm whose loop is tuned."""
 
     arm: Annotated[LoopArm, QUIET]
@@ -193,18 +193,11 @@ class ColumnOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(FileOptions):
-    """Where gains or a certificate are written."""
+class TuningOutputOptions(FileOptions):
+    """Files to write, and how much to print."""
 
     out: Path | None = None
     "Where to write the gains (a TOML file) or the certificate (a JSON file)."
-
-
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
-class TuningOutputOptions(OutputOptions):
-    """Files to write, and how much to print."""
-
     verbose: Annotated[bool, FLAG] = False
     "Print every figure, every warning, and the cases that no proof covers."
 
