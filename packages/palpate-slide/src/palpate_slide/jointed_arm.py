@@ -190,40 +190,9 @@ class JointedArm:
         at = at + (self.place.place - n @ at) * n
         return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
 
-    def check_range(self, q: Array, time: float) -> None:
-        """Refuses joints at the end of their range, shape (n,), at a time [s]."""
-        beyond = np.flatnonzero(~((q >= self.arm.lower) & (q <= self.arm.upper)))
-        if len(beyond):
-            raise InputError(
-                f"{self.arm.names[beyond[0]]} reached the end of its range at {time:.3f} s; make --length smaller"
-            )
-
-
-class TipOnGround:
-    """The arm in the surface's axes, for a sequence.
-
-    Args:
-        arm: moved by `engine`.
-        engine: of arm and ground.
-        frame: of the surface.
-    """
-
-    def __init__(self, arm: SimulatedArm, engine: OnGround, frame: Frame):
-        self._arm, self._engine = arm, engine
-        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
-
-    def read(self) -> TipSample:
-        """The readings at this tick."""
-        time, _, position, _ = self._arm.read()
-        return TipSample(time, self._engine.reading, self._axes @ (position - self._origin))
-
-    def move(self, velocity: Array) -> None:
-        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
-        self._arm.move(velocity @ self._axes)
-
 
 class JointedSlide:
-    """A slide that goes on tick by tick.
+    """A slide that goes on tick by tick, and the arm of its sequence, in the surface's axes.
 
     Args:
         at: the arm before the surface.
@@ -245,14 +214,22 @@ class JointedSlide:
         seed: int = 0,
     ):
         check_mode(gains, at.inner.kind)
-        self._at, self.loop = at, SlidingLoop(gains, into)
-        frame = at.frame()
+        self.loop, frame = SlidingLoop(gains, into), at.frame()
         cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
         self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
         self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
-        arm = TipOnGround(self.tip, self.engine, frame)
-        driver = SlidingDriver(arm, self.loop, direction)
-        self.sequence = PressSequence(arm, driver, lambda _: self.loop.desired, gains.arm.tick)
+        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
+        driver = SlidingDriver(self, self.loop, direction)
+        self.sequence = PressSequence(self, driver, lambda _: self.loop.desired, gains.arm.tick)
+
+    def read(self) -> TipSample:
+        """The readings at this tick."""
+        time, _, position, _ = self.tip.read()
+        return TipSample(time, self.engine.reading, self._axes @ (position - self._origin))
+
+    def move(self, velocity: Array) -> None:
+        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
+        self.tip.move(velocity @ self._axes)
 
     def tick(self, row: Array) -> None:
         """A tick; fills a row of `world.COLUMNS`.
@@ -261,8 +238,11 @@ class JointedSlide:
             InputError: a joint reached the end of its range.
         """
         sample, desired, action = self.sequence.tick()
-        loop, after = self.loop, self.engine.slid
-        self._at.check_range(self.tip.truth.q, sample.time)
+        loop, after, arm, q = self.loop, self.engine.slid, self.tip.arm, self.tip.truth.q
+        beyond = np.flatnonzero(~((q >= arm.lower) & (q <= arm.upper)))
+        if len(beyond):
+            at = f"reached the end of its range at {sample.time:.3f} s"
+            raise InputError(f"{arm.names[beyond[0]]} {at}; make --length smaller")
         v, f = _three(action.velocity), _three(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
         row[20] = desired
