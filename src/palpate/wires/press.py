@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.force import ForceLoop, SlidingLoop
-from palpate.press.tool import Troubles
+from palpate.press.sequence import Troubles
 from palpate.wires.at_rest import AtRest, look, with_noise_of
 from palpate.wires.order import Limits, Order
 from palpate.wires.outcome import Outcome, Rows, force_reached, settling_time, surface_of
