@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
-from palpate.force import ForceLoop, SlidingLoop
+from palpate.force import SlidingLoop
 from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
 from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius

@@ -11,9 +11,11 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import Limits, LostError, Rows, Sense, Task, checked, press
-from palpate_rehearsal.rehearsal import REST, ToolAxisArm
 from palpate.wires.order import travel_for
+from palpate_rehearsal.rehearsal import REST, ToolAxisArm
 from wires.slow_cell import cell, servo_cell
+
+SURFACE = surface(4000.0, 20.0)
 
 
 class FakeWire:
@@ -64,7 +66,7 @@ def folder(tmp_path_factory):
 
 def lying(
     folder, lie=lambda sense, first: sense, since=2.0, noise=None, hold=2.0, shown=None,
-    touched=surface(4000.0, 20.0), speed=0.05, travel=0.03,
+    touched=SURFACE, speed=0.05, travel=0.03,
 ):  # fmt: skip
     model = load_arm(str(folder / "arm.toml"))
     arm = ToolAxisArm(model, touched, 0.002, (0.0, 0.0, 1.0), 0)
