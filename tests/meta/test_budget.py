@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=328, lines=59527, tokens=403617),
+    "src/palpate": Weight(files=313, lines=56655, tokens=386736),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=68, lines=10726, tokens=81142),
     "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2715, tokens=21005),
@@ -31,11 +31,12 @@ LARGEST = {
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1315, tokens=9043),
     "packages/palpate-slide/src/palpate_slide": Weight(files=10, lines=1780, tokens=14694),
+    "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3206, tokens=18815),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6349, tokens=42605),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 85, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 81, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {

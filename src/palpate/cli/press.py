@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _terminal
-from palpate.cli._program import command, print_answer
+from palpate.cli._program import command, option_of, print_answer
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import bar, console, place, show_answer
 from palpate.cli._terminal import place as show_place
@@ -130,9 +130,7 @@ def press(
             code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
-        from palpate.cli._press_wire import press_over
-
-        code = press_over(asked, wire, limits, json=json)
+        code = option_of("wire", "wires")(asked, wire, limits, json=json)
     cell.save((asked, simulated, wire, limits), "press")
     return code
 
