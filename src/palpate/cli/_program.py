@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
@@ -33,7 +33,6 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
     "certify": "Prove where a tuned force loop is stable, or check such a proof.",
@@ -58,6 +57,7 @@ GROUPS = {
 COMPANIONS = {
     "excite": "palpate-excitation",
     "live": "palpate-live",
+    "map": "palpate-maps",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",
@@ -65,6 +65,8 @@ COMPANIONS = {
     "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",
 }
+PARTS = {"controller": "certify", "map": "maps"}
+"""Options of palpate's own commands that other distributions serve, by the extra that installs them."""
 ENTRY_POINTS = "palpate.commands"
 """The group of entry points by which a distribution adds a command: its name, and module:function."""
 
@@ -72,6 +74,23 @@ ENTRY_POINTS = "palpate.commands"
 def command() -> str:
     """The whole command, as it can be typed again."""
     return shlex.join(["palpate", *TYPED.get()])
+
+
+def added_part(option: str) -> Callable[..., int]:
+    """The function that another distribution adds to a command of palpate's own, by its option.
+
+    Raises:
+        InputError: the distribution is not installed.
+    """
+    from importlib.metadata import entry_points
+
+    for entry in entry_points(group="palpate.added_parts", name=option):
+        part: Callable[..., int] = entry.load()
+        return part
+    extra = PARTS[option]
+    raise InputError(
+        f"--{option} is of palpate-{extra}, which is not installed: pip install palpate[{extra}]"
+    )
 
 
 def _version() -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._program import print_answer
+from palpate.cli._program import added_part, print_answer
 from palpate.cli._terminal import console, print_lines
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
@@ -153,7 +153,7 @@ def certify(
     if gains is None:
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     if others is not None and others.controller is not None:
-        return _others(gains, others, proof, output)
+        return added_part("controller")(gains, others, proof, output)
     if others is not None and others.report is not None:
         raise InputError("--report is of --controller; palpate tune writes a page about gains")
     output.check_new(output.out, ending=".json")
@@ -198,17 +198,6 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
         why = "; no proof covers that of a servo" if gains.arm.kind == "servo" else ""
         print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}{why}.")
     return 1 if missing else 0
-
-
-def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
-    """The answer of the distribution that reads parameter files of others."""
-    from importlib.metadata import entry_points
-
-    for entry in entry_points(group="palpate.certifiers", name="controller"):
-        return int(entry.load()(path, others, asked, output))
-    raise InputError(
-        "--controller is of palpate-certify, which is not installed: pip install palpate[certify]"
-    )
 
 
 def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
