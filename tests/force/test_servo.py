@@ -7,7 +7,6 @@ import pytest
 from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
-from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
@@ -23,6 +22,7 @@ from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
 from palpate.wires import Limits, Task, checked
+from palpate_certify.force_certificate import RefusedError, check
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
@@ -35,10 +35,8 @@ COMMANDS = {
     "topics": "List the signals of a log: topics, variables, columns.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
-    "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
 }
@@ -56,6 +54,8 @@ GROUPS = {
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
     "excite": "palpate-excitation",
+    "certify": "palpate-certify",
+    "checks": "palpate-checks",
     "live": "palpate-live",
     "map": "palpate-maps",
     "study": "palpate-studies",
@@ -65,8 +65,6 @@ COMPANIONS = {
     "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",
 }
-PARTS = {"controller": "certify", "map": "maps"}
-"""Options of palpate's own commands that other distributions serve, by the extra that installs them."""
 ENTRY_POINTS = "palpate.commands"
 """The group of entry points by which a distribution adds a command: its name, and module:function."""
 
@@ -74,23 +72,6 @@ ENTRY_POINTS = "palpate.commands"
 def command() -> str:
     """The whole command, as it can be typed again."""
     return shlex.join(["palpate", *TYPED.get()])
-
-
-def added_part(option: str) -> Callable[..., int]:
-    """The function that another distribution adds to a command of palpate's own, by its option.
-
-    Raises:
-        InputError: the distribution is not installed.
-    """
-    from importlib.metadata import entry_points
-
-    for entry in entry_points(group="palpate.added_parts", name=option):
-        part: Callable[..., int] = entry.load()
-        return part
-    extra = PARTS[option]
-    raise InputError(
-        f"--{option} is of palpate-{extra}, which is not installed: pip install palpate[{extra}]"
-    )
 
 
 def _version() -> str:
