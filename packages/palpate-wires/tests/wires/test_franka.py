@@ -17,8 +17,8 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate.wires import Command
-from palpate_wires import LostError, open_wire, realtime
+from palpate.wires import Command, LostError
+from palpate_wires import open_wire, realtime
 from palpate_wires.franka_driver import Driver, nearer
 from palpate_wires.orientation import from_matrix_by_columns
 from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses

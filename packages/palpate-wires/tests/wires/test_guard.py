@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.wires import EndedError, SilentError
-from palpate_wires import Command, Limits, LostError
+from palpate.wires import Command, EndedError, LostError, SilentError
+from palpate_wires import Limits
 from palpate_wires.guard import Guard, unsafe
 
 LIMITS = Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0)

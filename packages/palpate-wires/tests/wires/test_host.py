@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from palpate.errors import InputError
-from palpate.wires import SilentError
-from palpate_wires import Command, LostError, Sense, realtime
+from palpate.wires import Command, LostError, Sense, SilentError
+from palpate_wires import realtime
 from palpate_wires.host import Host
 from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, cell
 

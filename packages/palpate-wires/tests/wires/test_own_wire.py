@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from palpate.checks import outcomes
 from palpate.cli import main
 from palpate.errors import InputError, PluginError
-from palpate.wires import SilentError
+from palpate.wires import LostError, Sense, SilentError
+from palpate_checks import outcomes
 from palpate_rehearsal.conformance import LAWS, wire_checks
-from palpate_wires import LostError, Sense, open_wire
+from palpate_wires import open_wire
 from palpate_wires.opening import name_of
 from wires.slow_cell import WORDS, cell
 

@@ -10,8 +10,9 @@ import pytest
 from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
+from palpate.wires import LostError, Sense
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm
-from palpate_wires import Limits, LostError, Rows, Sense, Task, checked, press
+from palpate_wires import Limits, Rows, Task, checked, press
 from palpate_wires.order import travel_for
 from wires.slow_cell import cell, servo_cell
 

@@ -185,7 +185,8 @@ def test_a_controller_sees_by_deadline_and_liveliness_that_commands_ended(folder
     from cyclonedds.sub import DataReader
     from cyclonedds.topic import Topic
 
-    from palpate_wires import Command, open_wire
+    from palpate.wires import Command
+    from palpate_wires import open_wire
     from palpate_wires import ros2_messages as m
 
     told = []

@@ -21,9 +21,10 @@ from palpate.cli import main
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.logs import read_record
+from palpate.wires import LostError
 from palpate_rehearsal import sim_arm
 from palpate_rehearsal.rehearsal import ToolAxisArm
-from palpate_wires import LostError, open_wire, sim
+from palpate_wires import open_wire, sim
 from wires.slow_cell import WORDS, arm, cell, relayed, servo_cell, wait_for_rows
 
 

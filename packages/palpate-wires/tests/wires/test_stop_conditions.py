@@ -9,7 +9,8 @@ import pytest
 
 from palpate.force import ForceLoop, load_arm
 from palpate.press.engines import gains_for
-from palpate_wires import AtRest, Limits, Sense, Task, checked
+from palpate.wires import Sense
+from palpate_wires import AtRest, Limits, Task, checked
 from palpate_wires.guard import Moment, reason_to_stop, spoiled
 
 GAINS = gains_for(load_arm("ur5e"), 10.0)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.contact_frame import Payload
-from palpate_wires import AtRest, Sense
+from palpate.wires import Sense
+from palpate_wires import AtRest
 from palpate_wires.at_rest import notes_on
 
 WEIGHT = (0.0, 0.0, 9.80665)

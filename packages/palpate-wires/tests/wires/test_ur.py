@@ -15,7 +15,8 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from palpate_wires import Command, open_wire
+from palpate.wires import Command
+from palpate_wires import open_wire
 from palpate_wires.orientation import from_rotation_vector, turn_vector
 from wires.slow_cell import ADDRESSES, WORDS, cell, child, wait_for_rows, while_it_presses
 
