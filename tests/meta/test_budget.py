@@ -39,10 +39,8 @@ PARTICIPLES, SHORT_DOCSTRINGS = 85, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {
-        "Arm", "ArmOptions", "Bound", "Cautious", "Cell", "Chain", "Command", "Compensation", "Curve", "Data",
-        "Fit", "ForceLoop", "ForceSensor", "Identification", "Inside", "Kernel", "Limits", "Margins",
-        "OutputOptions", "Parameter", "Payload", "Prediction", "Problem", "Sense", "Surface", "Table", "Task",
-        "Touch", "Verdict", "Wire",
+        "Arm", "Chain", "Curve", "Data", "Fit", "Inside", "Kernel", "Limits", "Payload", "Prediction", "Sense",
+        "Surface", "Table", "Task", "Verdict",
     }
 )  # fmt: skip
 """Class names that stand for two things. None is added; whoever renames one takes it off."""
