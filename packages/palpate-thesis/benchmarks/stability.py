@@ -60,7 +60,7 @@ def laws() -> list[ForceLaw]:
     lever = JOINT_2.lever
     own = direct_neural()
     start = own.start()
-    own.step(start, 20.0, 20.0)  # no error, nothing is learned
+    own.step(start, 20.0, 20.0, 0.0)  # no error, nothing is learned
     direct = own.gain(start) / lever
     network = Neural.thesis().network
     state = network.start()

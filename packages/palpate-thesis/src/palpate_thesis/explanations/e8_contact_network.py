@@ -312,7 +312,7 @@ def plot(data: Data) -> Figure:
     share = [100 * np.mean([a.early for a in some]) for some in data.lower.values()]
     grid[1][1].plot(SWITCHES, share, "o-", color=style.FAIL, markersize=4)
     early = [a.early for some in data.found.values() for a in some]
-    grid[1][1].axhline(100 * np.mean(early), color=style.INK, linewidth=1, linestyle="--")
+    grid[1][1].axhline(100 * sum(early) / len(early), color=style.INK, linewidth=1, linestyle="--")
     grid[1][1].set(xlabel="switch [N]", ylabel="in free motion [%]")
     grid[1][1].set_title("recognised before the touch, by a switch; dashed: by the network")
     for axis in (grid[0][0], grid[1][0]):

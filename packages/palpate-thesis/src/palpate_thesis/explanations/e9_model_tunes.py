@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -157,13 +158,13 @@ def models(experiment: Experiment, record: Record, seed: int) -> dict[str, Model
     scaled = np.clip((inputs - middle) / size, -2.0, 2.0)
     net = fit(SIZES, scaled, f - f.mean(), np.random.default_rng(seed), **OPTIONS)
     blank = network([np.zeros((6, 3)), np.zeros((1, 7))], 1.0, 1.0)
-    range_ = Vec3(*middle, 0.0), Vec3(*size, 1.0)
-    made = ModelTuned(POLE, ZERO3, *range_, 0.0, net)
+    at, by = (Vec3(float(row[0]), float(row[1]), 0.0) for row in (middle, size))
+    made = ModelTuned(POLE, ZERO3, at, by, 0.0, net)
     memory = made.start().network
     least = min(float(made.slopes(memory, *row)[0]) for row in inputs[::50])
     return {
         "network": made._replace(least=max(least, float(line[0]) / 10.0)),
-        "line": ModelTuned(POLE, Vec3(float(line[0]), float(line[1]), 0.0), *range_, 0.0, blank),
+        "line": made._replace(line=Vec3(float(line[0]), float(line[1]), 0.0), network=blank),
     }
 
 
@@ -201,7 +202,7 @@ def response(record: Record) -> Array:
 
 def run(runs: Runs) -> dict[str, list[Tuned]]:
     """Each stiffening surface, identified and pressed on with every seed."""
-    return {name: runs.map(lambda seed, e=e: tune(e, seed), runs.seeds) for name, e in PARAMETERS.items()}
+    return {name: runs.map(partial(tune, e), runs.seeds) for name, e in PARAMETERS.items()}
 
 
 def check(data: Mapping[str, Sequence[Tuned]]) -> Sequence[ThesisClaim]:

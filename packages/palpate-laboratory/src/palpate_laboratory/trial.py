@@ -37,7 +37,7 @@ from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoic
 
 STEPS = 5
 """Of the physics in a tick while a laboratory is looked for: a quarter of the figures', at half the cost. As many
-verdicts turn as with another draw of the noise (`benchmarks/laboratory/steps.py`)."""
+verdicts turn as with another draw of the noise (`benchmarks/steps.py`)."""
 SWITCHED = 4.0
 """Seconds of contact that figure 4.2 looks at [s]."""
 LARGEST_RATE = fig_6_06.RATES[-1]
