@@ -7,7 +7,6 @@ import pytest
 from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
-from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force import SlidingLoop
 from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
@@ -22,6 +21,7 @@ from palpate.force.law import lead_speed
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
+from palpate_certify.force_certificate import RefusedError, check
 
 
 @pytest.fixture(scope="module")
