@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from palpate.checks import identifier_checks
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
+from palpate_checks import identifier_checks
 from palpate_thesis.continuous_least_squares import ContinuousLeastSquares
 from palpate_thesis.explanations import e7_continuous_least_squares as e7
 
