@@ -78,12 +78,12 @@ def run(runs: Runs) -> Data:
         pi,
         {size: errors[i * PER_SIZE : (i + 1) * PER_SIZE] for i, size in enumerate(SIZES)},
         {size: lost[i * PER_LOSS : (i + 1) * PER_LOSS] for i, size in enumerate(SIZES)},
-        {name: {s: _tracked(runs, name, s) for s in ("foam", "rubber")} for name in ARCHITECTURES},
+        {name: {s: _errors_of(runs, name, s) for s in ("foam", "rubber")} for name in ARCHITECTURES},
         {name: runs.map(partial(_loss, runs, name), runs.seeds[:PER_RATE]) for name in ARCHITECTURES},
     )
 
 
-def _tracked(runs: Runs, name: str, surface: str) -> list[Tracking]:
+def _errors_of(runs: Runs, name: str, surface: str) -> list[Tracking]:
     """The error with an architecture in the place of the network, at the text's rate."""
     e = SURFACES[surface]
 

@@ -133,7 +133,7 @@ def fit(
     return net._replace(weights=memory.weights)
 
 
-def taught(seed: int) -> Approach:
+def teach(seed: int) -> Approach:
     """The approach by networks that have learned from `LESSONS` others, on foam and rubber, at several speeds."""
     random = np.random.default_rng(seed)
     lessons = [
@@ -209,20 +209,20 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Networks taught anew for each seed, and the approaches that they are compared with."""
-    nets = dict(zip(runs.seeds, runs.map(taught, runs.seeds), strict=True))
+    nets = dict(zip(runs.seeds, runs.map(teach, runs.seeds), strict=True))
 
     def arrivals(surface: KelvinVoigt, part_of: Callable[[int], Approach]) -> list[Arrival]:
         return runs.map(lambda seed: arrival(approach(surface, part_of(seed), seed)), runs.seeds)
 
-    def switched(surface: KelvinVoigt, switch: float) -> list[Arrival]:
+    def by_switch(surface: KelvinVoigt, switch: float) -> list[Arrival]:
         return arrivals(surface, lambda seed: nets[seed]._replace(switch=switch))
 
     first = runs.seeds[0]
     return Data(
         {name: (nets[first], approach(surface, nets[first], first)) for name, surface in SURFACES.items()},
-        {name: switched(surface, 0.0) for name, surface in SURFACES.items()},
-        {name: switched(surface, SWITCH) for name, surface in SURFACES.items()},
-        {f: [a for surface in SURFACES.values() for a in switched(surface, f)] for f in SWITCHES},
+        {name: by_switch(surface, 0.0) for name, surface in SURFACES.items()},
+        {name: by_switch(surface, SWITCH) for name, surface in SURFACES.items()},
+        {f: [a for surface in SURFACES.values() for a in by_switch(surface, f)] for f in SWITCHES},
         {
             name: {v: arrivals(surface, partial(constant, v)) for v in SPEEDS}
             for name, surface in SURFACES.items()
