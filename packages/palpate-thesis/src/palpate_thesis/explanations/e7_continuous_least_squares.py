@@ -38,7 +38,7 @@ KEYS = "MBK"
 
 
 @dataclass(frozen=True)
-class Compared:
+class BothIdentifiers:
     """One press: both identifiers on the same samples, and Euler's steps of the continuous one's equations."""
 
     recursive: Array  # M, B, K after each sample, shape (k, 3)
@@ -60,14 +60,14 @@ class Compared:
         return abs(times[0] - times[1])
 
 
-def compare(record: Record) -> Compared:
+def compare(record: Record) -> BothIdentifiers:
     """Both identifiers on the first press of a run, with the thesis' own signals."""
     press = press_runs.contact(record)
     phi, force = press_runs.thesis_signals(press)
     surface = record.meta["experiment"]["surface"]
     truth = np.array([surface["mass"], surface["damping"], surface["stiffness"]])
     ratio = press_runs.ratio(press, (press_runs.FIRST - 1.0, press_runs.FIRST))
-    return Compared(
+    return BothIdentifiers(
         press_runs.trajectory(phi, force, START, LARGE),
         continuous(phi, force),
         continuous(phi, phi @ truth)[-1] / truth,
@@ -95,12 +95,12 @@ def by_euler(phi: Array, force: Array, scale: Sequence[float]) -> Array:
     return np.where(np.isfinite(theta), theta, np.nan)
 
 
-def run(runs: Runs) -> dict[str, list[Compared]]:
+def run(runs: Runs) -> dict[str, list[BothIdentifiers]]:
     """One press a seed on each surface."""
     return {name: runs.over_seeds(e, compare) for name, e in SURFACES.items()}
 
 
-def check(data: Mapping[str, Sequence[Compared]]) -> Sequence[ThesisClaim]:
+def check(data: Mapping[str, Sequence[BothIdentifiers]]) -> Sequence[ThesisClaim]:
     """The same as the recursive ones; right in simulation; and whether Euler's steps would do."""
     every = [one for found in data.values() for one in found]
     right = {name: np.array([reaches(one, name) for one in every]) for name in SCALES}
@@ -124,7 +124,7 @@ def check(data: Mapping[str, Sequence[Compared]]) -> Sequence[ThesisClaim]:
     ]
 
 
-def _same(data: Mapping[str, Sequence[Compared]], key: str) -> ThesisClaim:
+def _same(data: Mapping[str, Sequence[BothIdentifiers]], key: str) -> ThesisClaim:
     apart = {name: [100 * one.apart[KEYS.index(key)] for one in found] for name, found in data.items()}
     every = [one for found in data.values() for one in found]
     return claim(
@@ -138,7 +138,7 @@ def _same(data: Mapping[str, Sequence[Compared]], key: str) -> ThesisClaim:
     )
 
 
-def reaches(one: Compared, shape: str) -> Array:
+def reaches(one: BothIdentifiers, shape: str) -> Array:
     """With which of `SIZES` Euler's steps come to f/x."""
     return np.asarray(np.abs(one.euler[shape] - 1.0) <= RIGHT)
 
@@ -149,7 +149,7 @@ def _sizes(right: Array) -> str:
     return f"p = {', '.join(good)}" if good else "no p"
 
 
-def plot(data: Mapping[str, Sequence[Compared]]) -> Figure:
+def plot(data: Mapping[str, Sequence[BothIdentifiers]]) -> Figure:
     """M, B and K of both over time; K by Euler's steps over the size of P(0)."""
     drawing, grid = panels([1.9, 1.9, 2.2], 2, 11.0)
     cells = [axis for row in grid for axis in row]

@@ -56,7 +56,7 @@ class ApproachState(NamedTuple):
 
 
 @part
-class Approach(NamedTuple):
+class ApproachByNetwork(NamedTuple):
     """Position control at a speed until contact is recognised, then force control.
 
     Args:
@@ -133,7 +133,7 @@ def fit(
     return net._replace(weights=memory.weights)
 
 
-def teach(seed: int) -> Approach:
+def teach(seed: int) -> ApproachByNetwork:
     """The approach by networks that have learned from `LESSONS` others, on foam and rubber, at several speeds."""
     random = np.random.default_rng(seed)
     lessons = [
@@ -141,7 +141,9 @@ def teach(seed: int) -> Approach:
     ]
     inputs, near, contact = (np.concatenate(rows) for rows in zip(*lessons, strict=True))
     nearness = fit((1, 3, 1), inputs[:, 3:], near, random)
-    return Approach(FAST, SLOW, 0.0, offset(seed), nearness, fit((3, 4, 1), inputs[:, :3], contact, random))
+    return ApproachByNetwork(
+        FAST, SLOW, 0.0, offset(seed), nearness, fit((3, 4, 1), inputs[:, :3], contact, random)
+    )
 
 
 def lesson(random: np.random.Generator, surface: KelvinVoigt, seed: int) -> tuple[Array, Array, Array]:
@@ -160,10 +162,10 @@ def lesson(random: np.random.Generator, surface: KelvinVoigt, seed: int) -> tupl
     return inputs[rows], near, contact
 
 
-def constant(speed: float, seed: int, switch: float = SWITCH) -> Approach:
+def constant(speed: float, seed: int, switch: float = SWITCH) -> ApproachByNetwork:
     """The thesis' approach: a constant speed until the force reaches a switch."""
     blank = (network([np.zeros((1, n + 1)), np.zeros((1, 2))], 1.0, 1.0) for n in (1, 3))
-    return Approach(speed, speed, switch, offset(seed), *blank)
+    return ApproachByNetwork(speed, speed, switch, offset(seed), *blank)
 
 
 def offset(seed: int) -> float:
@@ -171,7 +173,7 @@ def offset(seed: int) -> float:
     return float(STRAY * np.random.default_rng((seed, 7)).standard_normal())
 
 
-def approach(surface: KelvinVoigt, part: Approach, seed: int) -> Record:
+def approach(surface: KelvinVoigt, part: ApproachByNetwork, seed: int) -> Record:
     """A run from `GAP` before the surface, and on in contact."""
     duration = 3.0 + GAP / part.fast + (0.0 if part.fast == part.slow else 4.0 * NEAR / part.slow)
     schedule = ForceSchedule(SWITCH, SWITCH, 2.5, 0.0, 0.5, 0.0)
@@ -200,7 +202,7 @@ def arrival(record: Record) -> Arrival:
 class Data:
     """Measured values for `check` and `plot`; arrivals by surface, one a seed."""
 
-    shown: dict[str, tuple[Approach, Record]]  # of the first seed
+    shown: dict[str, tuple[ApproachByNetwork, Record]]  # of the first seed
     found: dict[str, list[Arrival]]
     by_switch: dict[str, list[Arrival]]  # at the same pace, with the thesis' switch
     lower: dict[float, list[Arrival]]  # likewise with lower ones, both surfaces
@@ -211,7 +213,7 @@ def run(runs: Runs) -> Data:
     """Networks taught anew for each seed, and the approaches that they are compared with."""
     nets = dict(zip(runs.seeds, runs.map(teach, runs.seeds), strict=True))
 
-    def arrivals(surface: KelvinVoigt, part_of: Callable[[int], Approach]) -> list[Arrival]:
+    def arrivals(surface: KelvinVoigt, part_of: Callable[[int], ApproachByNetwork]) -> list[Arrival]:
         return runs.map(lambda seed: arrival(approach(surface, part_of(seed), seed)), runs.seeds)
 
     def by_switch(surface: KelvinVoigt, switch: float) -> list[Arrival]:
