@@ -443,6 +443,8 @@ class _Slide(_Press):
         super().__init__(*given)
         self._law = self._sliding = SlidingLoop(self._loop.gains, self._direction)
         self._sliding.desired = self._order.task.force
+        if self._loop.gains.arm.kind == "servo":
+            self._sliding.limit_speed(self._order.limits.speed)
         assert self._order.task.path is not None
         self._ways = self._order.task.path.directions(self._loop.gains, self._direction)
 
