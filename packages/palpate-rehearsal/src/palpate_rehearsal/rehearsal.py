@@ -55,8 +55,9 @@ class ToolAxisArm:
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
         self.at, self.aside, self.bent = np.array([0.4, 0.0]), np.array([0.4, 0.0]), np.zeros(2)
-        servo = isinstance(arm.inner, ServoLoop)
-        self._follows = 1.0 - np.exp(-arm.tick / arm.inner.lag) if servo else 1.0
+        self._follows = 1.0
+        if isinstance(arm.inner, ServoLoop):
+            self._follows = 1.0 - float(np.exp(-arm.tick / arm.inner.lag))
         self._by_torque = self.world.torque > 0.0 and self.world.yields == 0.0
         self._line = [0.0 if self._by_torque else -gap] * max(self.world.delay, 1)
 
