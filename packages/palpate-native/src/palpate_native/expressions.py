@@ -175,9 +175,9 @@ class Expressions:
         return self._calling(getter.fget, [part], node, own=True)
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return self._made([self.expression(one, alone=True) for one in node.elts], None, node)
+        return self._new_part([self.expression(one, alone=True) for one in node.elts], None, node)
 
-    def _made(self, values: list[Value], cls: Any, node: Any) -> Value:
+    def _new_part(self, values: list[Value], cls: Any, node: Any) -> Value:
         """A part, or a tuple, of its fields."""
         from numba import types
 
@@ -294,7 +294,7 @@ class Expressions:
         if inspect.isfunction(callee):
             return self._calling(callee, self._arguments(callee, node), node)
         if callee in parts:
-            return self._made(self._arguments(callee, node), callee, node)
+            return self._new_part(self._arguments(callee, node), callee, node)
         return self._built_in(callee, [self.expression(one) for one in node.args], node)
 
     def _arguments(self, callee: Any, node: ast.Call, *known: Value) -> list[Value]:

@@ -31,14 +31,14 @@ class _Rewriting(ast.NodeTransformer):
             value = ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in triples])
         else:
             return node
-        return _placed(value, node)
+        return _at_place_of(value, node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         """`a += b` as `a = a + b`."""
         self.generic_visit(node)
         before = copy.deepcopy(node.target)
         before.ctx = ast.Load()
-        return self._assign(node.target, _placed(ast.BinOp(before, node.op, node.value), node), node)
+        return self._assign(node.target, _at_place_of(ast.BinOp(before, node.op, node.value), node), node)
 
     def visit_Assign(self, node: ast.Assign) -> list[ast.stmt]:
         """`a = b = c` as two assignments, and `a, b = c, d`."""
@@ -54,7 +54,7 @@ class _Rewriting(ast.NodeTransformer):
     def _assign(self, target: Any, value: Any, node: ast.stmt) -> list[ast.stmt]:
         """Assigns an expression; of a tuple each element, and none before all are read that another's place is in."""
         if not isinstance(target, ast.Tuple):
-            return [_placed(ast.Assign([target], value), node)]
+            return [_at_place_of(ast.Assign([target], value), node)]
         lines: list[ast.stmt] = []
         if isinstance(value, ast.Tuple):
             pairs = list(zip(target.elts, value.elts, strict=True))
@@ -71,17 +71,19 @@ class _Rewriting(ast.NodeTransformer):
             pairs = [
                 pair for pair in zip(target.elts, parts, strict=True) if getattr(pair[0], "id", "") != "_"
             ]
-        return lines + [line for one, part in pairs for line in self._assign(one, _placed(part, node), node)]
+        return lines + [
+            line for one, part in pairs for line in self._assign(one, _at_place_of(part, node), node)
+        ]
 
     def _temporary(self, value: ast.expr) -> tuple[list[ast.stmt], ast.Name]:
         """The value under a name that the function does not have."""
         self._temporaries += 1
         name = f"value{self._temporaries}_"
         line = ast.Assign([ast.Name(name, ast.Store())], value)
-        return [_placed(line, value)], ast.Name(name, ast.Load())
+        return [_at_place_of(line, value)], ast.Name(name, ast.Load())
 
 
-def _placed(node: Any, beside: ast.AST) -> Any:
+def _at_place_of(node: Any, beside: ast.AST) -> Any:
     """A new node where another stands in the file."""
     return ast.fix_missing_locations(ast.copy_location(node, beside))
 
