@@ -56,7 +56,7 @@ class FunctionBody(Expressions):
         for argument, kind in zip(self._given, self.kinds, strict=True):
             own, of = c_name(argument), self.whole.structs.name(kind)
             given = f"const {of} *{own}" if by_pointer(kind) else f"{of} {own}"
-            value = _pointed(own, kind) if by_pointer(kind) else Value(own, kind, place=True)
+            value = _behind(own, kind) if by_pointer(kind) else Value(own, kind, place=True)
             if by_pointer(kind) and self._stores[argument] > 1:
                 self._first.append(f"{of} {own}_;")
             if not self._uses[argument]:
@@ -66,7 +66,7 @@ class FunctionBody(Expressions):
         returns = [one.value for one in ast.walk(self.tree) if isinstance(one, ast.Return) and one.value]
         if len(returns) == 1:
             once = {name for name, times in _names(returns).items() if times == 1 and name not in self._given}
-            places = self._places(returns[0], _pointed("to", self.result))
+            places = self._places(returns[0], _behind("to", self.result))
             self._homes = {name: place for name, place in places if name in once}
         lines, of = self._block(self.tree.body), f"{self.whole.structs.name(self.result)} "
         if by_pointer(self.result):
@@ -129,7 +129,7 @@ class FunctionBody(Expressions):
         value = self.cast(self.expression(node.value, alone=True), self.result, node)
         if not by_pointer(self.result):
             return [f"return {value.text};"]
-        return [*self._fill(_pointed("to", self.result), value), "return to;"]
+        return [*self._fill(_behind("to", self.result), value), "return to;"]
 
     def _places(self, node: Any, place: Value) -> Iterator[tuple[str, Value]]:
         """Variables that are large fields of the struct that an expression makes, and their places in it."""
@@ -173,7 +173,7 @@ class FunctionBody(Expressions):
         of, large, block = self.whole.structs.name(value.type), by_pointer(value.type), self._block_now
         home = self._homes.pop(name, None)
         if home and home.type == value.type and not known:
-            self.variables[name], self._blocks[name] = _pointed(c_name(name), value.type), block
+            self.variables[name], self._blocks[name] = _behind(c_name(name), value.type), block
             self._first.append(f"{of} *{c_name(name)} = {home.address};")
             self._standing.add((f"*{c_name(name)}", home.text))
             return self._fill(self.variables[name], value)
@@ -184,7 +184,7 @@ class FunctionBody(Expressions):
             self._first.append(f"{of} {place.text} = {zero};")
             return self._fill(place, value)
         if large and value.place and not value.call and self._stays(name, node.value):
-            self.variables[name] = _pointed(place.text, value.type)
+            self.variables[name] = _behind(place.text, value.type)
             return [f"const {of} *{place.text} = {value.address};"]
         if large and (value.call or value.fields):
             return [f"{of} {place.text};", *self._fill(place, value)]
@@ -223,7 +223,7 @@ class FunctionBody(Expressions):
         ]
 
 
-def _pointed(name: str, kind: Any) -> Value:
+def _behind(name: str, kind: Any) -> Value:
     """The struct behind a pointer."""
     return Value(f"*{name}", kind, UNARY, place=True)
 
