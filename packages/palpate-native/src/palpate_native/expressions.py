@@ -50,7 +50,7 @@ REMEDIES = {
     "for": "count with range by 1 or by -1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
 }
-"""What the subset has instead, by the kind of syntax."""
+"""Remedies of refused syntax, by its kind."""
 
 
 class Value(NamedTuple):
