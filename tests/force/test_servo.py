@@ -7,9 +7,8 @@ import pytest
 from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
-from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
-from palpate.force import ForceLoop, SlidingLoop
+from palpate.force import SlidingLoop
 from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
 from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius
@@ -22,7 +21,7 @@ from palpate.force.law import lead_speed
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
-from palpate.wires import Limits, Task, checked
+from palpate_certify.force_certificate import RefusedError, check
 
 
 @pytest.fixture(scope="module")
@@ -207,6 +206,3 @@ def test_it_is_read_from_a_file(gains):
 def test_what_does_not_cover_a_servo_refuses_it(gains):
     with pytest.raises(InputError, match="a slide of a servo is not covered"):
         SlidingLoop(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)))
-    task = Task(force=15.0, direction=(0.0, 0.0, -1.0), hold=1.0, retreat=0.01)
-    with pytest.raises(InputError, match="the adapting gain of a servo is not proved"):
-        checked(ForceLoop(gains), task, Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0))

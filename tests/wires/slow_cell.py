@@ -43,6 +43,8 @@ full_scale = 100
 speed = 0.25
 stiffness = 1e4
 """
+SERVO = 'kind = "servo"\nmass = 10\nstiffness = 5e3\ndamping = 1e3\ndelay = 0.15\n'
+"""In place of its inner loop: a servo that yields, of a lag of 0.2 s."""
 ALONE = (
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
     "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
@@ -63,14 +65,18 @@ WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--sp
          "--travel-limit", "30:mm", "--time-limit", "20:s")  # fmt: skip
 
 
-def cell(folder: Path, **changed: float) -> Path:
+def cell(folder: Path, text: str = ARM, **changed: float) -> Path:
     """Arm and gains as files, with some numbers of the arm changed; returns the gains' path."""
-    text = ARM
     for name, value in changed.items():
         text = re.sub(rf"(?m)^{name} = .*$", f"{name} = {value}", text)
     (folder / "arm.toml").write_text(text)
     (folder / "gains.toml").write_text(_gains(text, folder / "arm.toml"))
     return folder / "gains.toml"
+
+
+def servo_cell(folder: Path) -> Path:
+    """A cell of a servo that yields."""
+    return cell(folder, re.sub(r"(?s)kind = .*?(?=\n\[sensor)", SERVO, ARM))
 
 
 def slower_cell(folder: Path, rate: int) -> Path:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from palpate.checks import outcomes
 from palpate.cli import main
 from palpate.errors import InputError, PluginError
 from palpate.wires import LostError, Sense, open_wire
 from palpate.wires.opening import name_of
 from palpate.wires.protocol import SilentError
+from palpate_checks import outcomes
 from palpate_rehearsal.conformance import LAWS, wire_checks
 from wires.slow_cell import WORDS, cell
 

@@ -11,8 +11,11 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import Limits, LostError, Rows, Sense, Task, checked, press
+from palpate.wires.order import travel_for
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm
-from wires.slow_cell import cell
+from wires.slow_cell import cell, servo_cell
+
+SURFACE = surface(4000.0, 20.0)
 
 
 class FakeWire:
@@ -61,15 +64,18 @@ def folder(tmp_path_factory):
     return made
 
 
-def lying(folder, lie=lambda sense, first: sense, since=2.0, noise=None, hold=2.0, shown=None):
+def lying(
+    folder, lie=lambda sense, first: sense, since=2.0, noise=None, hold=2.0, shown=None,
+    touched=SURFACE, speed=0.05, travel=0.03,
+):  # fmt: skip
     model = load_arm(str(folder / "arm.toml"))
-    arm = ToolAxisArm(model, surface(4000.0, 20.0), 0.002, (0.0, 0.0, 1.0), 0)
+    arm = ToolAxisArm(model, touched, 0.002, (0.0, 0.0, 1.0), 0)
     if noise is not None:
         arm.world = arm.world._replace(noise=noise)
     wire = FakeWire(arm, lie, since)
     order = checked(
         ForceLoop.load(folder / "gains.toml"), Task(10.0, (0.0, 0.0, -1.0), hold, 0.001),
-        Limits(force=25.0, speed=0.05, travel=0.03, seconds=20.0),
+        Limits(force=25.0, speed=speed, travel=travel, seconds=20.0),
     )  # fmt: skip
     rows = Rows(None, order.most, {})
     outcome = press(wire, order, rows, lambda: None, (shown if shown is not None else []).append)
@@ -176,3 +182,46 @@ def test_a_wire_that_is_lost_ends_the_press(folder):
 
     outcome, _, _ = lying(folder, gone)
     assert outcome.ended == "the controller has closed the connection"
+
+
+@pytest.fixture(scope="module")
+def servo(tmp_path_factory):
+    made = tmp_path_factory.mktemp("servo")
+    servo_cell(made)
+    return made
+
+
+@pytest.mark.parametrize("K", [500.0, 4000.0, 1e4])
+def test_a_servo_that_yields_presses_within_the_same_limits(servo, K):
+    """Its command goes ahead of the tip by F/K_s and more; after the press the tip comes to where that has led."""
+    outcome, wire, rows = lying(servo, touched=surface(K), hold=3.0, travel=0.06)
+    assert outcome.ok, outcome.ended
+    assert outcome.force == pytest.approx(10.0, rel=0.05)
+    record = rows.record()
+    assert record["force_sampled"].max() < 1.1 * 10.0
+    assert max(np.linalg.norm(command.velocity) for command in wire.sent) <= 0.05 * (1.0 + 1e-9)
+    pressed = record["x_measured"][record["phase"] > 0.0].max() - 0.002
+    for _ in range(200):
+        wire.arm.tick()
+    assert wire.arm.command == pytest.approx(pressed - 0.001, abs=5e-4)
+    assert wire.arm.body.x <= wire.arm.command + 1e-6
+
+
+def test_a_servo_whose_lead_knows_what_the_limit_takes_off_settles_sooner(servo, monkeypatch):
+    """One that does not goes back from a speed that its tip has never had."""
+    told = lying(servo, touched=surface(500.0), speed=0.1, hold=4.0, travel=0.06)[0].settled
+    monkeypatch.setattr(ForceLoop, "limit_speed", lambda self, speed: None)
+    untold = lying(servo, touched=surface(500.0), speed=0.1, hold=4.0, travel=0.06)[0].settled
+    assert told < untold - 0.2
+
+
+def test_a_servo_with_a_sensor_that_lies_presses_no_harder_than_the_plan_says(servo):
+    """A force that ripples about zero, to the end of the travel that the plan gives."""
+    rng = np.random.default_rng(0)
+    ripple = force(lambda now, first: first + 0.05 * rng.standard_normal())
+    gains = ForceLoop.load(servo / "gains.toml").gains
+    outcome, wire, _ = lying(
+        servo, ripple, since=0.0, touched=surface(gains.cap), travel=travel_for(gains, 25.0)
+    )
+    assert "was not sent" in outcome.ended
+    assert wire.arm.body.force < 25.0

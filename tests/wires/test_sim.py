@@ -24,7 +24,7 @@ from palpate.logs import read_record
 from palpate.wires import LostError, open_wire, sim
 from palpate_rehearsal import sim_arm
 from palpate_rehearsal.rehearsal import ToolAxisArm
-from wires.slow_cell import WORDS, arm, cell, relayed, wait_for_rows
+from wires.slow_cell import WORDS, arm, cell, relayed, servo_cell, wait_for_rows
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +69,22 @@ def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folde
     # The certificate counts readings that are late by two ticks; a busy machine's move the loop's own estimate further.
     ratio = told["stiffness_N_per_m"][0] / (4000 / (1 + 4000 / 5e4))
     assert told["lateness"]["p99.9_s"] > 2 * 0.01 or 0.5 < ratio < 2.0
+
+
+def test_a_servo_that_yields_presses_over_a_wire_and_its_record_shows_the_surface_alone(here, capsys):
+    servo_cell(here)
+    with arm(here, "--stiffness", "4000") as (_, address):
+        code, told = press(
+            capsys, here, address, "--yes", "--record", "rec", "--probe", "0.2", "--seconds", "3"
+        )
+    assert code == 0, told["ended"]
+    assert told["force_N"] == pytest.approx(10.0, rel=0.05)
+    assert main(["identify", "rec/record.parquet", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "series-compliance" not in {warn["code"] for warn in found["warnings"]}
+    K = found["parameters"]["K"]
+    assert abs(K["value"] - 4000) < 4.0 * K["std"]
+    assert K["std"] < 150
 
 
 def test_a_dry_run_moves_nothing(folder, here, capsys):

@@ -33,13 +33,10 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
-    "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
 }
@@ -57,7 +54,10 @@ GROUPS = {
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
     "excite": "palpate-excitation",
+    "certify": "palpate-certify",
+    "checks": "palpate-checks",
     "live": "palpate-live",
+    "map": "palpate-maps",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
     "laboratory": "palpate-thesis",

@@ -13,7 +13,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, held
-from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
+from palpate.press.cell import NO_TOOL, HeldTool, Workcell, WristSensor
 from palpate.robots.serial.inverse import checked_pose
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -133,7 +133,9 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
         )
 
 
-def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL) -> Cell:
+def cell_of(
+    arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL
+) -> Workcell:
     """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
     motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if motors else arm.chain
@@ -153,7 +155,7 @@ def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool:
         damper = loop.inner.lag * spring
         fastest = max(fastest, _fastest(links, damper))
     steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
-    return Cell(
+    return Workcell(
         chain=chain, normal=_three(place.normal), place=place.place, surface=surface,
         sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps,
         elastic=float(motors or servo), yields=float(servo), spring=spring, damper=damper, first=float(first),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
-from palpate.wires.order import Order
+from palpate.wires.order import Order, checked
 from palpate.wires.protocol import Quaternion, Sense, Wire, unreadable
 
 _FEWEST = 20
@@ -99,9 +99,8 @@ def with_noise_of(rest: AtRest, order: Order) -> tuple[Order, str | None]:
     said = f"the force's noise is {rest.noise:.2g} N at rest, and the gains are for {expected:g} N"
     if order.loop.certificate is not None:
         raise InputError(f"{said}: the certificate is of other gains; tune for this noise, and certify again")
-    loop = ForceLoop(gains)
-    loop.desired = order.task.force
-    return replace(order, loop=loop), f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
+    retuned = checked(ForceLoop(gains), order.task, order.limits)
+    return retuned, f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
 
 
 def _count(rest: AtRest) -> int:

@@ -15,8 +15,8 @@ from palpate.force.gains import Gains
 from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_state import beside
+from palpate.press.sequence import Plan
 from palpate.press.tare import TARE
-from palpate.press.tool import Plan
 from palpate.wires.protocol import Triple, triple
 
 
@@ -139,8 +139,11 @@ class Order:
 
 
 def stiffest(gains: Gains) -> float:
-    """The stiffest surface of the gains, as the measured position feels it [N/m]."""
-    return gains.seen_cap
+    """The stiffest surface of the gains in series with what gives way behind a command [N/m].
+
+    Of a torque arm the surface alone: a wire's controller has a spring of its own.
+    """
+    return gains.cap if gains.arm.kind == "torque" else gains.arm.seen(gains.cap)
 
 
 def travel_for(gains: Gains, force: float) -> float:
@@ -160,11 +163,6 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
         InputError: what does not fit, and what to do.
     """
     gains = loop.gains
-    if gains.arm.kind == "servo":
-        raise InputError(
-            f"{gains.arm.title}: the adapting gain of a servo is not proved, and no press over a wire has tried it;"
-            " give gains of kind position or torque"
-        )
     size = float(np.linalg.norm(task.direction))
     if not (math.isfinite(size) and size > 0.0):
         raise InputError(
@@ -187,6 +185,8 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
     if not 0.0 <= task.retreat <= limits.travel:
         raise InputError(f"--retreat must be from 0 to the travel limit of {1e3 * limits.travel:g} mm")
     loop.desired = task.force
+    if gains.arm.kind == "servo":  # its lead has to know what the limit takes off
+        loop.limit_speed(limits.speed)
     task = replace(task, direction=triple(np.array(task.direction) / size))
     if task.path is not None:
         _check_path(task.path, gains, task, limits)

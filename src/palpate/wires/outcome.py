@@ -231,4 +231,4 @@ def _record(rows: Any, about: dict[str, Any]) -> Record:
     if len(rows):
         columns["t"] = columns["t"] - columns["t"][0]
     meta = {name: value for name, value in about.items() if name != "written_by"}
-    return Record(columns, UNITS, {"wire": meta, "position_from": "joints"})
+    return Record(columns, UNITS, {"wire": meta, "position_from": about.get("position_from", "joints")})

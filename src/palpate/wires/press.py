@@ -18,7 +18,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.force import ForceLoop, SlidingLoop
-from palpate.press.tool import Troubles
+from palpate.press.sequence import Troubles
 from palpate.wires.at_rest import AtRest, look, with_noise_of
 from palpate.wires.order import Limits, Order
 from palpate.wires.outcome import Outcome, Rows, force_reached, settling_time, surface_of
@@ -350,11 +350,14 @@ class _Press:
         return SurfaceBelief(_PHASES[loop.phase], bound, stiffness, self._direction)
 
     def _retreat(self) -> None:
-        """Go back from the surface."""
+        """Go back from the surface: the tip, or the command of a servo, which its tip follows later."""
         back = self._depth - self._order.task.retreat
+        servo = self._loop.gains.arm.kind == "servo"
         # At half the limit: a pose that a network delays shows the way of two or three ticks as that of one.
         speed = min(0.5 * self._order.limits.speed, 10.0 * self._loop.gains.approach)
-        while self._order.task.retreat and self._depth > back:
+        while (
+            self._order.task.retreat and (self._commanded @ self._direction if servo else self._depth) > back
+        ):
             self._move(self._read(), -speed * self._direction)
 
     def _held(self) -> bool:

@@ -11,11 +11,13 @@ from palpate.arrays import Array
 from palpate.bench.force_input import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
+from palpate.force import ForceLoop
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.press.engines import series_of
 from palpate.press.prepare import Question, prepare_press
-from palpate.press.pressing import JOINT_LIMIT, Cautious
+from palpate.press.pressing import JOINT_LIMIT
+from palpate.press.sequence import CautiousDriver, PressSequence
 from palpate.press.setting import Place, cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.robots.serial.serial_arm import SerialArm as Serial
@@ -100,9 +102,16 @@ class PressingArm:
         self.state.begin(seed)
         loop, cell = self._gains.arm, cell_of(self._arm, self._place, self._surface, self._gains.arm)
         self._simulated = SimulatedArm(self._arm, loop, self._place, cell, "own", self.state.seed or 0)
-        self._pilot = Cautious(self._simulated, self._gains, self._place.normal)
         self._k, self._phase, self._high = 0, 0.0, True
+        self._take_gains()
         self._forget()
+
+    def _take_gains(self) -> None:
+        """A new loop with the gains as they now are, and a new sequence with it."""
+        self._loop = ForceLoop(self._gains)
+        driver = CautiousDriver(self._simulated, self._loop, self._place.normal)
+        desired, tick = (lambda _: self.state.values["force"]), self._gains.arm.tick
+        self._sequence = PressSequence(self._simulated, driver, desired, tick)
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come: one a stride."""
@@ -128,13 +137,13 @@ class PressingArm:
             return
         self.state.values[key] = value
         if key == "force":
-            self._pilot.loop.desired = value
+            self._loop.desired = value
         elif key == "gain":
             self._gains = replace(self._gains, alpha=value)
-            before = self._pilot.loop.state
-            self._pilot = Cautious(self._simulated, self._gains, self._place.normal)
-            self._pilot.loop.state = before
-            self._pilot.loop.desired = self.state.values["force"]
+            before = self._loop.state
+            self._take_gains()
+            self._loop.state = before
+            self._loop.desired = self.state.values["force"]
         else:
             cell = cell_of(self._arm, self._place, self._surface, self._gains.arm)
             self._simulated.change_surface(cell)
@@ -171,12 +180,10 @@ class PressingArm:
 
     def _tick(self) -> float:
         """One tick; the force reading before it [N]."""
-        sense = self._simulated.read()
-        normal = self._place.normal
-        reading = float(sense.force[:3] @ normal)
-        self._identifier.update(float(normal @ sense.pose[:3, 3]), reading)
-        acted = self._pilot.step(sense, self.state.values["force"])
-        self._note(acted.phase)
+        tick, normal = self._sequence.tick(), self._place.normal
+        reading = float(tick.sample.force @ normal)
+        self._identifier.update(float(normal @ tick.sample.position), reading)
+        self._note(tick.action.phase)
         self._k += 1
         if self._k % round(self._gains.arm.rate / _LOOKS) == 0:
             self._known = self._estimate()
@@ -222,7 +229,7 @@ class PressingArm:
         if saturated.any():
             joints = " and ".join(self._arm.names[i] for i in np.flatnonzero(saturated))
             return f"{printable(joints)} is at its torque limit; the desired force is out of reach."
-        return self._pilot.loop.trouble
+        return self._loop.trouble
 
     def _note(self, phase: float) -> None:
         now = self._k * self._gains.arm.tick

@@ -55,7 +55,8 @@ class ToolAxisArm:
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
         self.at, self.bent = np.array([0.4, 0.0]), np.zeros(2)
-        self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
+        self._by_torque = self.world.torque > 0.0 and self.world.yields == 0.0
+        self._line = [0.0 if self._by_torque else -gap] * max(self.world.delay, 1)
 
     def velocity_to(self, place: Any) -> Array:
         """Velocity of the command that leads to a place within a tick, shape (3,) [m/s]."""
@@ -74,7 +75,7 @@ class ToolAxisArm:
         self.bent = bent * min(1.0, most / max(np.hypot(*bent), 1e-12))
         self.command += world.tick * min(max(speed, -world.speed), world.speed)
         into = self.command
-        if world.torque > 0.0:
+        if self._by_torque:
             into = world.stiffness * (self.command - self.body.x) - world.second * self.body.v
         held = self._line[0] if world.delay > 0 else into
         self._line = [*self._line[1:], into]

@@ -94,9 +94,15 @@ class WatchedSlide:
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
-        self._run = JointedSlide(self._at, self._gains, self._surface, self._into, self.state.seed or 0)
+        self._run = JointedSlide(
+            self._at, self._gains, self._surface, self._direction, self._into, self.state.seed or 0
+        )
         self._run.loop.desired = self.state.values["force"]
         self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))
+
+    def _direction(self, _: float) -> list[float]:
+        share = 1e-3 * self.state.values["speed"] / self._speed
+        return [share * cos(self._angle), share * sin(self._angle), 0.0]
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come: one a stride."""
@@ -138,14 +144,14 @@ class WatchedSlide:
         )
 
     def _step(self) -> None:
-        share, before = 1e-3 * self.state.values["speed"] / self._speed, self._run.ticks
+        before = self._run.sequence.touch
         try:
-            self._run.tick([share * cos(self._angle), share * sin(self._angle), 0.0], self._own)
+            self._run.tick(self._own)
         except InputError as error:
             self.state.ended = str(error)
         self._k += 1
         now = self._k * self._tick
-        if self._run.ticks and not before:
+        if self._run.sequence.touch is not None and before is None:
             self.state.note(Happened(now, "slides"))
         self._angle += self._own[PLACE["speed"]] * self._tick / self._radius
         trouble = self._run.loop.trouble

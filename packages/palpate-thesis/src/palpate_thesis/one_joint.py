@@ -10,7 +10,7 @@ import numpy as np
 from palpate._jit import kernel, law, part
 from palpate._vector import clip
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
-from palpate.bench.tables import ForceSensor
+from palpate.bench.tables import ForceSensorTable
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
@@ -257,7 +257,7 @@ def one_joint(
         steps: of the plant between ticks.
     """
     require_positive(rate=rate, steps=steps)
-    force = force_input(ForceSensor(noise=noise), rate * steps)
+    force = force_input(ForceSensorTable(noise=noise), rate * steps)
     joint = Joint(float(link.inertia), float(link.lever), link.friction.checked(), join(surface))
     smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
     return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))

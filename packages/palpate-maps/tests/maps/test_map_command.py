@@ -16,12 +16,12 @@ from scipy.spatial.distance import cdist
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs.store import write_record
-from palpate.maps.phantom import Phantom, PhantomLump, load_phantom
-from palpate.maps.presses import Presses, merge_presses, read_table
-from palpate.maps.result import MapRequest, map_of
 from palpate.records import Record
+from palpate_maps.phantom import Phantom, PhantomLump, load_phantom
+from palpate_maps.presses import Presses, merge_presses, read_table
+from palpate_maps.result import MapRequest, map_of
 
-PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
+PRESS = Path(__file__).parents[4] / "examples" / "data" / "press.csv"
 
 
 @pytest.fixture(scope="module")
@@ -230,6 +230,11 @@ def test_logs_without_a_place_are_refused_in_one_line(tmp_path, capsys):
         ("x,y,K,half\n0,0,1000,10\n", ("--next", "-1"), "--next"),
         ("x,y,K,half\n0,0,1000,10\n", ("--rate", "500"), "are of logs"),
         ("x,y,K,half\n0,0,1000,10\n", ("--wrench-frame", "base"), "are of logs"),
+        (
+            "x,y,K,half,frame_id\n0,0,1000,10,base\n1,1,1000,10,camera\n",
+            (),
+            "row 2 (line 3) in 'camera'; a map has one frame",
+        ),
         ("x,y,K,half\n0,0,1000,10\n", ("--each-contact",), "are of logs"),
         ("x,y,K,half\n0,0,1000,10\n", ("--start", "1,2,3:mm", "--way", "5:mm"), "has places of 2"),
     ],

@@ -13,11 +13,11 @@ from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.files import read_table, read_text
-from palpate.maps.presses import Presses
-from palpate.maps.result import MapRequest, MapResult, map_of
 from palpate.press.prepare import Pressing, Question, prepare_press
 from palpate.press.setting import GAP, place_of
 from palpate.press.summary import summarise
+from palpate_maps.presses import Presses
+from palpate_maps.result import MapRequest, MapResult, map_of
 
 FIRST = 4
 """Rows and columns of the presses before the first map: with fewer than sixteen no length scale shows."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist, pdist
 
-from palpate.maps.gaussian_process import Conditioned, Hyperparameters, fit, loss
+from palpate_maps.gaussian_process import Conditioned, Hyperparameters, fit, loss
 
 RNG = np.random.default_rng(3)
 PLACES = RNG.uniform(0.0, 0.1, (25, 2))

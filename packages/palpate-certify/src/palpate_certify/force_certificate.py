@@ -1,6 +1,6 @@
 """An independent check of a certificate of palpate certify, in exact arithmetic.
 
-    python -m palpate.checks.force_certificate certificate.json
+    python -m palpate_certify.force_certificate certificate.json
 
 It is written from the page on force alone, and shares no line with what makes certificates. Numbers are integers over
 2^160; a matrix has a bound of its elements' error. Each tick contracts if P - Phi^T P Phi is positive definite for

@@ -5,19 +5,20 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli._program import print_answer
-from palpate.cli._terminal import console, show_table
 from palpate.cli.options.common import JsonOption, PluginOptions
+from palpate.cli.toolkit import console, print_answer, show_table
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.checks.check import Check
+    from palpate_checks.check import Check
 
 
 def checks(
     name: str | None = None, /, *, own: PluginOptions | None = None, output: JsonOption | None = None
 ) -> int:
-    """Run palpate's conformance suite on your own controller, surface or identifier, or on the wire to your own robot.
+    """Check a controller, surface, identifier or wire of your own.
+
+    The laws are those that every part of palpate keeps.
 
     palpate checks student:Damped
 
@@ -35,7 +36,7 @@ def checks(
         raise InputError(
             "nothing to check; give module:Class, as in student:Damped, or an experiment's TOML file"
         )
-    from palpate.checks.check import outcomes
+    from palpate_checks.check import outcomes
 
     code = name.partition("?")[0]
     with (own or PluginOptions()).consent(given=code):
@@ -61,8 +62,8 @@ def checks(
 
 def _checks_of(name: str, code: str) -> dict[str, list[Check]]:
     """The checks of a part, or of a wire with what is given to it, by what they are of."""
-    from palpate.checks.of_plugin import checks_of
     from palpate.plugins import is_plugin, plugin
+    from palpate_checks.of_plugin import checks_of
 
     part: Any = plugin(code).value() if is_plugin(code) and not code.endswith(".toml") else None
     if not all(hasattr(part, method) for method in ("read", "begin", "write", "stop")):

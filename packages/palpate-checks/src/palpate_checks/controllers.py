@@ -11,11 +11,11 @@ from palpate.arrays import Array
 from palpate.bench import build, changed, load
 from palpate.bench.bench import Bench
 from palpate.bench.build import check_parts
-from palpate.checks.check import Check, require
 from palpate.controllers.controller import controller as registered
 from palpate.errors import InputError
 from palpate.robots.arm3 import Arm3
 from palpate.signals.types import Sense, Task
+from palpate_checks.check import Check, require
 
 TICK, WALL = 0.001, 0.465
 """Time between ticks [s], and x of the surface [m], for which a part is to be made."""

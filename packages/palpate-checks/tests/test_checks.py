@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from own_parts import Normal, Push, Spring
-from palpate.checks import controller_checks, identifier_checks, outcomes, surface_checks
-from palpate.checks.controllers import IN_PLAIN
-from palpate.checks.of_plugin import checks_of
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate_checks import controller_checks, identifier_checks, outcomes, surface_checks
+from palpate_checks.controllers import IN_PLAIN
+from palpate_checks.of_plugin import checks_of
 
 pytestmark = pytest.mark.usefixtures("permitted")
 

@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.maps.lumps import Lump
-from palpate.maps.presses import AXES
-from palpate.maps.result import MapResult
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
@@ -17,6 +14,8 @@ from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import Table, data_address
 from palpate.report.style import svg
+from palpate_maps.presses import AXES
+from palpate_maps.result import Lump, MapResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -166,8 +165,8 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         answer,
         room="map",
         command=command,
-        package="palpate.report",
-        codes=(text_of("map.js", "palpate.report"),),
+        package="palpate_maps",
+        codes=(text_of("map.js", "palpate_maps"),),
         readout=data(_readout(result, field)),
         live=live,
     )

@@ -9,23 +9,81 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import label
 from scipy.spatial.distance import cdist
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files import write_text
-from palpate.maps.gaussian_process import Z95
-from palpate.maps.lumps import Lump, lumps_of
-from palpate.maps.next_press import Goal, NextPresses
-from palpate.maps.presses import AXES, LEAST, Presses
-from palpate.maps.stiffness_map import FieldMap, Prediction, StiffnessMap
-from palpate.maps.surface import Grid
+from palpate.files import whole, write_text
+from palpate_maps.gaussian_process import Z95
+from palpate_maps.next_press import Goal, NextPresses
+from palpate_maps.presses import AXES, LEAST, Presses
+from palpate_maps.stiffness_map import FieldMap, Prediction, StiffnessMap
+from palpate_maps.surface import Grid
 
 SHOWN = 2500
 """Places of the grid that is shown and printed: finer than presses lie, and a page of 200 kB."""
 
 FRAMES = 16
 """Of the map as it grew."""
+TOPIC, COLUMNS = "/palpate/map", ("x", "y", "z", "stiffness", "low", "high")
+"""Of an MCAP file: its topic, and the columns of its points."""
+
+
+@dataclass(frozen=True)
+class Lump:
+    """A connected part of the surface that is more likely than not stiffer than a threshold.
+
+    Args:
+        place: of its stiffest point (d,) [m].
+        stiffness: there [N/m].
+        ci95: 95 % interval of it [N/m].
+        area: where it is more likely than not above the threshold [m^2].
+        area95: the same where the probability is above .975, and where it is above .025 [m^2]; place by place.
+        is_sure: whether its stiffest point is above the threshold with a probability above .975.
+    """
+
+    place: tuple[float, ...]
+    stiffness: float
+    ci95: tuple[float, float]
+    area: float
+    area95: tuple[float, float]
+    is_sure: bool
+
+
+def lumps_of(grid: Grid, prediction: Prediction, threshold: float) -> list[Lump]:
+    """The lumps on a grid within the hull of the presses, the stiffest first.
+
+    Args:
+        grid: of places.
+        prediction: at them.
+        threshold: [N/m].
+    """
+    probability = np.where(grid.inside, prediction.exceeds(threshold), 0.0)
+    parts, count = label((probability > 0.5).reshape(grid.shape))
+    around, _ = label((probability > 0.025).reshape(grid.shape))
+    result = []
+    for k in range(1, count + 1):
+        part = (parts == k).ravel()
+        top = int(np.argmax(np.where(part, prediction.stiffness, 0.0)))
+        halo = around.ravel() == around.ravel()[top]
+        area = (
+            np.sum(part & (probability > 0.975)),
+            np.sum(halo & ((parts.ravel() == k) | (parts.ravel() == 0))),
+        )
+        result.append(
+            Lump(
+                tuple(float(c) for c in grid.places[top]), float(prediction.stiffness[top]),
+                _pair(prediction.ci95[top]),
+                float(part.sum() * grid.cell), (float(area[0] * grid.cell), float(area[1] * grid.cell)),
+                bool(probability[top] > 0.975),
+            )
+        )  # fmt: skip
+    return sorted(result, key=lambda lump: -lump.stiffness)
+
+
+def _pair(ends: Array) -> tuple[float, float]:
+    return float(ends[0]), float(ends[1])
 
 
 @dataclass(frozen=True)
@@ -220,6 +278,43 @@ class MapResult:
             for (x, y), h, k, (low, high), level in zip(places[:, :2], z, stiffness, ci95, light, strict=True)
         ]
         write_text(path, "\n".join([*head, *body]) + "\n")
+
+    def write_mcap(self, path: Path) -> None:
+        """The map as it grew, a second for each press, as point clouds [m, N/m] for Foxglove and Lichtblick.
+
+        Raises:
+            InputError: foxglove-sdk is not installed, or palpate may not write there.
+        """
+        try:
+            import foxglove
+            from foxglove import messages
+            from foxglove.channels import PointCloudChannel
+            from foxglove.mcap import MCAPWriteOptions
+        except ImportError:
+            raise InputError('an MCAP file needs foxglove-sdk: pip install "palpate[foxglove]"') from None
+        grid, context = self.coarse, foxglove.Context()
+        places = np.column_stack([grid.places, np.zeros(len(grid.places))])[:, :3]
+        number = messages.PackedElementFieldNumericType.Float32
+        fields = [
+            messages.PackedElementField(name=n, offset=4 * i, type=number) for i, n in enumerate(COLUMNS)
+        ]
+        origin = messages.Pose(
+            position=messages.Vector3(x=0.0, y=0.0, z=0.0),
+            orientation=messages.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
+        )
+        with whole(path) as draft, draft.open("wb") as file:
+            writer = foxglove.open_mcap(
+                file, context=context, writer_options=MCAPWriteOptions(profile="palpate")
+            )
+            with writer:
+                channel = PointCloudChannel(TOPIC, context=context)
+                for count, seen in self.film:
+                    points = np.column_stack([places, seen.stiffness, seen.ci95])[grid.inside].astype("<f4")
+                    cloud = messages.PointCloud(
+                        timestamp=messages.Timestamp(sec=count, nsec=0), frame_id="surface", pose=origin,
+                        point_stride=4 * len(COLUMNS), fields=fields, data=points.tobytes(),
+                    )  # fmt: skip
+                    channel.log(cloud, log_time=count * 1_000_000_000)
 
 
 def map_of(presses: Presses, request: MapRequest) -> MapResult:

@@ -21,12 +21,13 @@ from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.values import FLAG, quantity
 from palpate.errors import InputError
-from palpate.files import check_place, write_text
+from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
 from palpate.units import split_spec
 
 if TYPE_CHECKING:
-    from palpate.maps.presses import Presses
-    from palpate.maps.result import MapRequest, MapResult
+    from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions
+    from palpate_maps.presses import Presses
+    from palpate_maps.result import MapRequest, MapResult
 
 MAP = Group("The map", sort_key=2)
 POLL = 0.5
@@ -79,7 +80,7 @@ class MapOptions:
 
     def request(self) -> MapRequest:
         """The same for the library."""
-        from palpate.maps.result import MapRequest
+        from palpate_maps.result import MapRequest
 
         if self.until is not None and not 0.0 < self.until < 1e3:
             raise InputError(f"--until must be above 0 %, got {self.until:g}")
@@ -166,7 +167,7 @@ def map(  # noqa: A001 - the command's name
             "--each-contact and the options of logs, frames, arms and models are of logs; a table's places and "
             "stiffnesses stand as they are: leave these options out"
         )
-    from palpate.maps.result import map_of
+    from palpate_maps.result import map_of
 
     one = OneLog(
         fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
@@ -193,7 +194,7 @@ Known = dict[Path, tuple[tuple[int, int], "Presses | str", bool]]
 
 def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: OutputOptions, name: str) -> int:
     """Map again whenever there are other presses than before, until a signal; a map that fails is said once."""
-    from palpate.maps.result import map_of
+    from palpate_maps.result import map_of
 
     known: Known = {}
     result: MapResult | None = None
@@ -219,7 +220,7 @@ def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: Outp
 def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Known) -> Presses:
     """The presses by now; a file is read when it has rested since the last look, and once."""
     from palpate.logs.columns import gather_logs
-    from palpate.maps.presses import merge_presses
+    from palpate_maps.presses import merge_presses
 
     for path in [places.table] if places.table is not None else gather_logs(logs):
         state = path.stat()
@@ -242,7 +243,7 @@ def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Know
 
 
 def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses:
-    from palpate.maps.presses import read_logs, read_table
+    from palpate_maps.presses import read_logs, read_table
 
     if places.table is not None:
         if places.place is not None:
@@ -263,7 +264,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
 
 
 def _write(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
-    from palpate.report import map as page
+    from palpate_maps import report as page
 
     if output.figure is not None:
         from palpate.report.style import save
@@ -274,15 +275,13 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
     if output.ply is not None:
         result.write_ply(output.ply)
     if output.mcap is not None:
-        from palpate.maps.mcap import write_mcap
-
-        write_mcap(result, output.mcap)
+        result.write_mcap(output.mcap)
     if output.report is not None:
         write_text(output.report, page.page(result, f"Stiffness map of {name}", command(), live=live))
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
-    from palpate.report import map as page
+    from palpate_maps import report as page
 
     more = page.further(result)
     answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")
@@ -306,3 +305,50 @@ def _positive(option: str, text: str, kind: str) -> float:
     if value <= 0.0:
         raise InputError(f"{option} must be above 0, got {text!r}")
     return value
+
+
+def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
+    """Press a phantom at places that the map chooses, and write presses, map and page into the folder of results.
+
+    Returns:
+        0; 130 if it was interrupted: the map of the presses until then is written.
+
+    Raises:
+        InputError: the phantom, the arm or an option is wrong, or an interruption before a map could be drawn.
+    """
+    from palpate.environments.kelvin_voigt import KelvinVoigt
+    from palpate.report.numbers import plain
+    from palpate_maps import report as page
+    from palpate_maps.phantom import load_phantom, palpate_phantom
+
+    assert phantom.map is not None
+    if phantom.page is not None:
+        check_place(phantom.page, "--page", ending=".html")
+    surface = load_phantom(phantom.map)
+    title = f"Phantom {phantom.map.stem}, {' × '.join(plain(1e3 * side, 3) for side in surface.size)} mm"
+    request = MapOptions(stiffer_than=phantom.stiffer_than).request()
+    question = simulated.question(asked, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
+    folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"
+    with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
+        with bar(console(stderr=True)) as progress:
+            task = progress.add_task("pressing", total=phantom.presses)
+
+            def show(done: int, last: str) -> bool:
+                progress.update(task, completed=done, description=last)
+                return not interrupted()
+
+            def grow(result: MapResult) -> None:
+                if phantom.page is not None:
+                    write_text(phantom.page, page.page(result, title, command(), live=True))
+
+            result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
+        result.write_presses(fresh / "places.csv")
+        result.write_csv(fresh / "map.csv")
+        write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
+        for path in filter(None, (fresh / "report.html", phantom.page)):
+            write_text(path, page.page(result, title, command()))
+    if json:
+        print_answer(result.to_json())
+    else:
+        _show(result, OutputOptions(report=folder / "report.html"))
+    return interrupted.code if interrupted() else 0

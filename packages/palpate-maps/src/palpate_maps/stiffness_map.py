@@ -11,9 +11,9 @@ from scipy.stats import norm
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.maps.gaussian_process import Z95, GaussianProcess, fit
-from palpate.maps.next_press import Goal, NextPresses, choose, importance, travel
-from palpate.maps.surface import Grid, Surface
+from palpate_maps.gaussian_process import Z95, GaussianProcess, fit
+from palpate_maps.next_press import Goal, NextPresses, choose, importance, travel
+from palpate_maps.surface import Grid, Surface
 
 CANDIDATES = 600
 """Places among which the next press is chosen: in a plane 25 by 25, as fine as hundreds of presses are apart."""

@@ -96,8 +96,10 @@ def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] =
             x, y, z, stiffness or K, and half if none are given. A name such as x_mm carries its unit.
         further: columns of further quantities, each NAME or NAME:UNIT; a row may lack them.
 
+    A column `frame` or `frame_id` names the frame of each place.
+
     Raises:
-        InputError: a column is missing, or a number is none.
+        InputError: a column is missing, a number is none, or the places are in two frames.
     """
     sheet = open_table(path, kind_of(path))
     roles = _roles(sheet, columns)
@@ -122,7 +124,20 @@ def read_table(path: Path, columns: Sequence[str] = (), further: Sequence[str] =
         (numbers,) = sheet.numbers([column], ())
         fields[name], units[name] = numbers * unit(symbol or "1").factor, unit(symbol or "1").si
     line = sheet.numbers([sheet.resolve("line")], ())[0] if "line" in sheet.names else None
-    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units, line)
+    return Presses(where, values["stiffness"], values["half"], names, {}, fields, units, line, _frames(sheet))
+
+
+def _frames(sheet: Sheet) -> dict[str, str]:
+    """Frames that a column of the table names, each with its first row; two at most, which already are one too many."""
+    frames: dict[str, str] = {}
+    for name in {"frame", "frame_id"} & {*sheet.names}:
+        while len(frames) < 2:
+            (cells,), _ = sheet.read([sheet.resolve(name)], tuple(frames))
+            if cells.wrong is None:  # every word is one of these frames
+                break
+            row, frame = cells.wrong
+            frames[frame] = row
+    return frames
 
 
 def _roles(sheet: Sheet, columns: Sequence[str]) -> dict[str, str]:

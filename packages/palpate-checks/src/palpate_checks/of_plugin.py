@@ -8,12 +8,12 @@ from typing import Any
 
 from palpate.bench.tables import Experiment, load
 from palpate.bench.toml_parts import CONTROLLER, IDENTIFIER, SURFACE, Role, role_of, table_of
-from palpate.checks.check import Check
-from palpate.checks.controllers import TICK, WALL, controller_checks
-from palpate.checks.identifiers import identifier_checks
-from palpate.checks.surfaces import surface_checks
 from palpate.errors import InputError
 from palpate.plugins import is_plugin
+from palpate_checks.check import Check
+from palpate_checks.controllers import TICK, WALL, controller_checks
+from palpate_checks.identifiers import identifier_checks
+from palpate_checks.surfaces import surface_checks
 
 
 def checks_of(name: str) -> dict[str, list[Check]]:

@@ -11,8 +11,8 @@ import numpy as np
 from palpate._jit import kernel
 from palpate._jit import part as registered
 from palpate.arrays import Array
-from palpate.checks.check import Check, require
 from palpate.environments import SurfaceState, contact_force, impact, part_from, touch
+from palpate_checks.check import Check, require
 
 DT = 50e-6
 """A step of the physics [s]."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.maps import FieldMap, StiffnessMap
-from palpate.maps.lumps import lumps_of
-from palpate.maps.next_press import choose, importance, travel
+from palpate_maps import FieldMap, StiffnessMap
+from palpate_maps.next_press import choose, importance, travel
+from palpate_maps.result import lumps_of
 
 RNG = np.random.default_rng(8)
 GRID = np.stack(np.meshgrid(np.linspace(0.0, 0.1, 40), np.linspace(0.0, 0.1, 40)), axis=-1).reshape(-1, 2)

@@ -16,8 +16,11 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from force.gained import gains_of
-from palpate.checks import force_certificate as independent
-from palpate.checks.force_certificate import (
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import proved_claim
+from palpate.force.claims import adapting_claims, held_claim, one_sided_claim
+from palpate_certify import force_certificate as independent
+from palpate_certify.force_certificate import (
     ONE,
     Ball,
     ExactClaim,
@@ -25,11 +28,8 @@ from palpate.checks.force_certificate import (
     exponential,
     is_positive,
 )
-from palpate.force.certificate import FORM, Certificate
-from palpate.force.certifying import proved_claim
-from palpate.force.claims import adapting_claims, held_claim, one_sided_claim
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "force"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks" / "force"))
 
 from forgeries import certificate, forged, forgery, is_true, verdicts
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.checks.check import Check, require
+from palpate_checks.check import Check, require
 
 TRUTH = np.array([0.1, 200.0, 5200.0])
 """M [kg], B [N s/m], K [N/m] of the foam that is pressed."""
