@@ -1,9 +1,9 @@
-"""Explanation 8: schemes that learn an unknown surface implicitly (sec. 2.3), on the arm."""
+"""Explanation 10: schemes that learn an unknown surface implicitly (sec. 2.3), on the arm."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +12,17 @@ from palpate.bench import Experiment, build, changed, load
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import RUBBER_SURFACE, SHORT, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.panels import dots_panel, panels
-from palpate_thesis.force_control.tracking import describe, since_contact, slot, tracking
+from palpate_thesis.force_control.tracking import (
+    Tracking,
+    describe,
+    following,
+    since_contact,
+    slot,
+    tracking,
+)
 from palpate_thesis.implicit_schemes import (
     FuzzyCompensation,
     feedback_error_learning,
@@ -46,7 +53,7 @@ SCHEMES = {
     "feedback-error": Scheme(lambda seed: feedback_error_learning(seed=seed), 20.0),
     "impedance-search": Scheme(lambda seed: impedance_search(PARAMETERS.wall.x + BEYOND, seed), 400.0),
 }
-WORLDS = {
+WORLDS: Mapping[str, Mapping[str, Any]] = {
     "foam": {},
     "rubber": RUBBER_SURFACE,
     "tip that\nslides": {"wall.side_friction": 0.0},
@@ -59,19 +66,11 @@ _NAMED = ("foam", "rubber")
 class Learned:
     """End of a run, and its way there."""
 
-    rms: float  # of the force error outside the steps, in the last window [N]
-    off: float  # largest mean error at an interval's end there, as a share of the desired force
+    last: Tracking  # in the last window, whatever was lost before it
     y: float  # mean error of y there [mm]
     angle: float  # and of the angle [degrees]
     lost: int  # losses of contact, from the start on
     path: tuple[float, ...]  # rms of each window
-
-    settled = property(lambda self: self.rms)
-
-    @property
-    def follows(self) -> bool:
-        """Whether the force keeps to the desired one in the end."""
-        return self.rms <= LIMIT and self.off <= SHARE
 
 
 @dataclass(frozen=True)
@@ -110,9 +109,8 @@ def _learned(record: Record, seconds: float) -> Learned:
     windows = [tracking(at, at + WINDOW)(record) for at in np.arange(0.0, seconds, WINDOW)]
     late, last = since_contact(record) >= seconds - WINDOW, windows[-1]
     y, angle = 1e3 * record["y"][late].mean(), np.degrees(record["phi"][late].mean())
-    return Learned(
-        last.settled, last.off, float(y), float(angle), last.lost, tuple(w.settled for w in windows)
-    )
+    path = tuple(w.settled for w in windows)
+    return Learned(replace(last, lost=0), float(y), float(angle), last.lost, path)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -124,9 +122,10 @@ def _claim(name: str, found: dict[str, list[Learned]]) -> ThesisClaim:
     free = found["tip that\nslides"]
     return claim(
         f"implicit-schemes.{name}",
-        all(often(one.follows for one in found[world]) for world in _NAMED),
-        foam=describe(found["foam"]),
-        rubber=describe(found["rubber"]),
+        all(following([one.last for one in found[world]]) for world in _NAMED),
+        foam=describe([one.last for one in found["foam"]]),
+        rubber=describe([one.last for one in found["rubber"]]),
+        lost=sum(one.lost > 0 for world in _NAMED for one in found[world]),
         seconds=SCHEMES[name].seconds,
         window=WINDOW,
         rms=LIMIT,
@@ -136,7 +135,7 @@ def _claim(name: str, found: dict[str, list[Learned]]) -> ThesisClaim:
         free_y=[one.y for one in free],
         free_angle=[one.angle for one in free],
         first=[one.path[0] for one in found["foam"]],
-        where=stops_holding(found, lambda one: one.follows),
+        where=stops_holding(found, lambda one: one.last.follows),
     )
 
 
@@ -163,8 +162,8 @@ def plot(data: Data) -> Figure:
     dots_panel(
         dots,
         shown,
-        lambda one: one.rms,
-        lambda one: one.follows,
+        lambda one: one.last.settled,
+        lambda one: one.last.follows,
         limit=LIMIT,
         label="RMS error [N]",
         title="in the last seconds; a dot follows, a cross does not",

@@ -1,24 +1,21 @@
-"""Explanation 9: conditions that change: friction with the configuration, a surface with its temperature (sec. 4.5)."""
+"""Explanation 11: conditions that change: friction with the configuration, a surface with its temperature."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from palpate._jit import law, part
-from palpate._vector import Vec3, sqrt
 from palpate.arrays import Array
 from palpate.bench import Experiment, build, changed
-from palpate.friction import LuGre
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.uncertainty import student
 from palpate.report import style
-from palpate.robots.arm3 import Arm3, directions, onto_joints
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import by_condition, move_wall
+from palpate_thesis.configuration import FrictionByConfiguration, tilting
 from palpate_thesis.explanations.e6_friction_compensation import PARAMETERS as COMPENSATED
 from palpate_thesis.explanations.e6_friction_compensation import PLAIN, held_in
 from palpate_thesis.force_control.panels import panels
@@ -33,54 +30,10 @@ WALLS = (0.40, 0.43, 0.465, 0.49)
 """x of the surface [m]; friction is as chosen for the third."""
 MORE = 1.25
 """Least ratio of two errors that counts as a difference."""
-GRAVITY = 9.81
-"""[m/s^2]."""
 SOFTENING, MIDDLE = -0.005, 22.5
 """Chosen: change of the foam's stiffness [1/K] about a temperature [C]."""
 TEMPERATURES = np.linspace(10.0, 35.0, 10)
 """One for each press [C]."""
-
-
-@law
-def tilting(arm, q):
-    """Moment that tilts each joint's vertical axis: of the weight of all links beyond it [N m], shape (3,)."""
-    (c, s), m, a = directions(q), arm.mass, arm.length
-    first = m * (a + arm.com) + Vec3((m.y + m.z) * a.x, m.z * a.y, 0.0)
-    x, y = onto_joints(first * c), onto_joints(first * s)
-    return GRAVITY * sqrt(x * x + y * y)
-
-
-@part
-class ConfigurationState(NamedTuple):
-    bristles: Vec3  # [rad]
-    q: Vec3  # joint angles [rad]
-
-
-@part
-class FrictionByConfiguration(NamedTuple):
-    """Friction of bearings that carry the weight of the links beyond them: as strong as that weight tilts them.
-
-    Args:
-        friction: where the bearings carry `reference`.
-        arm: whose weight it is.
-        reference: tilting moments [N m], shape (3,).
-        q: joint angles at the start [rad], shape (3,).
-    """
-
-    friction: LuGre
-    arm: Arm3
-    reference: Vec3
-    q: Vec3
-
-    def start(self):
-        return ConfigurationState(self.friction.start(), self.q)
-
-    def step(self, state, v, dt):
-        """As that of `LuGre`; the plant's angles are the integral of its rates."""
-        q = state.q + dt * v
-        now = self.friction.scaled(tilting(self.arm, q) / self.reference)
-        torque, bristles = now.step(state.bristles, v, dt)
-        return torque, ConfigurationState(bristles, q)
 
 
 def errors(experiment: Experiment, seed: int) -> tuple[float, float]:
@@ -88,7 +41,7 @@ def errors(experiment: Experiment, seed: int) -> tuple[float, float]:
     bench = build(experiment)
     arm, plant = bench.loop.conditioning.arm, bench.loop.plant
     reference = tilting(arm, build(PARAMETERS).q)
-    friction = FrictionByConfiguration(plant.friction, arm, reference, bench.q)
+    friction: Any = FrictionByConfiguration(plant.friction, arm, reference, bench.q)
     other = replace(bench, loop=bench.loop._replace(plant=plant._replace(friction=friction)))
     constant, dependent = (
         held_in(one.run(experiment.run.duration, seed, press=experiment.run.press)).error
