@@ -60,7 +60,7 @@ COMPANIONS = {
     "map": "palpate-maps",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
-    "laboratory": "palpate-thesis",
+    "laboratory": "palpate-laboratory",
     "references": "palpate-references",
     "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",

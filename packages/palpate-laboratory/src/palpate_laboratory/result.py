@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 
 from palpate.arrays import Array
-from palpate_thesis.inference import judge
-from palpate_thesis.inference.contradictions import CHANCE, Alone, Bred, Together, VerdictTable
-from palpate_thesis.inference.judge import Judged, Predictive
-from palpate_thesis.inference.sampler import Sample
-from palpate_thesis.inference.sentences import Sentence, sentences
+from palpate_laboratory import judge
+from palpate_laboratory.contradictions import CHANCE, Alone, Bred, Together, VerdictTable
+from palpate_laboratory.judge import Judged, Predictive
+from palpate_laboratory.sampler import Sample
+from palpate_laboratory.sentences import Sentence, sentences
 from palpate_thesis.laboratory.laboratory import values
 from palpate_thesis.laboratory.unknowns import LAWS, LISTING, UNKNOWNS, Unknown
 
@@ -219,7 +219,7 @@ def samples(result: InferenceResult) -> dict[str, Sample]:
 @cache
 def reasons() -> dict[str, str]:
     """Why a sentence is never true, or several exclude each other: by its name, or all joined by " + "."""
-    text = resources.files("palpate_thesis.inference").joinpath("reasons.toml").read_text("utf-8")
+    text = resources.files("palpate_laboratory").joinpath("reasons.toml").read_text("utf-8")
     return msgspec.toml.decode(text, type=dict[str, str])
 
 

@@ -96,11 +96,11 @@ def thesis(
 def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[FigureModule]:
     """The figures to measure: all, or one; in another laboratory those that it was inferred from."""
     from palpate_thesis.figure import studies, study
-    from palpate_thesis.inference.sentences import sentences
+    from palpate_thesis.laboratory.laboratory import EXPERIMENTS
 
     if in_all:
         return studies() if figure is None else [study(figure)]
-    known = {sentence.figure for sentence in sentences()}
+    known = {s.NUMBER for s in studies() if s.NUMBER.startswith(EXPERIMENTS)}
     if figure is not None and study(figure).NUMBER not in known:
         raise InputError(
             f"figure {figure} tells nothing of the thesis' own laboratory; leave out --laboratory {laboratory}, or "

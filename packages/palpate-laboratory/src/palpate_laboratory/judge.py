@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate_laboratory.contradictions import VerdictTable
+from palpate_laboratory.sentences import Sentence, sentences, verdicts
+from palpate_laboratory.trial import Trial
 from palpate_studies.run_one import map_unordered
-from palpate_thesis.inference.contradictions import VerdictTable
-from palpate_thesis.inference.sentences import Sentence, sentences, verdicts
-from palpate_thesis.inference.trial import Trial
 from palpate_thesis.laboratory.laboratory import Laboratory
 
 

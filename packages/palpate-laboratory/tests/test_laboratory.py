@@ -16,16 +16,11 @@ from palpate.bench import Experiment, build, changed, load
 from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate_studies.cluster import Cluster
-from palpate_thesis.claims import ThesisClaim, count_in_words, count_verdicts, with_wholes
-from palpate_thesis.conditions import rougher
-from palpate_thesis.figure import studies, study
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
-from palpate_thesis.inference import archive, contradictions, findings, infer, judge, result, sampler, search
-from palpate_thesis.inference.archive import Tried
-from palpate_thesis.inference.contradictions import Bred, breed
-from palpate_thesis.inference.judge import drawn_shares, judged_shares
-from palpate_thesis.inference.result import (
+from palpate_laboratory import archive, contradictions, findings, infer, judge, result, sampler, search
+from palpate_laboratory.archive import Tried
+from palpate_laboratory.contradictions import Bred, breed
+from palpate_laboratory.judge import drawn_shares, judged_shares
+from palpate_laboratory.result import (
     EXCLUDED,
     IMPOSSIBLE,
     NOT_FOUND,
@@ -34,10 +29,15 @@ from palpate_thesis.inference.result import (
     reasons,
     worth,
 )
-from palpate_thesis.inference.sampler import Settings, sample
-from palpate_thesis.inference.search import MISS, Job, PosteriorSearch, Threads, Workers
-from palpate_thesis.inference.sentences import HOLDS, TELLING_FIRST, sentences, sentences_of_search
-from palpate_thesis.inference.trial import Trial
+from palpate_laboratory.sampler import Settings, sample
+from palpate_laboratory.search import MISS, Job, PosteriorSearch, Threads, Workers
+from palpate_laboratory.sentences import HOLDS, TELLING_FIRST, sentences, sentences_of_search
+from palpate_laboratory.trial import Trial
+from palpate_studies.cluster import Cluster
+from palpate_thesis.claims import ThesisClaim, count_in_words, count_verdicts, with_wholes
+from palpate_thesis.conditions import rougher
+from palpate_thesis.figure import studies, study
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
 from palpate_thesis.laboratory import laboratory
 from palpate_thesis.laboratory.laboratory import (
     CHOSEN,

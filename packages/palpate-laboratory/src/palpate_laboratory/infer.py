@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from palpate.files import MADE, kept_folder, with_author, write_json, write_text
-from palpate_thesis.inference import archive, contradictions, judge, search
-from palpate_thesis.inference.contradictions import VerdictTable
-from palpate_thesis.inference.findings import present
-from palpate_thesis.inference.judge import Judged, drawn_shares, judged_shares
-from palpate_thesis.inference.result import Contradiction, InferenceResult
-from palpate_thesis.inference.sampler import Sample, Settings
-from palpate_thesis.inference.search import PosteriorSearch, Runner
-from palpate_thesis.inference.sentences import sentences, sentences_of_search
+from palpate_laboratory import archive, contradictions, judge, search
+from palpate_laboratory.contradictions import VerdictTable
+from palpate_laboratory.findings import present
+from palpate_laboratory.judge import Judged, drawn_shares, judged_shares
+from palpate_laboratory.result import Contradiction, InferenceResult
+from palpate_laboratory.sampler import Sample, Settings
+from palpate_laboratory.search import PosteriorSearch, Runner
+from palpate_laboratory.sentences import sentences, sentences_of_search
 from palpate_thesis.laboratory.laboratory import CHOSEN, Laboratory, laboratory_at, text
 
 Progress = Callable[[str, int, int], None]

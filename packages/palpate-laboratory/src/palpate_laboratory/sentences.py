@@ -9,11 +9,11 @@ from importlib import resources
 
 import msgspec
 
+from palpate_laboratory.trial import LARGEST_RATE, Trial, WatchedPress
 from palpate_thesis.claims import ENOUGH
 from palpate_thesis.figures import fig_6_01_04 as first_seconds
 from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.figures import fig_6_03, fig_6_06, fig_6_10, fig_6_15
-from palpate_thesis.inference.trial import LARGEST_RATE, Trial, WatchedPress
 from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.neural_identifier import claims as network_claims
 from palpate_thesis.neural_identifier.network import NetworkAnswer
@@ -60,7 +60,7 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 @cache
 def sentences() -> tuple[Sentence, ...]:
     """All of them, in the order of the figures; which figure is in which half stands in `halves.toml`."""
-    text = resources.files("palpate_thesis.inference").joinpath("halves.toml").read_text("utf-8")
+    text = resources.files("palpate_laboratory").joinpath("halves.toml").read_text("utf-8")
     figures = msgspec.toml.decode(text, type=dict[str, Figure])
     return tuple(
         Sentence(

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import msgspec
 
+from palpate_laboratory.findings import DOCUMENT, FOUND
+from palpate_laboratory.sentences import sentences
 from palpate_thesis.claims import ThesisClaim, count_in_words
-from palpate_thesis.inference.findings import DOCUMENT, FOUND
-from palpate_thesis.inference.sentences import sentences
 
 MARKS = ("<!-- found: begin -->", "<!-- found: end -->")
 BENCH = "hand-chosen bench"

@@ -14,13 +14,20 @@ from palpate_thesis.figures import (
     fig_4_04,
     fig_6_06,
     fig_6_10,
-    fig_6_13,
     fig_6_14,
     fig_6_15,
-    fig_6_17,
 )
 from palpate_thesis.figures.fig_6_02_05 import by_ratios
-from palpate_thesis.figures.fig_6_11_12_16 import FOAM, JUDGED, RUBBER, SINE
+from palpate_thesis.figures.fig_6_11_17 import (
+    FOAM,
+    JUDGED,
+    RUBBER,
+    RUBBER_SINE,
+    SINE,
+    SLOW,
+    adapted_at,
+    away_from_settled,
+)
 from palpate_thesis.force_control.tracking import Tracking, since_contact, tracking
 from palpate_thesis.laboratory.laboratory import Laboratory
 from palpate_thesis.least_squares import press_runs
@@ -30,7 +37,7 @@ from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoic
 
 STEPS = 5
 """Of the physics in a tick while a laboratory is looked for: a quarter of the figures', at half the cost. As many
-verdicts turn as with another draw of the noise (`benchmarks/laboratory/steps.py`)."""
+verdicts turn as with another draw of the noise (`benchmarks/steps.py`)."""
 SWITCHED = 4.0
 """Seconds of contact that figure 4.2 looks at [s]."""
 LARGEST_RATE = fig_6_06.RATES[-1]
@@ -145,7 +152,7 @@ class Trial:
     @cached_property
     def slow_first(self) -> Tracking:
         """Force at a small learning rate, at first: figure 6.13."""
-        return tracking(*fig_6_13.WINDOW)(self.record(fig_6_13.PARAMETERS))
+        return tracking(*SLOW.judged)(self.record(SLOW.PARAMETERS))
 
     @cached_property
     def slow_later(self) -> Tracking:
@@ -160,9 +167,9 @@ class Trial:
     @cached_property
     def rubber_sine(self) -> tuple[Tracking, float]:
         """Figure 6.17: how it follows, and when it has adapted [s]; never where contact was lost."""
-        record = self.record(fig_6_17.PARAMETERS)
-        adapted = fig_6_17.adapted_at(fig_6_17.away_from_settled(record)) if _whole(record) else float("inf")
-        return tracking(*fig_6_17.JUDGED)(record), adapted
+        record = self.record(RUBBER_SINE.PARAMETERS)
+        adapted = adapted_at(away_from_settled(record)) if _whole(record) else float("inf")
+        return tracking(*RUBBER_SINE.judged)(record), adapted
 
 
 def _whole(record: Record) -> bool:

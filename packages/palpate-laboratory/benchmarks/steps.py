@@ -11,10 +11,10 @@ import warnings
 
 import numpy as np
 
-from palpate_thesis.inference.judge import FINE
-from palpate_thesis.inference.sampler import Settings, prior
-from palpate_thesis.inference.sentences import sentences_of_search, verdicts
-from palpate_thesis.inference.trial import STEPS, Trial
+from palpate_laboratory.judge import FINE
+from palpate_laboratory.sampler import Settings, prior
+from palpate_laboratory.sentences import sentences_of_search, verdicts
+from palpate_laboratory.trial import STEPS, Trial
 from palpate_thesis.laboratory.laboratory import laboratory_at
 from palpate_thesis.laboratory.unknowns import UNKNOWNS
 

@@ -15,8 +15,8 @@ from palpate.cli.options.values import FLAG
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
-    from palpate_thesis.inference.result import InferenceResult
-    from palpate_thesis.inference.search import Runner
+    from palpate_laboratory.result import InferenceResult
+    from palpate_laboratory.search import Runner
 
 
 def _within(least: int, most: int) -> Parameter:
@@ -81,9 +81,9 @@ def laboratory(
     palpate laboratory --particles 32 --half --out runs/laboratory
     """
     from palpate.bench.speed import cores as all_cores
-    from palpate_thesis.inference.infer import Inference
-    from palpate_thesis.inference.result import as_json as numbers
-    from palpate_thesis.inference.sampler import Settings
+    from palpate_laboratory.infer import Inference
+    from palpate_laboratory.result import as_json as numbers
+    from palpate_laboratory.sampler import Settings
 
     search, who, output = search or SearchOptions(), who or RunnerOptions(), output or InferredOptions()
     command, out, threads = search.command, output.out, who.cores or all_cores()
@@ -101,7 +101,7 @@ def laboratory(
 
 @contextmanager
 def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
-    from palpate_thesis.inference.search import Threads, Workers
+    from palpate_laboratory.search import Threads, Workers
 
     if scheduler is None:
         yield Threads(threads)
@@ -117,8 +117,8 @@ def _runner(scheduler: str | None, threads: int) -> Iterator[Runner]:
 
 def _show(result: InferenceResult, folder: Path, found: Mapping[str, Any] | None) -> None:
     from palpate.report.page import Table
-    from palpate_thesis.inference.findings import PAGE
-    from palpate_thesis.inference.result import halves, laboratories
+    from palpate_laboratory.findings import PAGE
+    from palpate_laboratory.result import halves, laboratories
 
     if found is not None:
         print_answer(found)

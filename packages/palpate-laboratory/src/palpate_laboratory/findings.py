@@ -10,8 +10,8 @@ import numpy as np
 from palpate.files import MADE, with_author, write_json, write_text
 from palpate.report import style
 from palpate.report.page import Table, page
-from palpate_thesis.inference.judge import Judged
-from palpate_thesis.inference.result import (
+from palpate_laboratory.judge import Judged
+from palpate_laboratory.result import (
     Contradiction,
     InferenceResult,
     as_json,
@@ -23,9 +23,9 @@ from palpate_thesis.inference.result import (
     value_in_words,
     worth,
 )
-from palpate_thesis.inference.sampler import Sample
-from palpate_thesis.inference.search import MISS, WRONG
-from palpate_thesis.inference.sentences import Sentence, sentences
+from palpate_laboratory.sampler import Sample
+from palpate_laboratory.search import MISS, WRONG
+from palpate_laboratory.sentences import Sentence, sentences
 from palpate_thesis.laboratory.unknowns import UNKNOWNS, Unknown
 from palpate_thesis.look import Figure
 

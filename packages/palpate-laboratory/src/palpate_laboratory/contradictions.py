@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
-from palpate_thesis.inference.archive import Tried
-from palpate_thesis.inference.sampler import JITTER
-from palpate_thesis.inference.search import Job, Runner
+from palpate_laboratory.archive import Tried
+from palpate_laboratory.sampler import JITTER
+from palpate_laboratory.search import Job, Runner
 
 POOL = 16
 """Laboratories kept for each sentence: those that make it true, and most of the others with it."""

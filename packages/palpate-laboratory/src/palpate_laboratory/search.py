@@ -15,12 +15,12 @@ import numpy as np
 
 from palpate._jit import sources_stamp
 from palpate.arrays import Array
+from palpate_laboratory import archive, sampler
+from palpate_laboratory.archive import Archive, SearchIdentity, Tried
+from palpate_laboratory.sampler import Sample, Settings
+from palpate_laboratory.sentences import HOLDS, Sentence
+from palpate_laboratory.trial import STEPS, Trial
 from palpate_studies.run_one import map_unordered
-from palpate_thesis.inference import archive, sampler
-from palpate_thesis.inference.archive import Archive, SearchIdentity, Tried
-from palpate_thesis.inference.sampler import Sample, Settings
-from palpate_thesis.inference.sentences import HOLDS, Sentence
-from palpate_thesis.inference.trial import STEPS, Trial
 from palpate_thesis.laboratory.laboratory import laboratory_at
 from palpate_thesis.laboratory.unknowns import UNKNOWNS
 
