@@ -78,7 +78,7 @@ class FuzzyCompensation(NamedTuple):
         return torque, FuzzyState(compensation, rate, f)
 
     def rest(self, state, sense):
-        """Keeps the compensation."""
+        """Keeps the compensation between contacts."""
         return FuzzyState(state.compensation, 0.0, sense.f.x)
 
     def report(self, state):
@@ -93,7 +93,7 @@ class FeedbackErrorState(NamedTuple):
 
 
 @controller
-class FeedbackErrorLearning(NamedTuple):
+class FeedbackErrorNetwork(NamedTuple):
     """A network beside the feedback learns each joint's torque; its error is the feedback's own torque (Gomi, Kawato).
 
     It becomes the inverse model of arm and surface as far as the feedback needs one. It sees the desired force and the
@@ -241,7 +241,7 @@ class ImpedanceSearch(NamedTuple):
         return ZERO3, Vec3(state.stiffness.x, state.stiffness.y, state.expected.x)
 
 
-def feedback_error_learning(rate: float = 2e-3, hidden: int = 6, seed: int = 0) -> FeedbackErrorLearning:
+def feedback_error_learning(rate: float = 2e-3, hidden: int = 6, seed: int = 0) -> FeedbackErrorNetwork:
     """Feedback-error learning from small random weights.
 
     Args:
@@ -250,7 +250,7 @@ def feedback_error_learning(rate: float = 2e-3, hidden: int = 6, seed: int = 0) 
         seed: of the weights.
     """
     net = network(random_layers((4, hidden, 3), seed, 0.1), 6.0, rate)
-    return FeedbackErrorLearning(alike(400.0), alike(80.0), alike(0.25), 20.0, net)
+    return FeedbackErrorNetwork(alike(400.0), alike(80.0), alike(0.25), 20.0, net)
 
 
 def impedance_search(target: float, seed: int = 0) -> ImpedanceSearch:

@@ -87,7 +87,7 @@ def run(runs: Runs) -> Data:
         name: by_condition(
             runs,
             {world: (scheme, changed(PARAMETERS, change)) for world, change in WORLDS.items()},
-            lambda case, seed: _learned(press(*case, seed), case[0].seconds),
+            lambda case, seed: _learning_of(press(*case, seed), case[0].seconds),
             _NAMED,
         )
         for name, scheme in SCHEMES.items()
@@ -105,7 +105,7 @@ def press(scheme: Scheme, experiment: Experiment, seed: int) -> Record:
     return bench.run(experiment.run.duration, seed, press=scheme.seconds)
 
 
-def _learned(record: Record, seconds: float) -> Learned:
+def _learning_of(record: Record, seconds: float) -> Learned:
     windows = [tracking(at, at + WINDOW)(record) for at in np.arange(0.0, seconds, WINDOW)]
     late, last = since_contact(record) >= seconds - WINDOW, windows[-1]
     y, angle = 1e3 * record["y"][late].mean(), np.degrees(record["phi"][late].mean())

@@ -88,7 +88,7 @@ def stiffness_at(temperature: float) -> float:
     return IDENTIFIED.surface.stiffness * (1.0 + SOFTENING * (float(temperature) - MIDDLE))
 
 
-def pooled(data: Data, covariate: bool) -> Mean:
+def pool_presses(data: Data, covariate: bool) -> Mean:
     """Stiffness of all presses, with the temperature as a covariate or without."""
     return random_effects(data.stiffness, data.deviation**2, TEMPERATURES[:, None] if covariate else None)
 
@@ -99,7 +99,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     known = {name: np.array(found) for name, found in data.compensated.items()}
     last, start = f"{WALLS[-1]:g}", f"{WALLS[2]:g}"
     worse = {name: found[:, 1] / found[:, 0] for name, found in known.items()}
-    own, alone = pooled(data, True), pooled(data, False)
+    own, alone = pool_presses(data, True), pool_presses(data, False)
     slope, std = own.slopes[0]
     return [
         claim(
@@ -148,7 +148,7 @@ def plot(data: Data) -> Figure:
     force.set(xlabel="wall at [m]", ylabel="force error [N]", ylim=(0.0, None))
     force.set_title("friction by configuration; dashed: constant")
     force.legend()
-    own = pooled(data, True)
+    own = pool_presses(data, True)
     offsets = TEMPERATURES - TEMPERATURES.mean()
     stiffness.errorbar(
         TEMPERATURES, data.stiffness, 1.96 * data.deviation, fmt="o", color=style.K, markersize=4

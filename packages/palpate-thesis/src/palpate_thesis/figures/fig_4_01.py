@@ -109,24 +109,24 @@ def command(reading: Array, scheme: str) -> Array:
 
 
 @dataclass(frozen=True)
-class Press:
+class TiltedPress:
     """A press of the surface."""
 
     angle: Array  # between tool and normal, tick by tick [degrees]
     force: float  # error along the tool in the last second, absolute mean [N]
 
     @property
-    def left(self) -> float:
+    def rms_angle(self) -> float:
         """Angle in the last second, root mean square [degrees]."""
         return float(np.sqrt(np.mean(self.angle[-RATE:] ** 2)))
 
     @property
     def perpendicular(self) -> bool:
         """Whether that is small."""
-        return self.left <= WITHIN
+        return self.rms_angle <= WITHIN
 
 
-def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> Press:
+def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> TiltedPress:
     """A six-joint arm presses a surface that is off its tool's axis; the seed is of tilt, noise and crosstalk."""
     rng = np.random.default_rng(seed)
     arm = SerialArm.named("ur5e")
@@ -160,14 +160,14 @@ def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> Press:
         bit = FULL / 2 ** (BITS - 1)
         reading = bit * np.round(np.clip(noisy, -FULL, FULL) / bit)
         angles.append(np.degrees(np.arccos(min(1.0, float(axes[:, 2] @ normal)))))
-    return Press(np.array(angles), abs(float(np.mean(forces[-RATE:])) - FORCE))
+    return TiltedPress(np.array(angles), abs(float(np.mean(forces[-RATE:])) - FORCE))
 
 
 @dataclass(frozen=True)
 class Data:
     """Measured values for `check` and `plot`."""
 
-    found: dict[str, dict[str, list[Press]]]  # by surface and scheme
+    found: dict[str, dict[str, list[TiltedPress]]]  # by surface and scheme
 
 
 def run(runs: Runs) -> Data:
@@ -189,9 +189,9 @@ def _claim(data: Data, name: str, scheme: str) -> ThesisClaim:
     return claim(
         name,
         all(often(one.perpendicular for one in found[scheme]) for found in data.found.values()),
-        foam=[one.left for one in data.found["foam"][scheme]],
-        rubber=[one.left for one in data.found["rubber"][scheme]],
-        away=sum(one.left > GONE for one in data.found["foam"]["moments alone"]),
+        foam=[one.rms_angle for one in data.found["foam"][scheme]],
+        rubber=[one.rms_angle for one in data.found["rubber"][scheme]],
+        away=sum(one.rms_angle > GONE for one in data.found["foam"]["moments alone"]),
         force=[one.force for one in data.found["foam"][scheme]],
         within=WITHIN,
         tilt=np.degrees(TILT),
@@ -217,7 +217,7 @@ def plot(data: Data) -> Figure:
     dots_panel(
         dots,
         shown,
-        lambda one: min(one.left, GONE),
+        lambda one: min(one.rms_angle, GONE),
         lambda one: one.perpendicular,
         limit=WITHIN,
         label="angle [degrees]",
