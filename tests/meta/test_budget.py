@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=309, lines=55846, tokens=373864),
+    "src/palpate": Weight(files=292, lines=52652, tokens=354866),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=61, lines=10300, tokens=80800),
     "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=12, lines=2100, tokens=14081),
@@ -34,11 +34,12 @@ LARGEST = {
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2524, tokens=19257),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1315, tokens=9043),
     "packages/palpate-slide/src/palpate_slide": Weight(files=10, lines=1780, tokens=14694),
+    "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3210, tokens=18830),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6349, tokens=42605),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 85, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 81, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset(
     {

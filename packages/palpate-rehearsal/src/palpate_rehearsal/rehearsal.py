@@ -16,7 +16,7 @@ from palpate.force.arm import Arm, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
 from palpate.robots import SerialArm
-from palpate.wires.realtime import realtime_priority
+from palpate_wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""

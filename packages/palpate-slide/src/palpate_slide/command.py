@@ -15,7 +15,7 @@ from palpate.cli.options.force import SlideLimits
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
-from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.cli.toolkit import command, console, option_of, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
@@ -267,14 +267,14 @@ def _watch(asked: SlideOptions) -> int:
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
-    from palpate.cli._press_wire import press_over
-    from palpate.wires.order import Path as SlidePath
-
     other = next((name for name in options_given((asked,)) if name not in _OF_WIRE), None)
     if other is not None:
         raise InputError(
             f"--{other} is for a simulated slide, and --wire names a real arm; leave out --{other}"
         )
+    press_over = option_of("wire", "wires")
+    from palpate_wires.order import Path as SlidePath
+
     path = SlidePath(asked.path, asked.extent, asked.seconds)
     press = AskOptions(force=asked.force, gains=asked.gains, normal=asked.normal, seconds=asked.seconds)
     return press_over(press, wire, limits, json=json, path=path)
