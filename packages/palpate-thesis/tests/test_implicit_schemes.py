@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from palpate_checks.controllers import IN_PLAIN, a_moment, it_runs_in_the_loop
 
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers.hybrid import hybrid
 from palpate.controllers.resolved_acceleration import position_command
+from palpate_checks.controllers import IN_PLAIN, a_moment, it_runs_in_the_loop
 from palpate_thesis.implicit_schemes import (
     FuzzyCompensation,
     feedback_error_learning,
