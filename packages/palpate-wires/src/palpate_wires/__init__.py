@@ -3,7 +3,7 @@
 from palpate.wires import Command, LostError, Sense, Wire
 from palpate_wires.at_rest import AtRest, look
 from palpate_wires.opening import KINDS, open_wire
-from palpate_wires.order import Limits, Order, Task, checked
+from palpate_wires.order import Order, PressLimits, PressTask, checked
 from palpate_wires.outcome import Outcome, Rows, recover
 from palpate_wires.press import press
 
@@ -11,13 +11,13 @@ __all__ = [
     "KINDS",
     "AtRest",
     "Command",
-    "Limits",
     "LostError",
     "Order",
     "Outcome",
+    "PressLimits",
+    "PressTask",
     "Rows",
     "Sense",
-    "Task",
     "Wire",
     "checked",
     "look",

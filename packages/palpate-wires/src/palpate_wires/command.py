@@ -21,7 +21,7 @@ from palpate.press.engines import mass_note
 from palpate.wires import Wire
 from palpate_wires.at_rest import AtRest, look, notes_on, with_noise_of
 from palpate_wires.opening import name_of, open_wire
-from palpate_wires.order import Limits, Order, Task, checked, stiffest, travel_for
+from palpate_wires.order import Order, PressLimits, PressTask, checked, stiffest, travel_for
 from palpate_wires.order import Path as SlidePath
 from palpate_wires.outcome import Outcome, Rows, recover
 from palpate_wires.press import press
@@ -82,7 +82,7 @@ def press_over(
         arm.close()
 
 
-def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[Task, Limits]:
+def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[PressTask, PressLimits]:
     """The task of a real arm; the direction and every limit have to be given.
 
     Raises:
@@ -105,14 +105,14 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
         travel = travel_for(load_gains(Path(str(asked.gains))), force)
     else:
         travel = in_si("--travel-limit", limits.travel_limit, "length")
-    most = Limits(
+    most = PressLimits(
         force,
         in_si("--speed-limit", str(limits.speed_limit), "velocity"),
         travel,
         in_si("--time-limit", str(limits.time_limit), "time"),
     )
     retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
-    return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
+    return PressTask(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
 
 
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
@@ -201,7 +201,7 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     return [arms, does, stops, f"if this process dies: {arm.watchdog}", _lies(gains, limits), kept, *notes]
 
 
-def _lies(gains: Gains, limits: Limits) -> str:
+def _lies(gains: Gains, limits: PressLimits) -> str:
     """The force that a sensor that lies leads to."""
     cap, travel, short = stiffest(gains), limits.travel, travel_for(gains, limits.force)
     less = ""

@@ -16,7 +16,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.wires import Command, EndedError, LostError, Sense, SilentError, Wire, unreadable
 from palpate_wires.at_rest import AtRest
-from palpate_wires.order import Limits, Order
+from palpate_wires.order import Order, PressLimits
 from palpate_wires.realtime import CLOCKS
 
 _ROUNDING = 1e-9
@@ -43,7 +43,7 @@ class Guard:
     def __init__(
         self,
         wire: Wire,
-        limits: Limits,
+        limits: PressLimits,
         start: Array,
         tick: float,
         lag: float,
@@ -117,7 +117,7 @@ def end_if(reason: str | None) -> None:
         raise EndedError(reason)
 
 
-def unsafe(command: Command, limits: Limits, start: Array) -> str | None:
+def unsafe(command: Command, limits: PressLimits, start: Array) -> str | None:
     """Why a command must not go out, in words; None if it may.
 
     Args:

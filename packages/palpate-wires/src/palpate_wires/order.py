@@ -21,7 +21,7 @@ from palpate.wires import Triple, triple
 
 
 @dataclass(frozen=True)
-class Limits:
+class PressLimits:
     """Limits that end a press; the user gives all of them.
 
     Args:
@@ -77,7 +77,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Task:
+class PressTask:
     """The order.
 
     Args:
@@ -119,8 +119,8 @@ class Order:
     """
 
     loop: ForceLoop
-    task: Task
-    limits: Limits
+    task: PressTask
+    limits: PressLimits
 
     @property
     def most(self) -> int:
@@ -156,7 +156,7 @@ def travel_for(gains: Gains, force: float) -> float:
     return force / stiffest(gains)
 
 
-def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
+def checked(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
     """The request as an order, its direction of unit length; refused where it contradicts the gains.
 
     Raises:
@@ -193,7 +193,7 @@ def checked(loop: ForceLoop, task: Task, limits: Limits) -> Order:
     return Order(loop, task, limits)
 
 
-def _check_path(path: Path, gains: Gains, task: Task, limits: Limits) -> None:
+def _check_path(path: Path, gains: Gains, task: PressTask, limits: PressLimits) -> None:
     speed, into = numbers_of(gains).speed, np.array(task.direction)
     SlidingLoop(gains, into)  # compiled before the arm is read
     if speed > limits.speed:

@@ -162,6 +162,8 @@ class _Press:
         else:
             loop, ways = SlidingLoop(gains, self._direction), task.path.directions(gains, self._direction)
             loop.desired = task.force
+            if gains.arm.kind == "servo":
+                loop.limit_speed(order.limits.speed)
             rate, last = gains.arm.rate, len(ways) - 1
             self._driver = SlidingDriver(arm, loop, lambda since: ways[min(round(since * rate), last)], show)
         self._sequence = PressSequence(arm, self._driver, task.plan.desired, gains.arm.tick)

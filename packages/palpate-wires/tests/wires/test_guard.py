@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.wires import Command, EndedError, LostError, SilentError
-from palpate_wires import Limits
+from palpate_wires import PressLimits
 from palpate_wires.guard import Guard, unsafe
 
-LIMITS = Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0)
+LIMITS = PressLimits(force=40.0, speed=0.05, travel=0.01, seconds=20.0)
 START = np.array([0.4, 0.0, 0.3])
 TICK, LAG = 0.01, 0.1
 

@@ -12,7 +12,7 @@ from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import LostError, Sense
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm
-from palpate_wires import Limits, Rows, Task, checked, press
+from palpate_wires import PressLimits, PressTask, Rows, checked, press
 from palpate_wires.order import travel_for
 from wires.slow_cell import cell, servo_cell
 
@@ -75,8 +75,8 @@ def lying(
         arm.world = arm.world._replace(noise=noise)
     wire = FakeWire(arm, lie, since)
     order = checked(
-        ForceLoop.load(folder / "gains.toml"), Task(10.0, (0.0, 0.0, -1.0), hold, 0.001),
-        Limits(force=25.0, speed=speed, travel=travel, seconds=20.0),
+        ForceLoop.load(folder / "gains.toml"), PressTask(10.0, (0.0, 0.0, -1.0), hold, 0.001),
+        PressLimits(force=25.0, speed=speed, travel=travel, seconds=20.0),
     )  # fmt: skip
     rows = Rows(None, order.most, {})
     outcome = press(wire, order, rows, lambda: None, (shown if shown is not None else []).append)

@@ -21,9 +21,9 @@ from palpate.force.simulated_press import surface
 from palpate.force.slide_table import Slide
 from palpate.logs import read_record
 from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
-from palpate_wires import Limits, Rows, Task, checked, press
+from palpate_wires import PressLimits, PressTask, Rows, checked, press
 from palpate_wires.order import Path as SlidePath
-from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, wait_for_rows
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, servo_cell, wait_for_rows
 from wires.test_press import FakeWire
 
 PATH = SlidePath("back", 0.01, 6.0)
@@ -40,10 +40,19 @@ def folder(tmp_path_factory):
     return made
 
 
+@pytest.fixture(scope="module")
+def servo(tmp_path_factory):
+    made = tmp_path_factory.mktemp("servo-slide")
+    slide = Slide(speed=0.004, mu_max=0.9, slope=0.05)
+    gains = msgspec.structs.replace(load_gains(servo_cell(made)), slide=slide)
+    (made / "gains.toml").write_text(gains.to_toml())
+    return made
+
+
 def order_of(folder, path=PATH, **limits):
     numbers = {"force": 25.0, "speed": 0.05, "travel": 0.03, "seconds": 30.0, **limits}
-    task = Task(10.0, (0.0, 0.0, -1.0), 6.0, 0.001, path=path)
-    return checked(ForceLoop.load(folder / "gains.toml"), task, Limits(**numbers))
+    task = PressTask(10.0, (0.0, 0.0, -1.0), 6.0, 0.001, path=path)
+    return checked(ForceLoop.load(folder / "gains.toml"), task, PressLimits(**numbers))
 
 
 def sliding(folder, lie=lambda sense, first: sense, since=4.0):
@@ -53,6 +62,18 @@ def sliding(folder, lie=lambda sense, first: sense, since=4.0):
     outcome = press(wire, order, rows, lambda: None)
     assert wire.did[-1] == "stop"
     return outcome, wire, rows.record()
+
+
+def test_a_servo_that_yields_slides_within_the_same_limits(servo):
+    outcome, wire, record = sliding(servo, since=math.inf)
+    assert outcome.ok, outcome.ended
+    assert outcome.force == pytest.approx(10.0, rel=0.05)
+    low, high = outcome.surface["friction"]["ci95"]
+    assert low < FRICTION < high
+    assert max(np.linalg.norm(c.velocity) for c in wire.sent) <= 0.05 * (1.0 + 1e-9)
+    slid = record["phase"] == 3.0
+    assert np.ptp(record["position_x"][slid]) + np.ptp(record["position_y"][slid]) > 0.009
+    assert np.abs(record["force_sampled"][slid] / 10.0 - 1.0).max() < 0.1
 
 
 def test_a_slide_holds_the_force_and_finds_normal_and_friction(folder):

@@ -10,7 +10,7 @@ import pytest
 from palpate.force import ForceLoop, load_arm
 from palpate.press.engines import gains_for
 from palpate.wires import Sense
-from palpate_wires import AtRest, Limits, Task, checked
+from palpate_wires import AtRest, PressLimits, PressTask, checked
 from palpate_wires.guard import Moment, reason_to_stop, spoiled
 
 GAINS = gains_for(load_arm("ur5e"), 10.0)
@@ -23,8 +23,8 @@ MOMENT = Moment(SENSE, 10.0, 0.001, 0.0, 0, 0.0, 1.0, None)
 @pytest.fixture(scope="module")
 def order():
     """Made by the first test: a loop is compiled where there is none yet."""
-    task = Task(10.0, (0.0, 0.0, -1.0), 3.0, 0.001)
-    return checked(ForceLoop(GAINS), task, Limits(force=40.0, speed=0.02, travel=0.01, seconds=20.0))
+    task = PressTask(10.0, (0.0, 0.0, -1.0), 3.0, 0.001)
+    return checked(ForceLoop(GAINS), task, PressLimits(force=40.0, speed=0.02, travel=0.01, seconds=20.0))
 
 
 def test_a_press_within_its_limits_goes_on(order):
