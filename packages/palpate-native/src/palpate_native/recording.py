@@ -121,7 +121,7 @@ def _reading(gains: Gains, fault: int, left: int, reading: float) -> float:
 
 
 def of_sliding_loop(loop: SlidingLoop) -> Recording:
-    """Slides over spheres, bowls and planes, with friction from none to beyond mu_max, steps and lost contacts."""
+    """Slides over spheres, bowls and planes, with friction from none to beyond mu_max, and every fault of a press."""
     return Recording(11, 100, lambda _, ticks, rng: _slide(loop, ticks, rng))
 
 
@@ -133,6 +133,7 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
     kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < 2.0 * RARE
     x, v, fault, force, out = np.zeros(3), np.zeros(3), 0, np.zeros(3), np.zeros((ticks, 14))
     changes, desired = rng.integers(0, 2), loop.desired
+    noise += rng.normal(0.0, 0.3 * gains.force, 3) * (rng.random() < _UNTARED)
     loop.reset()
     for k in range(ticks):
         fault = kinds[k] if begins[k] else fault * (k % 100 > 0)
