@@ -132,12 +132,11 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
     n, noise = loop.normal + rng.normal(0.0, 0.1, 3), gains.arm.sensor.noise * rng.standard_normal((ticks, 3))
     kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < 2.0 * RARE
     x, v, fault, force, out = np.zeros(3), np.zeros(3), 0, np.zeros(3), np.zeros((ticks, 14))
-    changes, desired, span = rng.integers(0, 2), loop.desired, rng.choice([15, 100])
-    drift = rng.normal(0.0, 0.5 * gains.force, 3) * (rng.random() < _BLOCKED)
-    noise += np.outer(np.linspace(0.0, 1.0, ticks), drift)
+    changes, desired = rng.integers(0, 2), loop.desired
+    noise += rng.normal(0.0, 0.3 * gains.force, 3) * (rng.random() < _UNTARED)
     loop.reset()
     for k in range(ticks):
-        fault = kinds[k] if begins[k] else fault * (k % span > 0)
+        fault = kinds[k] if begins[k] else fault * (k % 100 > 0)
         loop._desired = desired * (1.0 + 0.5 * changes * (k // 500 % 2))
         across, along, axis = x - (x @ n) * n, v - (v @ n) * n, k % 3
         wall += {RECEDES: 2e-6, STEPPED: 1e-3 * (k % 100 == 50)}.get(fault, 0.0)
