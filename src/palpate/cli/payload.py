@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cyclopts import Parameter
 
@@ -14,7 +14,7 @@ from palpate.cli.options.arm import FrameOptions
 from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import SIGNED, vector
+from palpate.cli.options.values import Point, si
 from palpate.errors import InputError
 from palpate.files import write_text
 
@@ -36,13 +36,13 @@ class PayloadOutput(ReportOption, FileOptions):
     (Franka), .yaml (ROS 2)."""
     check: Path | None = None
     "A controller's load file, to be compared with the log. With --gravity-compensated the controller had it."
-    flange: Annotated[str | None, SIGNED] = None
+    flange: Point | None = None
     """The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z in
     m, or with :mm. In a .yaml the sensor."""
 
     def origin(self, torque_at: tuple[float, float, float]) -> tuple[float, float, float]:
         """The flange from the point that the torque is about, which is given from the pose's origin [m]."""
-        x, y, z = vector("flange", self.flange, "length") or (0.0, 0.0, 0.0)
+        x, y, z = si(self.flange) or (0.0, 0.0, 0.0)
         a, b, c = torque_at
         return x - a, y - b, z - c
 

@@ -10,7 +10,19 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
+from palpate.cli.options.values import (
+    FLAG,
+    SIGNED,
+    WHOLE,
+    Direction,
+    Force,
+    Length,
+    Point,
+    Stiffness,
+    Time,
+    Velocity,
+    si,
+)
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,14 +41,14 @@ RETREAT = 0.002
 class AskOptions:
     """The press, of any arm."""
 
-    force: Annotated[str | None, SIGNED] = None
+    force: Force | None = None
     "Desired force, N, or with a unit as 20:N."
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from the touch on."
     gains: Path | None = None
     """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
     left out."""
-    normal: Annotated[str | None, SIGNED] = None
+    normal: Direction | None = None
     """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
     arm presses where its tip points at home if left out."""
     probe: Annotated[float | None, SIGNED] = None
@@ -59,7 +71,7 @@ class AskOptions:
         """Desired force F_d [N]."""
         if self.force is None:
             raise InputError("the desired force is missing; add --force, as 20:N")
-        force = in_si("--force", self.force, "force")
+        force = self.force.si
         if not force > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")
         return force
@@ -82,7 +94,7 @@ class SimulatedOptions:
     "own or mujoco (extra: arms)."
     controller: Annotated[Controller, QUIET] = "cautious"
     "cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance."
-    at: Annotated[str | None, SIGNED] = None
+    at: Point | None = None
     "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
     seed: Annotated[int, WHOLE] = 0
     "Of the noise; the same seed gives the same numbers."
@@ -107,8 +119,8 @@ class SimulatedOptions:
         touched = surface if surface is not None else surface_of(str(self.surface))
         return Question(
             arm=self.arm, force=asked.desired, surface=touched, site=self.site, mode=self.mode,
-            physics=self.physics, controller=self.controller, gains=asked.gains, at=vector("at", self.at, "length"),
-            normal=vector("normal", asked.normal, "number"), seconds=asked.seconds,
+            physics=self.physics, controller=self.controller, gains=asked.gains, at=si(self.at),
+            normal=si(asked.normal), seconds=asked.seconds,
             probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,
         )  # fmt: skip
 
@@ -132,7 +144,7 @@ class PhantomOptions:
     m, N/m and N s/m."""
     presses: Annotated[int, WHOLE] = 40
     "How many presses: sixteen on a grid, then where the map is worst known."
-    stiffer_than: str | None = None
+    stiffer_than: Stiffness | None = None
     "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
     page: Path | None = None
     "Where to write the page after each map; it loads itself again until the last."
@@ -155,7 +167,7 @@ class WireOptions:
     "Folder for all readings and commands; palpate identify reads its record.parquet."
     certificate: Path | None = None
     "File of palpate certify; without it the lateness is measured, and nothing is proved."
-    retreat: Annotated[str | None, SIGNED] = None
+    retreat: Length | None = None
     "Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter."
     ordinary_priority: Annotated[bool, FLAG] = False
     "Do not request real-time priority from the system."
@@ -168,14 +180,14 @@ class WireOptions:
 class LimitOptions:
     """Limits that end a press over a wire."""
 
-    force_limit: Annotated[str | None, SIGNED] = None
+    force_limit: Force | None = None
     "Force of any axis, as 40:N."
-    speed_limit: Annotated[str | None, SIGNED] = None
+    speed_limit: Velocity | None = None
     "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
-    travel_limit: Annotated[str | None, SIGNED] = None
+    travel_limit: Length | None = None
     """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
     stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
-    time_limit: Annotated[str | None, SIGNED] = None
+    time_limit: Time | None = None
     "Total duration, as 20:s."
 
 
@@ -206,20 +218,14 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
         "--time-limit": limits.time_limit,
     }  # fmt: skip
     lacking = [name for name, value in needed.items() if value is None]
-    if lacking:
+    normal = asked.normal
+    if not (normal and limits.force_limit and limits.speed_limit and limits.time_limit and not lacking):
         raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
-    normal = vector("normal", asked.normal, "number")
-    assert normal is not None
-    force = in_si("--force-limit", str(limits.force_limit), "force")
+    force = limits.force_limit.si
     if limits.travel_limit is None:
         travel = travel_for(load_gains(Path(str(asked.gains))), force)
     else:
-        travel = in_si("--travel-limit", limits.travel_limit, "length")
-    most = Limits(
-        force,
-        in_si("--speed-limit", str(limits.speed_limit), "velocity"),
-        travel,
-        in_si("--time-limit", str(limits.time_limit), "time"),
-    )
-    retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
-    return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
+        travel = limits.travel_limit.si
+    retreat = min(RETREAT, travel) if wire.retreat is None else wire.retreat.si
+    ends = Limits(force, limits.speed_limit.si, travel, limits.time_limit.si)
+    return Task(asked.desired, normal.si, asked.seconds, retreat, asked.probe or 0.0), ends

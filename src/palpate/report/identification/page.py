@@ -9,13 +9,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from palpate.identification.result import Identification, Parameter, Traces, Verdict
-from palpate.report.identification import evidence_panels as evidence
-from palpate.report.identification import evidence_panels as fit
-from palpate.report.identification import evidence_panels as trust
-from palpate.report.identification.evidence_panels import shown_by
-from palpate.report.identification.figure import Panel, both_parts, one
+from palpate.report.identification import figure
+from palpate.report.identification.details import BUDGET_HEAD, BUDGET_WORDS, METHOD, budgets, correlation
+from palpate.report.identification.figure import Panel, both_parts, one, shown_by
 from palpate.report.identification.spectra import over_noise, whiteness_of
-from palpate.report.identification.uncertainty import HEAD, METHOD, WORDS, correlation, tables
 from palpate.report.identification.words import (
     CALLED,
     NO_NUMBER,
@@ -173,9 +170,9 @@ def page(found: Identification, source: Source) -> str:
             {"code": w.code.word, "text": printable(w.text), "advice": advice(w.code)} for w in found.warnings
         ],
         figures=_figures(found),
-        budgets=list(tables(found)),
-        budget_head=HEAD,
-        budget_words=WORDS,
+        budgets=list(budgets(found)),
+        budget_head=BUDGET_HEAD,
+        budget_words=BUDGET_WORDS,
         budget_notes=[note for note in (correlation(found), METHOD) if note],
         models=_models(found),
         octaves=_octaves(found),
@@ -305,7 +302,7 @@ def _evidence(found: Identification) -> list[dict[str, str]]:
         return []
     return [
         _figure(found, "Dynamic stiffness", both_parts, spectrum, (_HALF, 430)),
-        _figure(found, "Press", partial(one, evidence.press), press, (_HALF, 430)),
+        _figure(found, "Press", partial(one, figure.press), press, (_HALF, 430)),
     ]
 
 
@@ -315,11 +312,11 @@ def _figures(found: Identification) -> list[dict[str, str]]:
     if traces is None:
         return []
     if not len(traces.fitted_time):
-        return [_panel(found, "Force over time", fit.force, untouched, (_WIDE, 260))]
+        return [_panel(found, "Force over time", figure.force, untouched, (_WIDE, 260))]
     return [
-        _panel(found, "Force over time", fit.force, force, (_WIDE, 260)),
-        _panel(found, "Misfit over time", fit.residual, residual, (_HALF, 260)),
-        _panel(found, "Is the misfit noise?", trust.residual_spectrum, noise, (_HALF, 260)),
+        _panel(found, "Force over time", figure.force, force, (_WIDE, 260)),
+        _panel(found, "Misfit over time", figure.residual, residual, (_HALF, 260)),
+        _panel(found, "Is the misfit noise?", figure.residual_spectrum, noise, (_HALF, 260)),
     ]
 
 
