@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._program import command, print_answer
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import bar, console, show_answer
-from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
 from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
+from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
 from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
 from palpate.units import split_spec
@@ -183,10 +181,7 @@ def map(  # noqa: A001 - the command's name
 
 def _answer(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
     _write(result, output, name, live)
-    if output.json:
-        print_answer(result.to_json())
-    else:
-        _show(result, output)
+    _show(result, output)
 
 
 Known = dict[Path, tuple[tuple[int, int], "Presses | str", bool]]
@@ -282,22 +277,17 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
-    from palpate_maps import report as page
+    from palpate_maps.report import answer_of
 
-    more = page.further(result)
-    answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")
-    screen = show_answer(
-        f"{len(result.map)} presses", f": {answer}", page.tables(result), page.warnings(result)
+    written = (
+        ("report:", output.report),
+        ("figure:", output.figure),
+        ("table:", output.csv),
+        ("points:", output.ply),
+        ("film:", output.mcap),
     )
-    for kind, path in (
-        ("report", output.report),
-        ("figure", output.figure),
-        ("table", output.csv),
-        ("points", output.ply),
-        ("film", output.mcap),
-    ):
-        if path is not None:
-            show_place(screen, f"{kind}:", path)
+    files = [(kind, path) for kind, path in written if path is not None]
+    print_result(answer_of(result), json=output.json, files=files)
 
 
 def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
@@ -340,8 +330,5 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
         write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
         for path in filter(None, (fresh / "report.html", phantom.page)):
             write_text(path, page.page(result, title, command()))
-    if json:
-        print_answer(result.to_json())
-    else:
-        _show(result, OutputOptions(report=folder / "report.html"))
+    _show(result, OutputOptions(report=folder / "report.html", json=json))
     return interrupted.code if interrupted() else 0

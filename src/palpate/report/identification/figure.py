@@ -304,12 +304,13 @@ def residual_spectrum(axes: Axes, found: Identification, traces: Traces) -> None
 
 Panel = Callable[["Axes", "Identification", "Traces"], None]
 
-_WIDE, _HIGH, _HEAD = 13.0, 11.8, 1.75
+WIDE, _HIGH, _HEAD = 13.0, 11.8, 1.75
+"""Width and height of the whole figure, and height of its head [in]."""
 _LINE = 160
 """Letters in a line of the head."""
 _PIXEL = 1 / 72
 """Of a page, in inches: what is drawn so wide keeps its letters at their size."""
-_LETTERS = 12
+LETTERS = 12
 """Size of letters on a page [px]."""
 
 
@@ -333,7 +334,7 @@ def draw(found: Identification, title: str) -> Figure:
         raise ValueError("an identification without traces has no figure")
     with style.ink():
         fitted = len(traces.fitted_time) > 0
-        figure = _figure(_WIDE, _HIGH if fitted else _HIGH / 2)
+        figure = _figure(WIDE, _HIGH if fitted else _HIGH / 2)
         parts: Any = figure.subfigures(2, 1, height_ratios=(_HEAD, figure.get_figheight() - _HEAD))
         head, body = parts
         _head(head, found, title)
@@ -379,7 +380,7 @@ def dynamic(figure: Any, found: Identification, traces: Traces, title: str = "")
 
 def one(panel: Panel, found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """A figure of one panel, so many pixels wide and high on a page."""
-    with style.ink(_LETTERS):
+    with style.ink(LETTERS):
         figure = _figure(width * _PIXEL, height * _PIXEL)
         panel(figure.subplots(), found, traces)
     return figure
@@ -387,7 +388,7 @@ def one(panel: Panel, found: Identification, traces: Traces, width: int, height:
 
 def both_parts(found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """Storage above loss, likewise."""
-    with style.ink(_LETTERS):
+    with style.ink(LETTERS):
         figure = _figure(width * _PIXEL, height * _PIXEL)
         dynamic(figure, found, traces)
     return figure

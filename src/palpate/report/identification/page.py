@@ -141,7 +141,7 @@ Drawn = Callable[[Identification, Traces, int, int], "Figure"]
 
 TONES = {Verdict.IDENTIFIED: "ok", Verdict.NOT_IDENTIFIABLE: "warn", Verdict.REJECTED: "fail"}
 _COLOURED = ("K", "B", "M")
-_WIDE, _HALF, _NARROW = 1150, 560, 360
+_WIDE, HALF, NARROW = 1150, 560, 360
 """Pixels of a panel: of a page's width, of half of it, of a telephone's."""
 _SHARE = 0.25
 """Of the value: the ends of the bar that shows how narrow an interval is, the same on all cards."""
@@ -301,8 +301,8 @@ def _evidence(found: Identification) -> list[dict[str, str]]:
     if found.traces is None or not found.contacts:
         return []
     return [
-        _figure(found, "Dynamic stiffness", both_parts, spectrum, (_HALF, 430)),
-        _figure(found, "Press", partial(one, figure.press), press, (_HALF, 430)),
+        _figure(found, "Dynamic stiffness", both_parts, spectrum, (HALF, 430)),
+        _figure(found, "Press", partial(one, figure.press), press, (HALF, 430)),
     ]
 
 
@@ -315,8 +315,8 @@ def _figures(found: Identification) -> list[dict[str, str]]:
         return [_panel(found, "Force over time", figure.force, untouched, (_WIDE, 260))]
     return [
         _panel(found, "Force over time", figure.force, force, (_WIDE, 260)),
-        _panel(found, "Misfit over time", figure.residual, residual, (_HALF, 260)),
-        _panel(found, "Is the misfit noise?", figure.residual_spectrum, noise, (_HALF, 260)),
+        _panel(found, "Misfit over time", figure.residual, residual, (HALF, 260)),
+        _panel(found, "Is the misfit noise?", figure.residual_spectrum, noise, (HALF, 260)),
     ]
 
 
@@ -340,9 +340,9 @@ def _figure(
     """A picture at the two widths at which it is looked at, so that its letters keep their size."""
     traces = found.traces
     assert traces is not None
-    narrow = (_NARROW, min(size[1], 330))
+    narrow = (NARROW, min(size[1], 330))
     drawn_at = [drawn(found, traces, *own) for own in (size, narrow)]
-    return picture(title, caption(found, traces), drawn_at, full=size[0] > _HALF)
+    return picture(title, caption(found, traces), drawn_at, full=size[0] > HALF)
 
 
 def picture(title: str, caption: str, drawn: Sequence[Figure], *, full: bool = False) -> dict[str, str]:
