@@ -63,7 +63,7 @@ COMPANIONS = {
     "map": "palpate-maps",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
-    "laboratory": "palpate-thesis",
+    "laboratory": "palpate-laboratory",
     "references": "palpate-references",
     "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",
@@ -96,6 +96,23 @@ def added_commands() -> dict[str, str]:
     from importlib.metadata import entry_points
 
     return {e.name: e.value for e in sorted(entry_points(group=ENTRY_POINTS)) if e.name not in COMMANDS}
+
+
+def option_of(name: str, extra: str) -> Any:
+    """The function of another distribution that does what an option of palpate's own commands asks for.
+
+    Args:
+        name: of the option, as `wire`.
+        extra: of palpate, by which that distribution is installed.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    from importlib.metadata import entry_points
+
+    for entry in entry_points(group="palpate.options", name=name):
+        return entry.load()
+    raise InputError(f"--{name} is of palpate-{extra}, which is not installed: pip install palpate[{extra}]")
 
 
 def _file_of(module: str) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _terminal
-from palpate.cli._program import command, print_result
+from palpate.cli._program import command, option_of, print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
 from palpate.cli.options.kept import CellOptions
@@ -19,7 +19,6 @@ from palpate.cli.options.press import (
     only,
 )
 from palpate.cli.options.values import FLAG
-from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
@@ -73,26 +72,15 @@ def press(
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
         if phantom is not None and phantom.map is not None:
-            code = _map_of(asked, simulated, phantom, json)
+            code = option_of("map", "maps")(asked, simulated, phantom, json=json)
         else:
             only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
             code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
-        from palpate.cli._press_wire import press_over
-
-        code = press_over(asked, wire, limits, json=json)
+        code = option_of("wire", "wires")(asked, wire, limits, json=json)
     cell.save((asked, simulated, wire, limits), "press")
     return code
-
-
-def _map_of(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, json: bool) -> int:
-    """The map of a phantom, by the distribution that makes maps."""
-    from importlib.metadata import entry_points
-
-    for entry in entry_points(group="palpate.maps", name="phantom"):
-        return int(entry.load()(asked, simulated, phantom, json=json))
-    raise InputError("--map is of palpate-maps, which is not installed: pip install palpate[maps]")
 
 
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:

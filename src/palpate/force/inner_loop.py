@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.lag import worst_stiffness, yielding_lag
 from palpate.force.sampled_loop import held
+from palpate.signals.types import NORMAL
 
 BLOCKS = 8
 """Parts of a log whose scores tell how far each number may be off, whatever the noise's colour."""
@@ -51,7 +52,7 @@ class LoopParameter:
 
     def beside(self, std: float) -> LoopParameter:
         """The number with another error beside its own, of this standard deviation."""
-        wider = hypot(self.half, 1.96 * std) - self.half
+        wider = hypot(self.half, NORMAL * std) - self.half
         return LoopParameter(self.value, max(self.low - wider, 0.0), self.high + wider)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 import numpy as np
@@ -20,7 +20,7 @@ from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, com
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
-from palpate.signals.types import Sense
+from palpate.signals.types import Sense, triple
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9
@@ -133,14 +133,10 @@ class ByMuJoCo:
         body.room.h[:] = (data.qfrc_bias - data.qfrc_passive)[dofs]
         body.room.J[:] = J[:, dofs]
         bias, velocity = Jdot @ data.qvel, J @ data.qvel
-        R = Mat3(*(_three(row) for row in axes))
+        R = Mat3(*map(triple, axes))
         return Tip(
-            _three(at), R, _three(velocity[:3]), _three(velocity[3:]), _three(bias[:3]), _three(bias[3:])
+            triple(at), R, triple(velocity[:3]), triple(velocity[3:]), triple(bias[:3]), triple(bias[3:])
         )
-
-
-def _three(values: Any) -> Vec3:
-    return Vec3(*map(float, values))
 
 
 MODES = ("torque", "position")

@@ -30,7 +30,7 @@ from palpate.press.sequence import Action, CautiousDriver, Plan, PressDriver, Pr
 from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.records import Record
-from palpate.signals.types import Task
+from palpate.signals.types import Task, alike, triple
 
 CAUTIOUS = "cautious"
 CONTROLLERS = (CAUTIOUS, "hybrid", "proportional-integral", "impedance")
@@ -59,7 +59,7 @@ class ByTorque:
     ):
         self._arm, self._normal, self._speed, self._switch = arm, place.normal, speed, switch
         at = place.axes @ place.pose[:3, 3]
-        self._at, self._gone, self._phase = Vec3(*map(float, at)), 0.0, APPROACH
+        self._at, self._gone, self._phase = triple(at), 0.0, APPROACH
         self._approach = ResolvedAcceleration(_six(_POSITION), _six(_RATE))
         self._controller = self._make(controller, place.place, force)
 
@@ -116,8 +116,7 @@ def driver_of(name: str, arm: SimulatedArm, gains: Gains, place: Place, force: f
 
 def _six(value: float) -> Any:
     """The same number in six directions; the types of tasks and controllers name those of three."""
-    one = Vec3(float(value), float(value), float(value))
-    return Vec6(one, one)
+    return Vec6(alike(value), alike(value))
 
 
 Progress = Callable[[float, str], None]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate._jit import BoundKernel
-from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate._vector import ZERO3, Mat3, Vec6
 from palpate.arrays import Array
 from palpate.bench.given_motion import rest_for
 from palpate.environments.surface_state import UNTOUCHED
@@ -23,7 +23,7 @@ from palpate.press.tare import TARE
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
-from palpate.signals.types import Task
+from palpate.signals.types import Task, alike, triple
 
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
@@ -213,13 +213,12 @@ class _TipLoop:
         J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
         mobility = J @ np.linalg.solve(M, J.T)
         turning = float(1.0 / np.linalg.eigvalsh(mobility[3:, 3:])[-1]) / inner.mass
-        one = Vec3(1.0, 1.0, 1.0)
+        spring, damper = float(inner.stiffness), float(inner.damping)
         self.spring = Spring(
-            Vec6(float(inner.stiffness) * one, float(inner.stiffness * turning) * one),
-            Vec6(float(inner.damping) * one, float(inner.damping * turning) * one),
+            Vec6(alike(spring), alike(spring * turning)), Vec6(alike(damper), alike(damper * turning))
         )
         self._chain, self._axes = arm.chain, place.axes
-        self._rows, self._held = _matrix(place.axes), _matrix(place.pose[:3, :3])
+        self._rows, self._held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
         n = arm.joints
         self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
@@ -228,7 +227,7 @@ class _TipLoop:
 
     def towards(self, goal: Array) -> Task:
         """The task of standing at a pose; the tip keeps its turn."""
-        x: Any = Vec6(Vec3(*(float(v) for v in self._axes @ goal[:3, 3])), ZERO3)
+        x: Any = Vec6(triple(self._axes @ goal[:3, 3]), ZERO3)
         nothing = 0.0 * x
         return Task(x, nothing, nothing, nothing, nothing)
 
@@ -245,7 +244,3 @@ class _TipLoop:
             self._room, torque,
         )  # fmt: skip
         return torque
-
-
-def _matrix(rows: Array) -> Mat3:
-    return Mat3(*(Vec3(*(float(v) for v in row)) for row in rows))

@@ -17,7 +17,7 @@ from palpate.files import MADE, write_text
 
 if TYPE_CHECKING:
     from palpate.force import Certificate
-    from palpate.force.certificate import Verdict
+    from palpate.force.certificate import CertificateVerdict
 
 
 @Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
@@ -227,7 +227,7 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
     return 0 if verdict.holds else 1
 
 
-def confirm(path: Path, certificate: Certificate) -> Verdict:
+def confirm(path: Path, certificate: Certificate) -> CertificateVerdict:
     """The verdict, if the independent check has the same."""
     from palpate.force.sliding.slide_proof import slide_proof
     from palpate_certify.force_certificate import RefusedError, check, check_slide
@@ -243,7 +243,10 @@ def confirm(path: Path, certificate: Certificate) -> Verdict:
 
 
 def _print(
-    certificate: Certificate, verdict: Verdict, output: TuningOutputOptions, written: Path | None = None
+    certificate: Certificate,
+    verdict: CertificateVerdict,
+    output: TuningOutputOptions,
+    written: Path | None = None,
 ) -> None:
     if output.json:
         from palpate.force.describe import as_json

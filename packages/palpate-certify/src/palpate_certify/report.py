@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from palpate.force import Certificate
-    from palpate.force.certificate import Verdict
+    from palpate.force.certificate import CertificateVerdict
 
 DELAYS = np.geomspace(0.25, 4.0, 33)
 """Of the delay, for which the edge is drawn."""
@@ -171,7 +171,9 @@ def _edge_at(loop: DelayedContact, delay: float) -> float:
     return found if isfinite(found) and found > 0.0 else float("nan")
 
 
-def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None = None) -> Iterator[Text]:
+def proof_lines(
+    certificate: Certificate, verdict: CertificateVerdict, written: Path | None = None
+) -> Iterator[Text]:
     """A certificate: whether it holds, and the surfaces that each of its claims covers, a line each."""
     gains, place = certificate.gains, f"   written: {written}" if written else ""
     if not certificate.claims:

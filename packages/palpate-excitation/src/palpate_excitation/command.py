@@ -9,22 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
-from palpate.cli.options.values import (
-    FLAG,
-    SIGNED,
-    DampingRange,
-    Force,
-    ForceRate,
-    Frequency,
-    Length,
-    Mass,
-    MassRange,
-    StiffnessRange,
-    Time,
-    quantity_default,
-    si,
-)
+from palpate.cli.options.values import FLAG, SIGNED, si
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -43,11 +30,11 @@ _FASTEST = 200_000
 class SurfaceRangeOptions:
     """Range of the surfaces."""
 
-    stiffness: StiffnessRange
+    stiffness: values.StiffnessRange
     "Of the surfaces, N/m; one value if it is known."
-    damping: DampingRange
+    damping: values.DampingRange
     "Of the surfaces, N s/m."
-    mass: MassRange | None = None
+    mass: values.MassRange | None = None
     "Of the surfaces, kg; without it they have none."
 
     def range(self) -> SurfaceRange:
@@ -66,19 +53,19 @@ class SurfaceRangeOptions:
 class BudgetOptions:
     """Limits of force and frequency."""
 
-    force: Force
+    force: values.Force
     "Mean force, N."
-    peak: Force
+    peak: values.Force
     "Highest force, N."
-    least: Force = quantity_default("2", "force")
+    least: values.Force = values.quantity_default("2", "force")
     "Lowest force, N, so that contact is kept."
-    bandwidth: Frequency = quantity_default("40", "frequency")
+    bandwidth: values.Frequency = values.quantity_default("40", "frequency")
     "Highest frequency, Hz."
-    lowest: Frequency = quantity_default("0.5", "frequency")
+    lowest: values.Frequency = values.quantity_default("0.5", "frequency")
     "Lowest frequency, Hz."
-    force_rate: ForceRate | None = None
+    force_rate: values.ForceRate | None = None
     "Fastest change of the desired force, N/s."
-    drive: Force | None = None
+    drive: values.Force | None = None
     """Largest departure of the desired force from its mean, N, if it may exceed that of the force on the
     surface."""
 
@@ -104,11 +91,11 @@ class GoalOptions:
 
     precision: Annotated[str, SIGNED] = "10%"
     "Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%."
-    duration: Time | None = None
+    duration: values.Time | None = None
     "Of the excitation, s; the shortest sufficient one if not given."
-    longest: Time = quantity_default("60", "time")
+    longest: values.Time = values.quantity_default("60", "time")
     "Longest duration, s."
-    settle: Time = quantity_default("1", "time")
+    settle: values.Time = values.quantity_default("1", "time")
     "Initial time that does not count, s."
     kind: str = "multisine"
     "multisine or chirp."
@@ -121,7 +108,7 @@ class GoalOptions:
 class SensorOptions:
     """Sensors of force and position."""
 
-    noise: Force = quantity_default("0.6", "force")
+    noise: values.Force = values.quantity_default("0.6", "force")
     "Standard deviation of one reading of the force sensor, N."
     sampling: Annotated[int, SIGNED] = 480
     "Independent readings of the force sensor per second."
@@ -129,9 +116,9 @@ class SensorOptions:
     "Low-pass before the sampling, as butterworth3:120, or none."
     rate: Annotated[int, SIGNED] = 1000
     "Rows per second of the log, and of --out."
-    position_step: Length = quantity_default("1.6:um", "length")
+    position_step: values.Length = values.quantity_default("1.6:um", "length")
     "Quantisation of the position, m."
-    lag_std: Time = quantity_default("0", "time")
+    lag_std: values.Time = values.quantity_default("0", "time")
     "Standard deviation of the calibrated lag between force and position, s."
 
     def sensors(self) -> Sensors:
@@ -160,11 +147,11 @@ class SensorOptions:
 class LoopOptions:
     """Force control of the arm."""
 
-    loop_bandwidth: Frequency | None = None
+    loop_bandwidth: values.Frequency | None = None
     "Of the robot's force control, Hz, if nothing else is known of it."
-    tip_mass: Mass | None = None
+    tip_mass: values.Mass | None = None
     "Effective mass of the robot at its tip, kg; this and the following default to the bench's arm."
-    tip_friction: Force | None = None
+    tip_friction: values.Force | None = None
     "Dry friction as felt at the tip, N."
     gain: Annotated[float | None, SIGNED] = None
     "Of the force error."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -47,7 +48,65 @@ _LOOKS = 20.0
 """Of the estimator, a second of simulated time."""
 
 
-class PressingArm:
+class WatchedArm:
+    """A serial arm that somebody watches: its view, its sliders and its time.
+
+    Args:
+        arm: what moves.
+        place: where it starts.
+        gains: of its force loop.
+        sliders: of the page.
+        about: the law, in words.
+        seed: of the noise.
+        more: of the view.
+
+    Raises:
+        InputError: an arm of more joints than are drawn.
+    """
+
+    # More than seven arguments: of an arm, and of its page.
+    def __init__(
+        self,
+        arm: Serial,
+        place: Place,
+        gains: Gains,
+        sliders: tuple[Slider, ...],
+        about: str,
+        seed: int,
+        **more: Any,
+    ):
+        if arm.joints > JOINTS:
+            raise InputError(f"{arm.title} has {arm.joints} joints; at most {JOINTS} are drawn")
+        self._arm, self._place, self._gains = arm, place, gains
+        self._stride, self._k = max(1, round(STRIDE * gains.arm.rate)), 0
+        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
+        self.view = View(
+            title=printable(arm.title), about=printable(f"{gains.arm.title}; {about}"), kind="simulation",
+            rate=float(gains.arm.rate), stride=self._stride * gains.arm.tick, sliders=sliders,
+            rest=tuple(float(v) for v in place.q), scene=scene_of(arm, place), **more,
+        )  # fmt: skip
+
+    def bones(self, row: Array) -> Array:
+        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
+        return self._arm.joint_places(row[AT["q1"] : AT["q1"] + self._arm.joints])
+
+    def advance(self, seconds: float) -> Array:
+        """The rows of the time to come: one a stride."""
+        raise NotImplementedError
+
+    def seek(self, time: float) -> None:
+        """Runs on to a moment, as fast as it goes.
+
+        Raises:
+            InputError: it lies behind, or beyond a run's longest.
+        """
+        tick = self._gains.arm.tick
+        check_ahead(self._k * tick, time)
+        while self._k * tick < time - self.view.stride and not self.state.ended:
+            self.advance(min(1.0, time - self._k * tick))
+
+
+class PressingArm(WatchedArm):
     """A serial arm that presses with the cautious law as long as somebody watches.
 
     Args:
@@ -65,26 +124,12 @@ class PressingArm:
         asked = prepare_press(
             Question(arm=name, force=FORCE, surface=KelvinVoigt(STIFFNESS, DAMPING, 0.0), probe=0.0)
         ).asked
-        if asked.arm.joints > JOINTS:
-            raise InputError(f"{asked.arm.title} has {asked.arm.joints} joints; at most {JOINTS} are drawn")
+        sliders, notes = _sliders(asked.gains), tuple(printable(note) for note in asked.notes)
+        about = "the cautious law of palpate tune, own physics"
+        super().__init__(asked.arm, asked.place, asked.gains, sliders, about, seed, notes=notes)
         if waiting is not None:
             waiting()
-        self._arm, self._place, self._gains = asked.arm, asked.place, asked.gains
         self._series = series_of(asked.gains.arm)
-        self._stride = max(1, round(STRIDE * asked.gains.arm.rate))
-        sliders = _sliders(asked.gains)
-        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
-        self.view = View(
-            title=printable(asked.arm.title),
-            about=printable(f"{asked.gains.arm.title}; the cautious law of palpate tune, own physics"),
-            kind="simulation",
-            rate=float(asked.gains.arm.rate),
-            stride=self._stride * asked.gains.arm.tick,
-            sliders=sliders,
-            rest=tuple(float(v) for v in asked.place.q),
-            scene=scene_of(asked.arm, asked.place),
-            notes=tuple(printable(note) for note in asked.notes),
-        )
         self.reset()
 
     @property
@@ -92,10 +137,6 @@ class PressingArm:
         """The loop as it now is, for `palpate_live.stability`."""
         values = self.state.values
         return OfArm(self._gains, values["surface.stiffness"], values["surface.damping"])
-
-    def bones(self, row: Array) -> Array:
-        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
-        return self._arm.joint_places(row[AT["q1"] : AT["q1"] + self._arm.joints])
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
@@ -148,17 +189,6 @@ class PressingArm:
             cell = cell_of(self._arm, self._place, self._surface, self._gains.arm)
             self._simulated.change_surface(cell)
             self._forget()
-
-    def seek(self, time: float) -> None:
-        """Runs on to a moment, as fast as it goes.
-
-        Raises:
-            InputError: it lies behind, or beyond a run's longest.
-        """
-        here = self._k * self._gains.arm.tick
-        check_ahead(here, time)
-        while self._k * self._gains.arm.tick < time - self.view.stride and not self.state.ended:
-            self.advance(min(1.0, time - self._k * self._gains.arm.tick))
 
     @property
     def _surface(self) -> KelvinVoigt:

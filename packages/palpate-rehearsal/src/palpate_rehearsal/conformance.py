@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires.protocol import Command, EndedError, Sense, SilentError, unreadable
+from palpate.wires import Command, EndedError, Sense, SilentError, unreadable
 from palpate_checks.check import Check, require
 
 _READINGS, _PATIENCE = 50, 5.0

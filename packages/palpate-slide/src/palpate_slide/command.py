@@ -10,23 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, LoopArm, Physics
 from palpate.cli.options.force import SlideLimits
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
-from palpate.cli.options.values import (
-    FLAG,
-    SIGNED,
-    WHOLE,
-    Direction,
-    Force,
-    Length,
-    Velocity,  # noqa: F401 - cyclopts looks for it here, of SlideLimits
-    quantity,
-    quantity_default,
-    si,
-)
-from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
+from palpate.cli.toolkit import command, console, option_of, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
@@ -60,7 +50,7 @@ class SlideOptions(SlideLimits):
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
     "ur5e, fr3, panda, iiwa14, or a TOML file."
-    force: Force | None = None
+    force: values.Force | None = None
     "Desired force, as 20:N; that of the gains if left out, or 15 N."
     shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
     """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
@@ -70,11 +60,11 @@ class SlideOptions(SlideLimits):
     relative change of K along x per metre."""
     path: str = "circle"
     "line, back, raster or circle."
-    length: Length = quantity_default("40:mm", "length")
+    length: values.Length = values.quantity_default("40:mm", "length")
     "Of a line or a pass, radius of a circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
     "Duration of the slide."
-    normal: Direction | None = None
+    normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
@@ -112,7 +102,7 @@ class SlideOptions(SlideLimits):
                 )
             way = speed / rate * ways.cumsum(axis=0)
             heights = heights_of(
-                Path(file), quantity("--shape", f"1:{unit}", "length"), float(abs(way).max())
+                Path(file), values.quantity("--shape", f"1:{unit}", "length"), float(abs(way).max())
             )
         height = {"height": self.radius, "period": 0.02} if name == "step" else {}
         radius = 0.2 if name == "step" else self.radius
@@ -134,7 +124,7 @@ class SlideOptions(SlideLimits):
         name, _, size = self.shape.partition(":")
         if name in {"plane", "mesh"} or not size:
             return 0.1 if name == "mesh" else 0.2
-        radius = quantity("--shape", size, "length")
+        radius = values.quantity("--shape", size, "length")
         if not 1e-3 <= abs(radius) <= 1e4 and name != "step":
             raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
         return radius
@@ -280,14 +270,14 @@ def _watch(asked: SlideOptions) -> int:
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
-    from palpate.cli._press_wire import press_over
-    from palpate.wires.order import Path as SlidePath
-
     other = next((name for name in options_given((asked,)) if name not in _OF_WIRE), None)
     if other is not None:
         raise InputError(
             f"--{other} is for a simulated slide, and --wire names a real arm; leave out --{other}"
         )
+    press_over = option_of("wire", "wires")
+    from palpate_wires.order import Path as SlidePath
+
     path = SlidePath(asked.path, asked.extent, asked.seconds)
     press = AskOptions(force=asked.force, gains=asked.gains, normal=asked.normal, seconds=asked.seconds)
     return press_over(press, wire, limits, json=json, path=path)

@@ -32,6 +32,7 @@ from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.signals.types import triple
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, Carried, contact, note
 
@@ -75,7 +76,7 @@ def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
 
 
 compiled_slid, compiled_note = kernel(slid), kernel(note)
-_UPRIGHT = Mat3(*(Vec3(*map(float, row)) for row in np.eye(3)))
+_UPRIGHT = Mat3(*map(triple, np.eye(3)))
 _NOTHING = Carried(ZERO3, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
 
 
@@ -138,7 +139,7 @@ class OnGround(ByMuJoCo):
         at = self._scene.tip(data)[0]
         self._engine.mj_jac(self._model, data, J, None, at, self._scene.body)
         v = J @ data.qvel
-        return Tip(_three(at), _UPRIGHT, _three(v), ZERO3, ZERO3, ZERO3)
+        return Tip(triple(at), _UPRIGHT, triple(v), ZERO3, ZERO3, ZERO3)
 
     def _load(self, body: Body, touch: TouchState) -> Array:
         return np.asarray((self._axes @ self._J[:3, self._dofs]).T @ np.array(self.slid.tip.force))
@@ -188,7 +189,7 @@ class JointedArm:
         n, axes = self.place.normal, self.place.axes
         at = self.place.pose[:3, 3]
         at = at + (self.place.place - n @ at) * n
-        return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
+        return Frame(Mat3(triple(axes[2]), triple(axes[1]), triple(-n)), triple(at))
 
 
 class JointedSlide:
@@ -213,7 +214,8 @@ class JointedSlide:
         into: ArrayLike = DOWN,
         seed: int = 0,
     ):
-        check_mode(gains, at.inner.kind)
+        if gains.arm.kind != "servo":  # which takes the place of any arm's own loop
+            check_mode(gains, at.inner.kind)
         self.loop, frame = SlidingLoop(gains, into), at.frame()
         cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
         self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
@@ -243,7 +245,7 @@ class JointedSlide:
         if len(beyond):
             at = f"reached the end of its range at {sample.time:.3f} s"
             raise InputError(f"{arm.names[beyond[0]]} {at}; make --length smaller")
-        v, f = _three(action.velocity), _three(sample.force)
+        v, f = triple(action.velocity), triple(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
         row[20] = desired
         row[13] = (1.0 if loop.sliding else 2.0) * (self.sequence.touch is not None)
@@ -263,7 +265,3 @@ def jointed_arm(name: str) -> JointedArm:
     arm = SerialArm.named(name)
     place = place_of(arm, None, None)
     return JointedArm(arm, place, loop_of(name, arm.title, usual_mode(name), place.mass))
-
-
-def _three(values: Array) -> Vec3:
-    return Vec3(*map(float, values))

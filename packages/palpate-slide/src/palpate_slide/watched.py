@@ -13,20 +13,14 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.sliding_loop import Z_95
-from palpate.text import printable
-from palpate_live.pressing import scene_of
+from palpate_live.pressing import WatchedArm
 from palpate_live.stability import OfArm
 from palpate_live.view import (
     AT,
-    JOINTS,
     LONGEST,
     OVER,
-    STRIDE,
     Happened,
     Slider,
-    SourceState,
-    View,
-    check_ahead,
 )
 from palpate_live.view import COLUMNS as SHOWN
 from palpate_slide.ground import Ground
@@ -38,7 +32,7 @@ FRICTION = 1.0
 """Largest friction of the slider; above mu_max the law refutes its normal."""
 
 
-class WatchedSlide:
+class WatchedSlide(WatchedArm):
     """An arm that slides around a circle.
 
     Args:
@@ -55,12 +49,9 @@ class WatchedSlide:
 
     # More than seven arguments: as of a slide, and the circle.
     def __init__(self, at: JointedArm, gains: Gains, ground: Ground, radius: float, into: Any, seed: int = 0):
-        if at.arm.joints > JOINTS:
-            raise InputError(f"{at.arm.title} has {at.arm.joints} joints; at most {JOINTS} are drawn")
-        self._at, self._gains, self._ground, self._radius, self._into = at, gains, ground, radius, into
+        self._at, self._ground, self._radius, self._into = at, ground, radius, into
         self._speed, self._tick = numbers_of(gains).speed, gains.arm.tick
         self._series = gains.arm.series if gains.arm.kind == "position" else np.inf
-        self._stride = max(1, round(STRIDE * gains.arm.rate))
         least, K = max(1.0, 10.0 * gains.arm.sensor.noise), ground.stiffness
         sliders = (
             Slider("force", "desired force", "N", least, 0.8 * gains.force_limit, gains.force),
@@ -68,28 +59,15 @@ class WatchedSlide:
             Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
             Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
         )  # fmt: skip
-        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
-        self.view = View(
-            title=printable(at.arm.title),
-            about=printable(f"{gains.arm.title}; the law of palpate tune --slide around a circle, MuJoCo"),
-            kind="simulation",
-            rate=float(gains.arm.rate),
-            stride=self._stride * self._tick,
-            sliders=sliders,
-            rest=tuple(float(v) for v in at.place.q),
-            scene=scene_of(at.arm, at.place),
-            quantities={"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")},
-        )
+        about = "the law of palpate tune --slide around a circle, MuJoCo"
+        quantities = {"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")}
+        super().__init__(at.arm, at.place, gains, sliders, about, seed, quantities=quantities)
         self.reset()
 
     @property
     def loop_asked(self) -> OfArm:
         """The loop as it now is, for `palpate_live.stability`."""
         return OfArm(self._gains, self.state.values["stiffness"], self._ground.damping)
-
-    def bones(self, row: Array) -> Array:
-        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
-        return self._at.arm.joint_places(row[AT["q1"] : AT["q1"] + self._at.arm.joints])
 
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
@@ -125,16 +103,6 @@ class WatchedSlide:
         if key == "force":
             self._run.loop.desired = value
         self._run.engine.ground = self._surface
-
-    def seek(self, time: float) -> None:
-        """Runs on to a moment, as fast as it goes.
-
-        Raises:
-            InputError: it lies behind, or beyond a run's longest.
-        """
-        check_ahead(self._k * self._tick, time)
-        while self._k * self._tick < time - self.view.stride and not self.state.ended:
-            self.advance(min(1.0, time - self._k * self._tick))
 
     @property
     def _surface(self) -> Ground:

@@ -8,19 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import (
-    FLAG,
-    SIGNED,
-    Damping,
-    Force,
-    Length,
-    Stiffness,
-    StiffnessRange,
-    Velocity,
-    quantity_default,
-    with_std,
-)
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,11 +50,11 @@ class LoopArmOptions:
 class SurfaceOptions:
     """Prior of the surface, without a log."""
 
-    stiffness: StiffnessRange | None = None
+    stiffness: values.StiffnessRange | None = None
     "Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT."
-    stiffness_cap: Stiffness | None = None
+    stiffness_cap: values.Stiffness | None = None
     "Largest possible stiffness, N/m."
-    damping_max: Damping | None = None
+    damping_max: values.Damping | None = None
     "Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives."
     surface_speed: Annotated[float | None, SIGNED] = None
     "Speed of a moving surface, m/s."
@@ -75,9 +65,9 @@ class SurfaceOptions:
 class PressOptions:
     """Desired force and its limit."""
 
-    force: Force
+    force: values.Force
     "Desired force, N; the smallest one if it varies."
-    peak: Force | None = None
+    peak: values.Force | None = None
     "Highest force allowed at the touch, N."
 
 
@@ -87,13 +77,13 @@ class SlideLimits:
 
     mu_max: Annotated[float, SIGNED] = 0.9
     "Largest friction coefficient that there may be."
-    speed: Velocity = quantity_default("30:mm/s", "velocity")
+    speed: values.Velocity = values.quantity_default("30:mm/s", "velocity")
     "Speed along the surface, as 30:mm/s."
     tilt: Annotated[float, SIGNED] = 7.0
     "Standard deviation of the given normal, in degrees."
-    step: Length = quantity_default("0:mm", "length")
+    step: values.Length = values.quantity_default("0:mm", "length")
     "Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it."
-    touches: Length = quantity_default("10:mm", "length")
+    touches: values.Length = values.quantity_default("10:mm", "length")
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
 
     def gains_with(self, gains: Gains, radius: float) -> Gains:
@@ -145,7 +135,7 @@ class SlideTuningOptions(SlideLimits):
 
     slide: Annotated[bool, FLAG] = False
     "Tune for a slide too, and print on which surfaces it holds the force within 3 % rms."
-    radius: Length = quantity_default("100:mm", "length")
+    radius: values.Length = values.quantity_default("100:mm", "length")
     "Smallest radius of curvature of the surface, as 100:mm."
 
     def tuned_for(self, gains: Gains) -> Gains:
@@ -247,4 +237,4 @@ class IndenterOptions:
     @property
     def ratio(self) -> tuple[float, float] | None:
         """Poisson's ratio, with its standard deviation."""
-        return with_std("poisson", self.poisson, "0.45:0.05")
+        return values.with_std("poisson", self.poisson, "0.45:0.05")

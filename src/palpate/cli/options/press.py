@@ -8,32 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.values import (
-    FLAG,
-    SIGNED,
-    WHOLE,
-    Direction,
-    Force,
-    Length,
-    Point,
-    Stiffness,
-    Time,
-    Velocity,
-    si,
-)
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from palpate.contact_frame import Payload
     from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.press.prepare import Question
-    from palpate.wires import Limits, Task
-
-
-RETREAT = 0.002
-"""Distance of the retreat if none is given [m]."""
 
 
 @Parameter(name="*", group=Group("The press", sort_key=1))
@@ -41,14 +25,14 @@ RETREAT = 0.002
 class AskOptions:
     """The press, of any arm."""
 
-    force: Force | None = None
+    force: values.Force | None = None
     "Desired force, N, or with a unit as 20:N."
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from the touch on."
     gains: Path | None = None
     """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
     left out."""
-    normal: Direction | None = None
+    normal: values.Direction | None = None
     """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
     arm presses where its tip points at home if left out."""
     probe: Annotated[float | None, SIGNED] = None
@@ -94,7 +78,7 @@ class SimulatedOptions:
     "own or mujoco (extra: arms)."
     controller: Annotated[Controller, QUIET] = "cautious"
     "cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance."
-    at: Point | None = None
+    at: values.Point | None = None
     "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
     seed: Annotated[int, WHOLE] = 0
     "Of the noise; the same seed gives the same numbers."
@@ -144,7 +128,7 @@ class PhantomOptions:
     m, N/m and N s/m."""
     presses: Annotated[int, WHOLE] = 40
     "How many presses: sixteen on a grid, then where the map is worst known."
-    stiffer_than: Stiffness | None = None
+    stiffer_than: values.Stiffness | None = None
     "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
     page: Path | None = None
     "Where to write the page after each map; it loads itself again until the last."
@@ -167,7 +151,7 @@ class WireOptions:
     "Folder for all readings and commands; palpate identify reads its record.parquet."
     certificate: Path | None = None
     "File of palpate certify; without it the lateness is measured, and nothing is proved."
-    retreat: Length | None = None
+    retreat: values.Length | None = None
     "Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter."
     ordinary_priority: Annotated[bool, FLAG] = False
     "Do not request real-time priority from the system."
@@ -180,14 +164,14 @@ class WireOptions:
 class LimitOptions:
     """Limits that end a press over a wire."""
 
-    force_limit: Force | None = None
+    force_limit: values.Force | None = None
     "Force of any axis, as 40:N."
-    speed_limit: Velocity | None = None
+    speed_limit: values.Velocity | None = None
     "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
-    travel_limit: Length | None = None
+    travel_limit: values.Length | None = None
     """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
     stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
-    time_limit: Time | None = None
+    time_limit: values.Time | None = None
     "Total duration, as 20:s."
 
 
@@ -200,32 +184,3 @@ def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, o
     given = next(iter(options_given((part,))), None)
     if given is not None:
         raise InputError(f"--{given} is for {of}, or leave out --{given}")
-
-
-def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[Task, Limits]:
-    """The task of a real arm; the direction and every limit have to be given.
-
-    Raises:
-        InputError: one is missing or invalid.
-    """
-    from palpate.force.gains import load_gains
-    from palpate.wires import Limits, Task
-    from palpate.wires.order import travel_for
-
-    needed = {
-        "--wire": wire.wire, "--gains": asked.gains, "--force": asked.force, "--normal": asked.normal,
-        "--force-limit": limits.force_limit, "--speed-limit": limits.speed_limit,
-        "--time-limit": limits.time_limit,
-    }  # fmt: skip
-    lacking = [name for name, value in needed.items() if value is None]
-    normal = asked.normal
-    if not (normal and limits.force_limit and limits.speed_limit and limits.time_limit and not lacking):
-        raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
-    force = limits.force_limit.si
-    if limits.travel_limit is None:
-        travel = travel_for(load_gains(Path(str(asked.gains))), force)
-    else:
-        travel = limits.travel_limit.si
-    retreat = min(RETREAT, travel) if wire.retreat is None else wire.retreat.si
-    ends = Limits(force, limits.speed_limit.si, travel, limits.time_limit.si)
-    return Task(asked.desired, normal.si, asked.seconds, retreat, asked.probe or 0.0), ends
