@@ -23,7 +23,7 @@ from palpate.cli.options.values import value_of
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.report.page import Answer
+    from palpate.report.page import CommandAnswer
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
@@ -189,7 +189,7 @@ def print_answer(found: Mapping[str, Any]) -> None:
     print_json({**head, **({} if "files" in found else {"files": _files(options)}), **found})
 
 
-def print_result(answer: Answer, *, json: bool, files: Iterable[tuple[str, object]] = ()) -> None:
+def print_result(answer: CommandAnswer, *, json: bool, files: Iterable[tuple[str, object]] = ()) -> None:
     """Print an answer as one JSON object, or as text with the written files.
 
     Args:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from palpate.report.page import Answer, Table
+    from palpate.report.page import CommandAnswer, Table
 
 STYLE = "yellow"
 """Style of warnings."""
@@ -107,7 +107,7 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
     console.print()
 
 
-def show_answer(answer: Answer) -> Console:
+def show_answer(answer: CommandAnswer) -> Console:
     """Print an answer: its title, sentence, tables and warnings; returns the console for further output."""
     screen = console()
     head(screen, answer.title, answer.sentence)

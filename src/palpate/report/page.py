@@ -30,8 +30,8 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a command found, as a terminal and a program show it.
+class CommandAnswer:
+    """The answer of a command, as a terminal and a program show it.
 
     Args:
         title: what it is of.

@@ -10,7 +10,7 @@ from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Answer, Table, data_address, render
+from palpate.report.page import CommandAnswer, Table, data_address, render
 from palpate.report.style import svg
 from palpate.text import printable
 
@@ -50,7 +50,7 @@ def sentence(found: Weighed) -> str:
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
 
 
-def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfLoad]) -> Answer:
+def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfLoad]) -> CommandAnswer:
     """The answer of `palpate payload`.
 
     Args:
@@ -67,7 +67,7 @@ def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfL
         checked = {"file": str(check), "agrees": agrees, "numbers": numbers}
     if check is not None and rows:
         said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
-    return Answer(log, f": {said}", tables, notes, found.to_json() | {"check": checked})
+    return CommandAnswer(log, f": {said}", tables, notes, found.to_json() | {"check": checked})
 
 
 def check_table(rows: list[NumberOfLoad]) -> Table:

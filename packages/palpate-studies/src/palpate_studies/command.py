@@ -199,10 +199,10 @@ def _runner(where: ClusterOptions, screen: Console) -> Iterator[StudyRunner]:
 
 
 def _show(found: Findings, folder: Path, as_json: bool) -> None:
-    from palpate.report.page import Answer
+    from palpate.report.page import CommandAnswer
 
     tables, summary = found.tables, found.summary
     few = [tables[0], *tables[1:2], tables[-1]] if len(tables) > _SHOWN else tables
     said = f", {summary['runs']} runs\n{chr(10).join(summary['answer'])}"
-    answer = Answer(summary["study"], said, few, found.notes, summary)
+    answer = CommandAnswer(summary["study"], said, few, found.notes, summary)
     print_result(answer, json=as_json, files=[("report:", folder / "report.html")])

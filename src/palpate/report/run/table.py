@@ -9,7 +9,7 @@ from palpate.identification.result import Identification
 from palpate.report.answer import Card
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity, with_half
-from palpate.report.page import Answer, Table
+from palpate.report.page import CommandAnswer, Table
 from palpate.text import printable
 
 
@@ -153,10 +153,10 @@ def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]
     return [Table("Force", ("", "value"), force_rows(summary)), *own, thesis_table(summary)]
 
 
-def answer_of(title: str, summary: dict[str, Any], shown: Sequence[Table]) -> Answer:
+def answer_of(title: str, summary: dict[str, Any], shown: Sequence[Table]) -> CommandAnswer:
     """The answer of a run, with the tables that its terminal shows."""
     head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    return Answer(title, f"{head}\n{sentence(summary)}", shown, notes(summary), summary)
+    return CommandAnswer(title, f"{head}\n{sentence(summary)}", shown, notes(summary), summary)
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
