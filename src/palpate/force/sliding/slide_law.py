@@ -84,6 +84,7 @@ from palpate.force.sliding.tangent_filter import (
     STIFF,
     Observation,
     begin,
+    confine,
     correct,
     predict,
     slope_variance,
@@ -263,7 +264,8 @@ def learn(law, s, work, late, desired, force):
     s[ROUGH] += 0.02 * (min(both, 100.0) - s[ROUGH])
     if s[ROUGH] > JERKY and s[TROUBLE] == FINE:
         s[TROUBLE] = JERKS
-    s[MU], s[FORCE] = min(max(s[MU], 0.0), law.mu_max), max(s[FORCE], 0.0)
+    confine(s, MU, 0.0, law.mu_max)
+    s[FORCE] = max(s[FORCE], 0.0)
     s[STIFF] = max(s[STIFF], 0.05)
     t1, t2 = turn(s)
     n = unit(n + t1 * e1 + t2 * e2, n)
@@ -302,7 +304,7 @@ def command(law, s, desired, force, direction):
         s[HALT] = s[HALT] + 1.0 if abs(felt - desired) < BAND * desired else 1.0
         if s[HALT] * c.tick > law.lead:
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
-            slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], s[MU], AFTER[1])
+            slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], LIKELY[0], LIKELY[1])
             s[SLOW] = 0.5
         return press * n
     v = along_surface(law, s, desired, direction)
