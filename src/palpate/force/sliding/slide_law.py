@@ -118,6 +118,8 @@ CROOKED = 0.4
 have 0.48."""
 LIGHT = 0.3
 """Share of F_d with which a normal is touched."""
+HALF = 0.5
+"""Share of the speed after a step, and where the force is off."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
@@ -330,7 +332,7 @@ def command(law, s, desired, force, direction):
     felt = max(normal, size / sqrt(1.0 + law.mu_max * law.mu_max))
     likely = 2.0 * sqrt(max(variance(s, FORCE, FORCE), 0.0))
     if s[TROUBLE] == FINE and abs(s[FORCE] - desired) + likely > BAND * desired:
-        s[TROUBLE] = AWAY
+        s[TROUBLE], s[SLOW] = AWAY, min(s[SLOW], HALF)
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
     if s[HALT] > 0.0:
@@ -339,7 +341,7 @@ def command(law, s, desired, force, direction):
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
             mu, mu_std = (s[MU], AFTER[1]) if s[TROUBLE] == STEPPED else LIKELY
             slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], mu, mu_std)
-            s[SLOW] = 0.5
+            s[SLOW] = HALF
         return press * n
     v = along_surface(law, s, desired, direction)
     put_vector(s, VELOCITY, v)
