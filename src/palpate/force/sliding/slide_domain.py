@@ -78,10 +78,8 @@ def numbers_of(gains: Gains) -> Slide:
     """The table `slide` of gains.
 
     Raises:
-        InputError: gains without it, or of a servo, whose lead the law of a slide does not know.
+        InputError: gains without it.
     """
-    if gains.arm.kind == "servo":
-        raise InputError(f"{gains.arm.title}: a slide of a servo is not covered; press with it by ForceLoop")
     if gains.slide is None:
         raise InputError("these gains have no numbers for a slide; tune again with --slide --mu-max .9")
     return gains.slide
@@ -103,9 +101,10 @@ def slide_sentence(gains: Gains) -> str:
     least = (
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
+    edge = edge_speed(gains, gains.cap)
     floor = (
-        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step that "
-        f"is not expected costs 0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap:.3g} N/m"
+        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step that is "
+        f"not expected costs 0.5 F at most up to {1e3 * edge:.2g} mm/s on {gains.cap:.3g} N/m"
     )
     if domain is None:
         better = "slow down, or give a better normal"
