@@ -56,13 +56,18 @@ def obeys(terms: dict[str, float]) -> bool:
     return all(terms[name] < limit for name, limit in LIMITS.items())
 
 
+def lead_of(gains: Gains) -> float:
+    """Sum of the lags from a reading to the tip [s]; of a servo what its own lead leaves."""
+    return gains.theta if gains.arm.kind == "servo" else sum_of_lags(gains.arm)
+
+
 def edge_speed(gains: Gains, stiffness: float) -> float:
     """Largest speed at which a step that was not expected costs half of F_d at most on a surface K [m/s].
 
     On an edge of 45 degrees the force rises by K_eff v L before the tip stops, with the sum L of the lags. That is
     `EXCESS` of F_d here; the rest up to a half is for the detection, the friction and the way on.
     """
-    return EXCESS * gains.force / (gains.arm.seen(stiffness) * sum_of_lags(gains.arm))
+    return EXCESS * gains.force / (gains.arm.seen(stiffness) * lead_of(gains))
 
 
 def slide_domain(gains: Gains) -> tuple[float, float] | None:
@@ -101,10 +106,9 @@ def slide_sentence(gains: Gains) -> str:
     least = (
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
-    edge = edge_speed(gains, gains.cap)
     floor = (
-        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step that is "
-        f"not expected costs 0.5 F at most up to {1e3 * edge:.2g} mm/s on {gains.cap:.3g} N/m"
+        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step costs "
+        f"0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap:.3g} N/m"
     )
     if domain is None:
         better = "slow down, or give a better normal"
