@@ -366,7 +366,8 @@ def command(law, s, desired, force, direction):
         s[HALT] = s[HALT] + 1.0 if abs(felt - desired) < BAND * desired else 1.0
         if s[HALT] * c.tick > law.lead:
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
-            mu, mu_std = (s[MU], AFTER[1]) if s[TROUBLE] == STEPPED else LIKELY
+            stepped = s[TROUBLE] == STEPPED
+            mu, mu_std = s[MU] if stepped else LIKELY[0], AFTER[1] if stepped else LIKELY[1]
             slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], mu, mu_std)
             s[SLOW] = HALF
         return press * n
