@@ -45,7 +45,6 @@ IN_SQUARES = {
     "squares <= 0.0": "residuals of exactly zero, which noise leaves none of",
 }
 IN_SLIDE = {
-    "press->estimate.std.x > 0.0": "a press that is locked has an estimate",
     "!(total > 0.0)": "the variance of what is read is positive, by the noise in it",
     "c->resolution == 0.0": "the sensor of this arm has steps below its noise",
     "size > c->force_limit ? LIMITED : SATURATED": "a force between 99 and 100 % of the sensor's scale, the limit",
