@@ -209,6 +209,8 @@ def _fit(blocks: _Blocks) -> _Line:
     return _Line(omega, theta[:2], change, variance, freedom)
 
 
+_ROUNDING = 1e-9
+"""Share of the motion that a depth may be by rounding alone."""
 _EXCITED = 0.05
 """Share of the position's variance that makes an octave worth a headline: one part in twenty of the motion."""
 
@@ -252,6 +254,7 @@ def working_point(
         assert octave is not None
         value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
         force, depth = float(problem.force[inside].mean()), float(depths.mean())
+        depth *= abs(depth) > _ROUNDING * float(np.abs(depths).max())  # of a depth that counts from its mean
         unseen_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
         parts = {**octave.contributions, "unexplained": Contribution.within(unseen_force)}
         half = float(np.hypot(half, unseen_force))
