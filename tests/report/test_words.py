@@ -14,6 +14,7 @@ from palpate.identification.result import (
     Verdict,
     WorkingPoint,
 )
+from palpate.identification.uncertainty import Measurement
 from palpate.report.identification.words import limited_by, model_line, sentence
 from palpate.report.numbers import quantity, quantity_between
 
@@ -75,7 +76,7 @@ def test_a_model_that_knows_the_stiffness_better_is_heard_first():
 
 
 def test_a_damper_leaves_with_its_loss():
-    own = DynamicStiffness(1.1, 400.0, 2700.0, 15670.0, 330.0, 7, 0.9)
+    own = DynamicStiffness(1.1, Measurement.within(400.0, 2700.0), Measurement.within(15670.0, 330.0), 7, 0.9)
     found = made(parameter(None, 2700, Verdict.NOT_IDENTIFIABLE), frequency=1.1, octaves=(own,), depth=-1e-6)
     assert sentence(found).startswith("The log shows a loss of 15.67 ± 0.33 kN/m, but no stiffness at 13.3 N")
     assert "from the middle of the motion" in sentence(found)

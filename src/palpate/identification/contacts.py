@@ -144,7 +144,7 @@ def _with_press(
     lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
     signs = seen.position_sign, seen.force_sign
     press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
-    return contacts if press is None or press.headline.stiffness <= 0 else replace(seen, press=press)
+    return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
 
 
 def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:

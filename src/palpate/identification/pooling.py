@@ -17,7 +17,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.result import Identification, Parameter, Verdict
-from palpate.identification.uncertainty import Contribution, student
+from palpate.identification.uncertainty import Contribution, Measurement, student
 from palpate.records import Result
 from palpate.signals.types import NORMAL
 
@@ -280,19 +280,18 @@ def _pool(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> Pool
 
 def _judge(mean: Mean, alike: float, count: int, kind: tuple[str, str], tolerance: float) -> Parameter:
     """A verdict on a mean; `alike` is the 95 % half-width of what all logs err by together."""
-    half = float(np.hypot(mean.half, alike))
-    share = half / abs(mean.value) if mean.value else np.inf
-    interval = (mean.value - half, mean.value + half)
     of = f"{mean.count} of {count} logs{f', as of {kind[1]}' if kind[1] else ''}"
+    freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
-        "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), mean.freedom),
-        "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), mean.freedom),
+        "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), freedom),
+        "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
         "common to all logs": Contribution.within(alike),
     }
-    found = Parameter.of(mean.value, half, kind[0], Verdict.IDENTIFIED, "", parts)
-    if share >= 1:
-        reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
-        return found.without_number(reason, ci95=interval)
+    found = Parameter.of(mean.value, kind[0], Verdict.IDENTIFIED, "", parts)
+    share = Measurement(mean.value, parts).relative_half
+    if share >= 1 and found.ci95 is not None:
+        reason = f"95 %: {found.ci95[0]:.3g} to {found.ci95[1]:.3g}; zero is within it ({of})"
+        return found.without_number(reason, ci95=found.ci95)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"
     reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.causes import Warn
-from palpate.identification.uncertainty import Contributions, Input, Uncertainty
+from palpate.identification.uncertainty import Contributions, Input, Measurement, Uncertainty
 from palpate.records import Compared, Readable, Result
 from palpate.signals import Estimate
 from palpate.signals.types import NORMAL
@@ -55,47 +55,34 @@ class Parameter(Readable):
     budget: dict[str, float] = field(default_factory=dict)
     contributions: Contributions = field(default_factory=dict)
 
-    # More than seven arguments: the fields of a parameter, in their order.
     @classmethod
     def of(
         cls,
         value: float,
-        half: float,
         unit: str,
         verdict: Verdict,
         reason: str,
         contributions: Contributions,
-        *,
-        joint: bool = False,
     ) -> Parameter:
-        """A parameter with its budget.
+        """A parameter with its interval and its budget.
 
         Args:
             value: of it.
-            half: half-width of its 95 % interval.
             unit: in SI.
             verdict: on it.
             reason: of that.
             contributions: to its uncertainty, by cause.
-            joint: the coverage factor is of all causes together; else each has its own.
         """
-        parts = {cause: part.half for cause, part in contributions.items()}
-        if joint:
-            coverage = half / (Uncertainty(contributions, half).combined or 1.0)
-            parts = {cause: coverage * part.std for cause, part in contributions.items()}
-        budget = sorted(
-            (item for item in parts.items() if item[1] > _SMALL * half), key=lambda item: -item[1]
-        )
+        whole = Uncertainty(contributions)
+        half = whole.expanded
+        share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
+        parts = {cause: share * part.std for cause, part in contributions.items()}
+        budget = {
+            cause: part for cause, part in sorted(parts.items(), key=lambda x: -x[1]) if part > _SMALL * half
+        }
         ends = value - half, value + half
         return cls(
-            value,
-            half / NORMAL,
-            ends,
-            unit,
-            verdict,
-            reason,
-            budget=dict(budget),
-            contributions=contributions,
+            value, half / NORMAL, ends, unit, verdict, reason, budget=budget, contributions=contributions
         )
 
     def without_number(
@@ -119,7 +106,7 @@ class Parameter(Readable):
         """Combined and expanded uncertainty; None without a number, or where no cause is known."""
         if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
             return None
-        return Uncertainty(self.contributions, (self.ci95[1] - self.ci95[0]) / 2)
+        return Uncertainty(self.contributions)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -141,21 +128,36 @@ class DynamicStiffness(Readable):
 
     Args:
         frequency: middle of the octave [Hz].
-        storage, loss: [N/m].
-        storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
+        in_phase, in_quadrature: storage and loss [N/m].
         blocks: how many there are.
         share: of the position's variance in contact.
-        contributions: to the uncertainty of the storage, by cause [N/m].
     """
 
     frequency: float
-    storage: float
-    storage_half: float
-    loss: float
-    loss_half: float
+    in_phase: Measurement
+    in_quadrature: Measurement
     blocks: int
     share: float
-    contributions: Contributions = field(default_factory=dict)
+
+    @property
+    def storage(self) -> float:
+        """Value of the storage [N/m]."""
+        return self.in_phase.value
+
+    @property
+    def storage_half(self) -> float:
+        """Its 95 % half-width [N/m], from the variance between blocks."""
+        return self.in_phase.half
+
+    @property
+    def loss(self) -> float:
+        """Value of the loss [N/m]."""
+        return self.in_quadrature.value
+
+    @property
+    def loss_half(self) -> float:
+        """Its 95 % half-width [N/m]."""
+        return self.in_quadrature.half
 
     def to_json(self) -> dict[str, float]:
         """Plain values that JSON can hold."""
@@ -190,12 +192,21 @@ class Tangent:
 
     Args:
         force: [N].
-        stiffness, half: slope and its 95 % half-width [N/m].
+        slope: there [N/m].
     """
 
     force: float
-    stiffness: float
-    half: float
+    slope: Measurement
+
+    @property
+    def stiffness(self) -> float:
+        """Value of the slope [N/m]."""
+        return self.slope.value
+
+    @property
+    def half(self) -> float:
+        """Its 95 % half-width [N/m]."""
+        return self.slope.half
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ Welch's and Satterthwaite's (annex G.4), and the expanded uncertainty U = k u_c 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import hypot, isfinite
 from typing import Any, NamedTuple
@@ -49,6 +49,21 @@ def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
     return found
 
 
+def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
+    """95 % half-widths of all causes together, shape (p,): Student's t times the root of the sum of the variances.
+
+    Args:
+        variance: by cause, shape (c, p).
+        freedom: degrees of freedom of each, shape (c, p).
+    """
+    from scipy.special import stdtrit
+
+    whole, together = np.asarray(variance, np.float64).sum(axis=0), effective_freedom(variance, freedom)
+    coverage = np.where(together < 0.99 * _MOST_FREEDOM, stdtrit(together, 0.975), NORMAL)
+    found: Array = coverage * np.sqrt(whole)
+    return found
+
+
 class Contribution(NamedTuple):
     """Contribution of one cause to the uncertainty of a result.
 
@@ -78,6 +93,49 @@ class Contribution(NamedTuple):
 Contributions = Mapping[str, Contribution]
 
 
+def half_width(contributions: Contributions) -> float:
+    """95 % half-width of one result: of a parameter, a working point or a slope."""
+    if not contributions:
+        return 0.0
+    std, freedom = np.array(list(contributions.values())).T
+    return float(half_widths(std**2, freedom))
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A value and the contributions to its uncertainty, by cause."""
+
+    value: float
+    contributions: Contributions
+
+    @classmethod
+    def within(cls, value: float, half: float, cause: str = "noise") -> Measurement:
+        """With one cause of a normal distribution, whose 95 % half-width is given."""
+        return cls(value, {cause: Contribution.within(half)})
+
+    @property
+    def half(self) -> float:
+        """95 % half-width of all causes together."""
+        return half_width(self.contributions)
+
+    @property
+    def relative_half(self) -> float:
+        """The same over the value."""
+        return self.half / abs(self.value or 1e-300)
+
+    def known_to(self, tolerance: float) -> bool:
+        """Whether its half-width is at most a share of its value."""
+        return self.half <= tolerance * abs(self.value)
+
+    def with_cause(self, cause: str, own: Contribution) -> Measurement:
+        """The same with one more cause of error."""
+        return replace(self, contributions={**self.contributions, cause: own})
+
+    def through(self, value: float, gain: float) -> Measurement:
+        """A function of it instead, by its value and its derivative."""
+        return Measurement(value, {cause: own.times(gain) for cause, own in self.contributions.items()})
+
+
 class Input(NamedTuple):
     """An input quantity that a cause stands for: estimate, standard uncertainty, and their unit."""
 
@@ -92,11 +150,14 @@ class Uncertainty:
 
     Args:
         contributions: by cause; independent of each other.
-        expanded: half-width of the 95 % interval.
     """
 
     contributions: Contributions
-    expanded: float
+
+    @property
+    def expanded(self) -> float:
+        """Half-width of the 95 % interval."""
+        return half_width(self.contributions)
 
     @property
     def combined(self) -> float:

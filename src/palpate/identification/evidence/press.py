@@ -30,8 +30,8 @@ from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.tangents import SteadyPress
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
-from palpate.signals.types import NORMAL
 
 
 def relaxation(
@@ -50,7 +50,8 @@ def relaxation(
         return None
     rows = slice(*best)
     moved = depth[rows] - depth[best[1] - 1]
-    given, doubt = (0.0 * moved, 0.0) if slope is None else (slope.stiffness * moved, slope.half)
+    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
+    given, doubt = stiffness.value * moved, stiffness.half
     return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
 
 
@@ -200,7 +201,7 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
         seen: the press by the filtered contact, if that shows one.
         origin: position of the surface [m].
     """
-    tangents = [Tangent(own.force, own.stiffness, own.half) for own in (*steady.others, steady.headline)]
+    tangents = [Tangent(own.force, own.stiffness) for own in (*steady.others, steady.headline)]
     surface = np.array([[origin], [0.0]])
     ordered = tuple(sorted(tangents, key=lambda own: own.force))
     curves = steady.loading - surface, steady.unloading - surface
@@ -220,8 +221,8 @@ def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tan
     found, other = _tangent_of(loadings, level), _tangent_of(later, level)
     if found is None or other is None:
         return None
-    by_lag = NORMAL * (other.stiffness - found.stiffness)
-    return replace(found, half=float(np.hypot(found.half, by_lag)))
+    by_lag = Contribution(abs(other.stiffness - found.stiffness))
+    return replace(found, slope=found.slope.with_cause("lag", by_lag))
 
 
 def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
@@ -244,10 +245,12 @@ def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    others = np.mean(by_speed), np.mean(by_filter) if by_filter else 0.0
-    return Tangent(
-        float(np.mean(forces)), mean.value, float(np.sqrt(mean.half**2 + sum(o**2 for o in others)))
-    )
+    causes = {
+        "repetition": Contribution(mean.std, mean.freedom),
+        "speed": Contribution.within(abs(float(np.mean(by_speed)))),
+        "filter": Contribution.within(float(np.mean(by_filter)) if by_filter else 0.0),
+    }
+    return Tangent(float(np.mean(forces)), Measurement(mean.value, causes))
 
 
 def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.intp]:
@@ -306,7 +309,7 @@ def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float |
     segments = segments_of(problem.motion.rows, problem.spans)
     if point.source == "press":
         slope = slope_of(loadings_in(problem, problem.lag.value, segments))
-        return None if slope is None else slope.stiffness
+        return None if slope is None else slope.stiffness.value
     spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
     near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]
     return near[0].storage if near else None

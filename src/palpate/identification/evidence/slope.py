@@ -13,7 +13,7 @@ from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.uncertainty import Contribution, Contributions
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
 
@@ -157,18 +157,15 @@ class Slope:
     """Slope of the upper part of all loadings.
 
     Args:
-        stiffness, half: [N/m].
+        stiffness: mean of the loadings [N/m].
         rise: mean duration of a loading [s].
         each: slope of each loading [N/m].
-        contributions: to its uncertainty, by cause [N/m].
         force, depth: where it is, the means of the upper part [N], [m].
     """
 
-    stiffness: float
-    half: float
+    stiffness: Measurement
     rise: float
     each: tuple[float, ...]
-    contributions: Contributions
     force: float
     depth: float
 
@@ -195,18 +192,17 @@ def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None
     other = slope_of(later) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
-    by_lag = Contribution(abs(other.stiffness - found.stiffness))
-    half = float(np.hypot(found.half, by_lag.half))
-    return replace(found, half=half, contributions={**found.contributions, "lag": by_lag})
+    by_lag = Contribution(abs(other.stiffness.value - found.stiffness.value))
+    return replace(found, stiffness=found.stiffness.with_cause("lag", by_lag))
 
 
 def slope_of(loadings: list[Loading]) -> Slope | None:
     """Slope in the upper part of the force; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
-    the interval reaches both. Beyond them it has the scatter of each loading, the change of the slope over the range,
-    what it differs by from the slope of the channels as they were read, and the variance between loadings (a random
-    effect, Student's t).
+    the interval reaches both. It has the scatter of each loading, the change of the slope over the range, what it
+    differs by from the slope of the channels as they were read, and the variance between loadings (a random effect,
+    Student's t).
     """
     slopes, variances, rises, changes, speeds, filters, levels = [], [], [], [], [], [], []
     for loading in loadings:
@@ -225,16 +221,11 @@ def slope_of(loadings: list[Loading]) -> Slope | None:
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    curvature, reach, by_filter = (float(np.mean(own)) for own in (changes, speeds, filters))
-    others = float(np.sqrt(mean.half**2 + curvature**2 + by_filter**2))
-    causes = {
-        "repetition" if len(slopes) > 1 else "noise": Contribution(mean.std, mean.freedom),
-        "curvature": Contribution.within(curvature),
-        "filter": Contribution.within(by_filter),
-        "speed": Contribution.within(float(np.sqrt((others + reach) ** 2 - others**2))),
-    }
+    bounds = zip(("curvature", "filter", "speed"), (changes, filters, speeds), strict=True)
+    causes = {cause: Contribution.within(float(np.mean(own))) for cause, own in bounds}
+    causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
     where = (float(own) for own in np.mean(levels, axis=0))
-    return Slope(mean.value, others + reach, float(np.mean(rises)), tuple(slopes), causes, *where)
+    return Slope(Measurement(mean.value, causes), float(np.mean(rises)), tuple(slopes), *where)
 
 
 def _upper(force: Array) -> NDArray[np.intp]:
