@@ -17,6 +17,7 @@ from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
+from palpate.identification.tangents import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 
 Linear = TypeVar("Linear", Answer, Fit)
@@ -158,6 +159,13 @@ def slope_without_series(own: Measurement, series: float, series_std: float) -> 
     value = gain * own.value
     by_series = Contribution(series_std * (value / series) ** 2)
     return own.through(value, gain**2).with_cause("series stiffness", by_series)
+
+
+def slopes_without_series(found: Slopes, series: float, series_std: float) -> Slopes:
+    """The same of the slopes of some loadings."""
+    own = slope_without_series(found.stiffness, series, series_std)
+    gain = (own.value / found.stiffness.value) ** 2
+    return replace(found, stiffness=own, again=None if found.again is None else gain * found.again)
 
 
 def press_without_series(press: Press, series: float, series_std: float) -> Press:

@@ -64,14 +64,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Tangent of the strokes at one force.
+    """Stiffness of some loadings, or of an octave, and where it is.
 
     Args:
         force, depth: where it is [N], [m].
-        stiffness: mean of the strokes [N/m].
-        each: slope of each stroke [N/m].
-        again: 95 % half-width for one more stroke; None for fewer than three [N/m].
-        rise: mean duration of a stroke [s].
+        stiffness: mean of the loadings [N/m].
+        each: slope of each [N/m].
+        again: 95 % half-width for one more; None for fewer than three [N/m].
+        rise: mean duration of one [s]; of an octave, a quarter of a period.
         explained: least share of a stroke's force that its curve follows.
     """
 
@@ -81,7 +81,7 @@ class Slopes:
     each: tuple[float, ...]
     again: float | None
     rise: float
-    explained: float
+    explained: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from palpate.identification.evidence.slope import (
     FEWEST,
     STILL,
     Loading,
-    Slope,
     apart,
     line,
     loadings_in,
@@ -23,19 +22,19 @@ from palpate.identification.evidence.slope import (
     slope_between,
     slope_of,
 )
-from palpate.identification.evidence.spectrum import dynamic_stiffness, steady_point, working_point
+from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
-from palpate.identification.tangents import SteadyPress
+from palpate.identification.tangents import Slopes, SteadyPress
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
 
 def relaxation(
-    problem: Problem, lag: float, segments: list[Segment], slope: Slope | None
+    problem: Problem, lag: float, segments: list[Segment], slope: Slopes | None
 ) -> Relaxation | None:
     """Of the longest hold after a loading, what the position gives back by its slope left aside."""
     depth = problem.motion.moved(0, lag)
@@ -283,18 +282,21 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
+    headline = (
+        None if steady is None else replace(steady.headline, depth=steady.headline.depth - problem.origin)
+    )
     if steady is not None:
         press = at_constant_speed(steady, press, problem.origin)
     if options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
+        headline = None if headline is None else in_series.slopes_without_series(headline, *series)
     if options.series_mass is not None:
         spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
-    if steady is not None:
-        return spectrum, press, steady_point(steady.headline, problem, options, unit)
-    point = working_point(whole, spectrum, options, unit, hidden)
-    return spectrum, press, point
+    if headline is not None:
+        return spectrum, press, point_of(headline, "press", problem, options, unit)
+    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:

@@ -13,6 +13,7 @@ from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
+from palpate.identification.tangents import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
@@ -152,25 +153,7 @@ _UPPER = 0.4
 """Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
 
 
-@dataclass(frozen=True)
-class Slope:
-    """Slope of the upper part of all loadings.
-
-    Args:
-        stiffness: mean of the loadings [N/m].
-        rise: mean duration of a loading [s].
-        each: slope of each loading [N/m].
-        force, depth: where it is, the means of the upper part [N], [m].
-    """
-
-    stiffness: Measurement
-    rise: float
-    each: tuple[float, ...]
-    force: float
-    depth: float
-
-
-def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
+def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
     """The slope of a log's loadings; with it what it moves by if the force is later than assumed.
 
     Args:
@@ -181,7 +164,7 @@ def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
     return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
-def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None:
+def slope_between(loadings: list[Loading], later: list[Loading]) -> Slopes | None:
     """The slope of some loadings; its interval reaches that of the same with the force later.
 
     Args:
@@ -196,7 +179,7 @@ def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None
     return replace(found, stiffness=found.stiffness.with_cause("lag", by_lag))
 
 
-def slope_of(loadings: list[Loading]) -> Slope | None:
+def slope_of(loadings: list[Loading]) -> Slopes | None:
     """Slope in the upper part of the force; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
@@ -224,8 +207,9 @@ def slope_of(loadings: list[Loading]) -> Slope | None:
     bounds = zip(("curvature", "filter", "speed"), (changes, filters, speeds), strict=True)
     causes = {cause: Contribution.within(float(np.mean(own))) for cause, own in bounds}
     causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
-    where = (float(own) for own in np.mean(levels, axis=0))
-    return Slope(Measurement(mean.value, causes), float(np.mean(rises)), tuple(slopes), *where)
+    force, depth = (float(own) for own in np.mean(levels, axis=0))
+    own = Measurement(mean.value, causes)
+    return Slopes(force, depth, own, tuple(slopes), mean.next_half, float(np.mean(rises)))
 
 
 def _upper(force: Array) -> NDArray[np.intp]:

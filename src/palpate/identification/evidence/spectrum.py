@@ -27,13 +27,13 @@ from palpate.identification.estimators.octaves import (
     segments_of,
     transform_of,
 )
-from palpate.identification.evidence.slope import Slope, slope_in, unseen
-from palpate.identification.in_series import slope_without_series
+from palpate.identification.evidence.slope import slope_in, unseen
+from palpate.identification.in_series import slopes_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
 from palpate.identification.tangents import Slopes
-from palpate.identification.uncertainty import Contribution, Measurement, student
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.types import NORMAL
 
 Complex = NDArray[np.complex128]
@@ -225,70 +225,67 @@ def working_point(
     surface (a probe that follows it, an inertia), and is passed over. A force that nothing explains, as where the probe
     bounces, is at every frequency at once: as much of it as is seen may be at the octave's own.
     """
-    lag, tolerance = problem.lag.value, options.tolerance
+    tolerance, bonded = options.tolerance, problem.contacts.bonded
     segments = segments_of(problem.motion.rows, problem.spans)
-    slope = slope_in(problem, segments)
-    if slope is not None and options.series_stiffness is not None:
-        series = options.series_stiffness, options.series_std
-        each = tuple(slope_without_series(Measurement(own, {}), *series).value for own in slope.each)
-        slope = replace(slope, stiffness=slope_without_series(slope.stiffness, *series), each=each)
-    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
-    depths = problem.motion.moved(0, lag)[inside]
-    octave = _octave_point(spectrum, tolerance)
-    if octave is None and slope is None:
-        return None
-    use_press = octave is None or (
-        slope is not None
-        and not octave.in_phase.known_to(tolerance)
-        and slope.stiffness.relative_half < octave.in_phase.relative_half
-    )
-    if use_press and slope is not None:
-        own, frequency, again = slope.stiffness, 0.25 / slope.rise, _again(slope)
-        force, depth = slope.force, slope.depth
+    press, octave = slope_in(problem, segments), _octave_point(spectrum, tolerance)
+    if press is not None and options.series_stiffness is not None:
+        press = slopes_without_series(press, options.series_stiffness, options.series_std)
+    if press is not None and (
+        octave is None
+        or (
+            not octave.in_phase.known_to(tolerance)
+            and press.stiffness.relative_half < octave.in_phase.relative_half
+        )
+    ):
+        found, source = press, "press"
+    elif octave is not None:
+        found, source = _at_octave(octave, problem, segments, hidden), "octave"
     else:
-        assert octave is not None
-        own, frequency, again = octave.in_phase, octave.frequency, None
-        force, depth = float(problem.force[inside].mean()), float(depths.mean())
-        depth *= abs(depth) > _ROUNDING * float(np.abs(depths).max())  # of a depth that counts from its mean
-        unseen_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
-        own = own.with_cause("unexplained", Contribution.within(unseen_force))
-    if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
-        own = own.with_cause("unseen way", Contribution.within(abs(own.value) * unseen(problem)))
+        return None
+    if bonded and not options.bonded:  # nothing tells that the first reading is in contact
+        reach = Contribution.within(abs(found.stiffness.value) * unseen(problem))
+        found = replace(found, stiffness=found.stiffness.with_cause("unseen way", reach))
     rest = 0.0 if problem.counted else problem.contacts.resting
-    contacts = problem.contacts
-    stiffness = _judge(own, options, unit)
-    against = ""
-    if not contacts.signed or (contacts.bonded and own.value < 0 and not options.bonded):
+    point = point_of(replace(found, force=found.force - rest), source, problem, options, unit)
+    falls = found.stiffness.value < 0 and not options.bonded
+    if not problem.contacts.signed or (bonded and falls):
         against = "the signs of force and position are not known (give --force-sign)"
-    elif own.value < 0 and not options.bonded:
+    elif falls:
         against = (
             "the force falls as the probe goes in: either the surface yields, or it moves, and then this is the"
             " stiffness of what holds the probe"
         )
-    if against:
-        reason = f"{stiffness.reason}; {against}"
-        stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
-    source = "press" if use_press else "octave"
-    return WorkingPoint(stiffness, force - rest, depth, float(frequency), source, again, not contacts.bonded)
+    else:
+        return point
+    reason = f"{point.stiffness.reason}; {against}"
+    return replace(point, stiffness=replace(point.stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason))
 
 
-def steady_point(found: Slopes, problem: Problem, options: Options, unit: str) -> WorkingPoint:
-    """The tangent of a press at constant speed, and the force and depth that it belongs to.
+def _at_octave(octave: DynamicStiffness, problem: Problem, segments: list[Segment], hidden: float) -> Slopes:
+    """The storage of an octave, where the contact is in the mean."""
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    depths = problem.motion.moved(0, problem.lag.value)[inside]
+    force, depth = float(problem.force[inside].mean()), float(depths.mean())
+    depth *= abs(depth) > _ROUNDING * float(np.abs(depths).max())  # of a depth that counts from its mean
+    hidden_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
+    own = octave.in_phase.with_cause("unexplained", Contribution.within(hidden_force))
+    return Slopes(force, depth, own, (own.value,), None, 0.25 / octave.frequency)
+
+
+def point_of(found: Slopes, source: str, problem: Problem, options: Options, unit: str) -> WorkingPoint:
+    """The working point of a stiffness, with a verdict.
 
     Args:
         found: at the force that is named.
+        source: octave or press.
         problem: of the log.
-        options: with the tolerance, and the stiffness in series with the surface.
+        options: with the tolerance and the calibration.
         unit: of a stiffness.
     """
-    own, again = found.stiffness, found.again
-    if options.series_stiffness is not None:
-        own = slope_without_series(own, options.series_stiffness, options.series_std)
-        again = None if again is None else (own.value / found.stiffness.value) ** 2 * again
-    interval = None if again is None else (own.value - again, own.value + again)
-    depth = found.depth - problem.origin
+    value, again = found.stiffness.value, found.again
+    interval = None if again is None else (value - again, value + again)
     return WorkingPoint(
-        _judge(own, options, unit), found.force, depth, 0.25 / found.rise, "press", interval,
+        _judge(found.stiffness, options, unit), found.force, found.depth, 0.25 / found.rise, source, interval,
         not problem.contacts.bonded,
     )  # fmt: skip
 
@@ -306,15 +303,6 @@ def _octave_point(spectrum: Sequence[DynamicStiffness], tolerance: float) -> Dyn
             kept.append(own)
     told = [own for own in kept if own.in_phase.known_to(tolerance)]
     return max(told or kept, key=lambda own: own.share, default=None)
-
-
-def _again(slope: Slope) -> tuple[float, float] | None:
-    """Where the slope of the next loading falls: t(n - 2) sqrt(between + own)."""
-    n = len(slope.each)
-    if n < 3:
-        return None
-    half = student(n - 2) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
-    return slope.stiffness.value - half, slope.stiffness.value + half
 
 
 def _judge(own: Measurement, options: Options, unit: str) -> Parameter:
