@@ -7,8 +7,8 @@ from identification.synthetic_contacts import coloured, force_of, press_path, re
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.identification.result import Identification, Press, Tangent, Verdict
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.result import Identification, Press, Tangent
+from palpate.identification.uncertainty import Measurement, Verdict
 
 MODULUS, NU = 2e5, 0.45
 REDUCED = MODULUS / (1 - NU**2)

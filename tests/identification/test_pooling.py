@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palpate.identification.pooling import pool, random_effects
-from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
+from palpate.identification.result import Identification, WorkingPoint
+from palpate.identification.uncertainty import Parameter, Verdict
 
 
 def parameter(value, half, unit="N/m", verdict=Verdict.IDENTIFIED):

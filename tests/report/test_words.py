@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.identification.causes import Code, Warn, cause_of
-from palpate.identification.result import (
-    DynamicStiffness,
-    Identification,
-    Parameter,
-    Traces,
-    Verdict,
-    WorkingPoint,
-)
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.result import DynamicStiffness, Identification, Traces, WorkingPoint
+from palpate.identification.uncertainty import Measurement, Parameter, Verdict
 from palpate.report.identification.words import limited_by, model_line, sentence
 from palpate.report.numbers import quantity, quantity_between
 

@@ -23,8 +23,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
-from palpate.identification.uncertainty import Contribution, half_width
+from palpate.identification.result import Identification, Press, Tangent
+from palpate.identification.uncertainty import Contribution, Parameter, Verdict, half_width
 from palpate.signals.types import NORMAL
 from palpate.units import unit
 

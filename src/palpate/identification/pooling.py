@@ -16,8 +16,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.result import Identification, Parameter, Verdict
-from palpate.identification.uncertainty import Contribution, Measurement, student
+from palpate.identification.result import Identification
+from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict, student
 from palpate.records import Result
 from palpate.signals.types import NORMAL
 

@@ -7,7 +7,8 @@ Welch's and Satterthwaite's (annex G.4), and the expanded uncertainty U = k u_c 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from itertools import combinations
 from math import hypot, isfinite
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.identification.causes import cause_of
+from palpate.records import Readable
 from palpate.signals.types import NORMAL
 
 _MOST_FREEDOM = 1e9
@@ -204,6 +206,111 @@ class Uncertainty:
             "standard_uncertainty": own.std,
             "degrees_of_freedom": _finite(own.freedom),
             "share": (own.std / self.combined) ** 2,
+        }
+
+
+class Verdict(StrEnum):
+    """How far to trust a parameter."""
+
+    IDENTIFIED = "identified"
+    NOT_IDENTIFIABLE = "not identifiable"
+    REJECTED = "rejected"
+
+
+_SMALL = 1e-3
+"""Share of a half-width below which a cause is not listed in the budget."""
+
+
+@dataclass(frozen=True)
+class Parameter(Readable):
+    """One parameter of the contact.
+
+    Args:
+        value, std: None where the log carries no number worth printing.
+        unit: in SI.
+        verdict: identified, not identifiable or rejected.
+        ci95: 95 % interval that holds whatever the model, also where `value` is None and the log bounds it; verdicts
+            rest on it.
+        reason: why.
+        ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
+        budget: half-width of `ci95` by cause, largest first; without what is under a thousandth of the whole.
+        contributions: to the combined standard uncertainty, by cause.
+    """
+
+    value: float | None
+    std: float | None
+    ci95: tuple[float, float] | None
+    unit: str
+    verdict: Verdict
+    reason: str
+    ci95_if_model_holds: tuple[float, float] | None = None
+    budget: dict[str, float] = field(default_factory=dict)
+    contributions: Contributions = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        value: float,
+        unit: str,
+        verdict: Verdict,
+        reason: str,
+        contributions: Contributions,
+    ) -> Parameter:
+        """A parameter with its interval and its budget.
+
+        Args:
+            value: of it.
+            unit: in SI.
+            verdict: on it.
+            reason: of that.
+            contributions: to its uncertainty, by cause.
+        """
+        whole = Uncertainty(contributions)
+        half = whole.expanded
+        share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
+        parts = {cause: share * part.std for cause, part in contributions.items()}
+        budget = {
+            cause: part for cause, part in sorted(parts.items(), key=lambda x: -x[1]) if part > _SMALL * half
+        }
+        ends = value - half, value + half
+        return cls(
+            value, half / NORMAL, ends, unit, verdict, reason, budget=budget, contributions=contributions
+        )
+
+    def without_number(
+        self,
+        reason: str,
+        verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
+        ci95: tuple[float, float] | None = None,
+    ) -> Parameter:
+        """The same without a value, and at most with bounds: its budget says why.
+
+        Args:
+            reason: why there is none.
+            verdict: on it.
+            ci95: bounds that the log still shows.
+        """
+        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
+        return replace(bare, verdict=verdict, reason=reason)
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """Combined and expanded uncertainty; None without a number, or where no cause is known."""
+        if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
+            return None
+        return Uncertainty(self.contributions)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values that JSON can hold."""
+        return {
+            "value": self.value,
+            "std": self.std,
+            "ci95": list(self.ci95) if self.ci95 else None,
+            "ci95_if_model_holds": list(self.ci95_if_model_holds) if self.ci95_if_model_holds else None,
+            "budget": self.budget,
+            "unit": self.unit,
+            "verdict": str(self.verdict),
+            "reason": self.reason,
         }
 
 

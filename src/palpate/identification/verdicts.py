@@ -13,9 +13,9 @@ from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag
-from palpate.identification.result import Parameter, Verdict, WorkingPoint
+from palpate.identification.result import WorkingPoint
 from palpate.identification.selection import Choice
-from palpate.identification.uncertainty import half_width
+from palpate.identification.uncertainty import Parameter, Verdict, half_width
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 

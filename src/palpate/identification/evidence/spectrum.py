@@ -31,9 +31,9 @@ from palpate.identification.evidence.slope import slope_in, unseen
 from palpate.identification.in_series import slopes_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
-from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
+from palpate.identification.result import DynamicStiffness, WorkingPoint
 from palpate.identification.tangents import Slopes
-from palpate.identification.uncertainty import Contribution, Measurement
+from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict
 from palpate.signals.types import NORMAL
 
 Complex = NDArray[np.complex128]

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from palpate.identification.result import Identification, Parameter, Traces, Verdict
+from palpate.identification.result import Identification, Traces
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import evidence_panels as evidence
 from palpate.report.identification import evidence_panels as fit
 from palpate.report.identification import evidence_panels as trust

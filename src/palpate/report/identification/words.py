@@ -11,7 +11,8 @@ from typing import Any
 from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.files import RECORD
 from palpate.identification.causes import Cause, Code, cause_of
-from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
+from palpate.identification.result import Identification, WorkingPoint
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.numbers import plain, quantity, quantity_between, with_half
 from palpate.text import printable
 
