@@ -66,8 +66,10 @@ def verdicts(
         point: the working point, with which K must agree.
         terms: how.
     """
+    steady = point is not None and choice.problem.contacts.press is not None
     found = against_working_point(choice.answer, point)
-    found = replace(found, budget=_with_presses(found, point))
+    if point is not None and steady and not found.fit.model.nonlinear:
+        found = replace(found, budget=_with_presses(found, point))
     scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
     found = found.with_cause("calibration", scales * found.theta)
     choice = replace(choice, answer=found)
@@ -80,7 +82,7 @@ def verdicts(
         parameters = {name: _refuse(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
         parameters = {name: _refuse(p, _UNTOUCHED) for name, p in parameters.items()}
-    if point is not None and choice.problem.contacts.press is not None and not found.fit.model.nonlinear:
+    if point is not None and steady and not found.fit.model.nonlinear:
         parameters = _of_press(parameters, point)
     return parameters, _warnings(parameters, found, lag, terms)
 
@@ -150,11 +152,12 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     return found.with_cause("dynamic stiffness", moved)
 
 
-def _with_presses(found: Answer, point: WorkingPoint | None) -> Budget:
-    """The budget of a linear answer, its stiffness no more certain than the presses of the log agree on theirs."""
-    apart = None if point is None else point.stiffness.contributions.get("repetition")
-    if apart is None or found.fit.model.nonlinear:
-        return found.budget
+def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
+    """The budget of a linear answer, its stiffness no more certain than presses at constant speed agree on theirs.
+
+    At constant speed neither a damping nor a mass makes the slopes of two presses differ.
+    """
+    apart = point.stiffness.contributions["repetition"]
     own, place = found.budget["repetition"], found.names.index("K")
     variance, freedom = own.variance.copy(), np.broadcast_to(own.freedom, own.variance.shape).copy()
     if apart.std**2 > variance[place]:
