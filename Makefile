@@ -5,6 +5,7 @@
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 THESIS := packages/palpate-thesis
+LABORATORY := packages/palpate-laboratory
 # The distributions beside palpate, which add commands to it.
 BESIDE := $(wildcard packages/*)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
@@ -80,7 +81,7 @@ laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and 
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
 	cp runs/laboratory/inferred.toml $(THESIS)/src/palpate_thesis/laboratory/shipped/inferred.toml
 	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --replace
-	$(BIN)/python $(THESIS)/benchmarks/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
+	$(BIN)/python $(LABORATORY)/benchmarks/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
 
 claims: .venv/dev.stamp ## measure the whole thesis again, say which claims changed, and keep what they are now for the tests
 	$(BIN)/palpate thesis --out runs/claims --replace

@@ -47,7 +47,7 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
 
 
-REAL_TIME = ROOT / "tests" / "wires"
+REAL_TIME = ROOT / "packages" / "palpate-wires" / "tests" / "wires"
 """A press over a wire runs against a clock: a machine that halts for half a second makes an arm late in truth, and the
 press ends as it should. So these may try again; a fault of ours fails each time. All others wait for a condition."""
 

@@ -21,7 +21,7 @@ from palpate.bench.tables import changed, parse
 from palpate.identification import identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
-from palpate_excitation import Budget, Design, HybridLoop, Problem, SurfaceRange, design
+from palpate_excitation import Budget, Design, DesignProblem, HybridLoop, SurfaceRange, design
 from palpate_excitation.report.table import experiment
 
 RUNS = 20
@@ -39,7 +39,7 @@ def designed(name: str, kind: str) -> Design:
     surfaces = SurfaceRange(*((value, value) for value in (s.stiffness, s.damping, s.mass)))
     loop = HybridLoop(gain=gains.kf, integral=1000 * gains.ki)
     asked = dict.fromkeys(NAMES, 0.1)
-    return design(Problem(surfaces, Budget(15.0, 20.0), asked, loop=loop, kind=kind, duration=20.0))
+    return design(DesignProblem(surfaces, Budget(15.0, 20.0), asked, loop=loop, kind=kind, duration=20.0))
 
 
 def errors(design_: Design, seed: int) -> dict[str, NDArray[np.float64]]:

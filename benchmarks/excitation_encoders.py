@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from palpate.identifiers import ContactIdentifier
 from palpate.references import Multisine
-from palpate_excitation import Budget, Design, KnownBandwidth, Problem, Sensors, SurfaceRange, design
+from palpate_excitation import Budget, Design, DesignProblem, KnownBandwidth, Sensors, SurfaceRange, design
 from palpate_excitation.spectra import ForceChain
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def designed(surface: tuple[float, float, float], step: float) -> Design:
     ranges = SurfaceRange(*((value, value) for value in surface))
     sensors = Sensors(CHAIN, position_step=step)
     asked, loop = dict.fromkeys(NAMES, 0.1), KnownBandwidth(60.0)
-    return design(Problem(ranges, Budget(15.0, 20.0), asked, sensors, loop, duration=SECONDS))
+    return design(DesignProblem(ranges, Budget(15.0, 20.0), asked, sensors, loop, duration=SECONDS))
 
 
 def signals(made: Design, begin: float) -> tuple[Array, Array]:

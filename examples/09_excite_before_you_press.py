@@ -10,13 +10,13 @@ from palpate.bench import build
 from palpate.bench.tables import parse
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
-from palpate_excitation import Budget, Problem, SurfaceRange, design
+from palpate_excitation import Budget, DesignProblem, SurfaceRange, design
 from palpate_excitation.report.table import experiment
 
 truth = {"K": 5200.0, "B": 200.0, "M": 0.3}
 surfaces = SurfaceRange(*((value, value) for value in truth.values()))
 precision = {"K": 0.05, "B": 0.05, "M": 0.2}
-found = design(Problem(surfaces, Budget(mean=15.0, peak=20.0), precision))
+found = design(DesignProblem(surfaces, Budget(mean=15.0, peak=20.0), precision))
 print(f"{len(found.wave.frequencies)} sines for {found.seconds:g} s")
 
 press = parse(experiment(found), "the design")  # the same text that `palpate excite --experiment` writes

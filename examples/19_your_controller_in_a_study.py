@@ -6,8 +6,8 @@ finds the module beside that file. A study is data: code that it names runs only
 
 from student import Damped
 
-from palpate.checks import controller_checks, outcomes
 from palpate.plugins import permit
+from palpate_checks import controller_checks, outcomes
 from palpate_studies import run
 from palpate_studies.pairing import comparisons
 from palpate_studies.plan import plan

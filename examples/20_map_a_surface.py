@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.maps import StiffnessMap
+from palpate_maps import StiffnessMap
 
 rng = np.random.default_rng(1)
 

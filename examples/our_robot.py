@@ -9,8 +9,7 @@ import time
 
 from palpate.force import load_arm
 from palpate.force.simulated_press import surface
-from palpate.wires import Command, LostError, Sense
-from palpate.wires.protocol import SILENCE, SilentError
+from palpate.wires import SILENCE, Command, LostError, Sense, SilentError
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm, ticks
 
 

@@ -32,12 +32,12 @@ from faulty_press import FAULTS as OF_THE_LAW
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-TESTS = ROOT / "tests" / "wires"
+TESTS = ROOT / "packages" / "palpate-wires" / "tests" / "wires"
 sys.path.insert(0, str(TESTS))
 from slow_cell import ALONE, WORDS, child, rows_came, slower_cell  # noqa: E402
 
 from palpate.logs import read_record  # noqa: E402
-from palpate.wires.outcome import UNITS  # noqa: E402
+from palpate_wires.outcome import UNITS  # noqa: E402
 
 STATE = ROOT / "build" / "wire-faults.json"
 WIRES = ("sim", "rtde", "franka", "ros2")

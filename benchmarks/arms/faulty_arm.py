@@ -124,7 +124,7 @@ def install(fault: Fault, trace) -> None:
 def stamped(module: str, fault: Fault) -> None:
     """Put the fault between the arm's clock and its protocol."""
     if module == "sim_arm":
-        from palpate.wires import sim
+        from palpate_wires import sim
 
         state = sim.state
         sim.state = lambda number, now, values: state(number, fault.stamp(now), values)
@@ -146,8 +146,8 @@ def stamped(module: str, fault: Fault) -> None:
 
         Controller.value = shown
     if module == "ros2_arm":
-        from palpate.wires import ros2_messages
         from palpate_rehearsal import ros2_arm
+        from palpate_wires import ros2_messages
 
         header, publish = ros2_messages.header, ros2_arm.Node.publish
 

@@ -19,7 +19,7 @@ import numpy as np
 from palpate._vector import ZERO3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import UNTOUCHED, touch
-from palpate.press.cell import Reading, Touch, body_at, compiled_tick
+from palpate.press.cell import Reading, TouchState, body_at, compiled_tick
 from palpate.press.engines import loop_of
 from palpate.press.setting import cell_of, place_of
 from palpate.robots import SerialArm
@@ -38,7 +38,7 @@ def own(name: str) -> Callable[[], float]:
     arm = SerialArm.named(name)
     place = place_of(arm, None, None, gap=-1e-4)
     cell = cell_of(arm, place, KelvinVoigt(5000.0, 50.0, 0.0), loop_of(name, arm.title, "torque", place.mass))
-    start = Touch(touch(UNTOUCHED, 0.0), Reading(ZERO3, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    start = TouchState(touch(UNTOUCHED, 0.0), Reading(ZERO3, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     cell = cell._replace(steps=STEPS)
     torque, noise = arm.gravity_torque(place.q), np.zeros(8)
 

@@ -25,10 +25,13 @@ HEAD = (
     " ended |"
 )
 ARM = (
-    'title = "a cell"\nrate = {rate}\n[inner]\nkind = "position"\nbandwidth = 1.5\ndamping = 1.0\n'
-    "delay = {delay}\nstiffness = 5e4\n[sensor]\nsampling = {rate}\nnoise = 0.1\nfull_scale = 100\n"
+    'title = "a cell"\nrate = {rate}\n[inner]\n{inner}[sensor]\nsampling = {rate}\nnoise = 0.1\nfull_scale = 100\n'
     "[limits]\nspeed = 0.25\nstiffness = 1e5\n"
 )
+INNER = {
+    "position": 'kind = "position"\nbandwidth = 1.5\ndamping = 1.0\ndelay = {delay}\nstiffness = 5e4\n',
+    "servo": 'kind = "servo"\nmass = 10\nstiffness = 5e3\ndamping = 1e3\ndelay = 0.1\n',
+}
 ROS2 = "?wrench=/ft/wrench&{place}&command=/command&as=twist&wrench-frame=tool&force-sign=reaction"
 ALONE = (
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="false"/></Interfaces>'
@@ -54,12 +57,13 @@ def said(*words: str) -> tuple[int, dict]:
     return code, json.loads(out.getvalue() or "{}")
 
 
-def row(name: str, seconds: float, folder: Path) -> str:
+def row(name: str, seconds: float, folder: Path, kind: str) -> str:
     module, where, address, rate = WIRES[name]
     own = folder / re.sub(r"\W+", "-", name)
     own.mkdir()
     # libfranka's loop has ten times the ticks in the same lag.
-    (own / "arm.toml").write_text(ARM.format(rate=rate, delay=0.1 if rate == 1000 else 0.05))
+    inner = INNER[kind].format(delay=0.1 if rate == 1000 else 0.05)
+    (own / "arm.toml").write_text(ARM.format(rate=rate, inner=inner))
     (own / "gains.toml").write_text(gains_for(load_arm(str(own / "arm.toml")), FORCE).to_toml())
     words = [sys.executable, "-m", f"palpate_rehearsal.{module}", "--arm", str(own / "arm.toml"), *where]
     with subprocess.Popen([*words, "--stiffness", str(STIFFNESS)], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
@@ -76,9 +80,8 @@ def row(name: str, seconds: float, folder: Path) -> str:
             arm.kill()
     late = told["lateness"]
     ms = [f"{1e3 * late[key]:.2f}" for key in ("p50_s", "p99_s", "p99.9_s", "most_s")]
-    _, found = said(
-        "identify", str(own / "record" / "record.parquet"), "--robot-stiffness", f"{SERIES:g}:1000"
-    )
+    series = ["--robot-stiffness", f"{SERIES:g}:1000"] if kind == "position" else []
+    _, found = said("identify", str(own / "record" / "record.parquet"), *series)
     K = found["parameters"]["K"]
     shown = f"{K['value']:.0f} ± {0.5 * (K['ci95'][1] - K['ci95'][0]):.0f}" if K["value"] else K["verdict"]
     force = "-" if told["force_N"] is None else f"{told['force_N']:.2f}"
@@ -90,12 +93,13 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--seconds", type=float, default=6.0)
     asked.add_argument("--wires", nargs="+", default=list(WIRES), choices=WIRES)
+    asked.add_argument("--kind", default="position", choices=INNER, help="of arm")
     words = asked.parse_args()
     os.environ.setdefault("CYCLONEDDS_URI", ALONE)
     print(HEAD, "|" + "---|" * HEAD.count(" | ") + "---|", sep="\n")
     with tempfile.TemporaryDirectory() as folder:
         for name in words.wires:
-            print(row(name, words.seconds, Path(folder)), flush=True)
+            print(row(name, words.seconds, Path(folder), words.kind), flush=True)
 
 
 if __name__ == "__main__":

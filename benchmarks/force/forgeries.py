@@ -20,7 +20,6 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force.arm import Arm, Limits, PositionLoop, Sensor, ServoLoop, TorqueLoop
 from palpate.force.boundary import radius
@@ -29,6 +28,7 @@ from palpate.force.certifying import proved_claim
 from palpate.force.claims import Claim, adapting_claims, held_claim, one_sided_claim
 from palpate.force.gains import Gains, gains_for
 from palpate.force.sampled_loop import SampledLoop, law_for
+from palpate_certify.force_certificate import RefusedError, check
 
 FORGERIES, LOOPS = 8, 10
 """Of each certificate, and drawn within each claim that passes."""

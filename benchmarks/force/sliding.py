@@ -2,6 +2,8 @@
 
     python benchmarks/force/sliding.py PART [--slides 300] [--arms ur5e fr3 iiwa14] [--seed 100]
 
+For `slides`, `servo-ur5e` and `servo-iiwa14` are those of benchmarks/arms/servo_world.py.
+
 The box: K 1 to 60 kN/m and speed 5 to 100 mm/s (even in the logarithm), mu 0 to 0.8, radius 60 to 500 mm, 8 to 30 N,
 noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes, along circles, there and back, 4 s
 each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (standard deviation, `near`); with
@@ -16,6 +18,8 @@ where the force is first held, with the same K_u; `leaderboard` has a row for ea
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
@@ -34,7 +38,8 @@ from palpate_slide.world import figures_of, simulate
 SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)
 STEPS = {"a step of 1 mm": 0.0, "the same, expected (`--step 1:mm`)": 1e-3}
-TITLES = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
+SHIPPED = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
+TITLES = SHIPPED | {"servo-ur5e": "UR5e, servos", "servo-iiwa14": "iiwa 14, servos"}
 STARTS = {"touches": "far, three touches", "far": "far", "near": "near"}
 
 
@@ -110,6 +115,16 @@ HEAD = [
 ]  # fmt: skip
 
 
+def arm_named(name):
+    """A shipped arm, or one of benchmarks/arms/servo_world.py."""
+    if not name.startswith("servo-"):
+        return load_arm(name)
+    sys.path.append(str(Path(__file__).parents[1] / "arms"))
+    from servo_world import arm_of
+
+    return arm_of(name.removeprefix("servo-"))
+
+
 def slides(args):
     """The law alone, in the simulation's own physics."""
     rows = []
@@ -117,7 +132,7 @@ def slides(args):
         for start in ("touches", "far", "near"):
             rng, found, inside = np.random.default_rng(args.seed), [], []
             for _ in range(args.slides):
-                gains, ground, ways, into, seed, terms = drawn(load_arm(arm), rng, start)
+                gains, ground, ways, into, seed, terms = drawn(arm_named(arm), rng, start)
                 found.append(figures_of(simulate(gains, ground, ways, into=into, seed=seed), gains, ground))
                 inside.append(obeys(terms))
             rows.append([f"{TITLES[arm]}, {STARTS[start]}", f"{len(found)}", *numbers_of(found, inside)])
@@ -234,7 +249,7 @@ def main():
     )
     parser.add_argument("part", choices=PARTS)
     parser.add_argument("--slides", type=int, default=300, help="of each row")
-    parser.add_argument("--arms", nargs="+", default=list(TITLES), choices=TITLES)
+    parser.add_argument("--arms", nargs="+", default=list(SHIPPED), choices=TITLES)
     parser.add_argument("--seed", type=int, default=100)
     args = parser.parse_args()
     PARTS[args.part](args)

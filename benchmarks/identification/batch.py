@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from presses import log_of
 
-from palpate.bench import ForceSensor, given_motion, load
+from palpate.bench import ForceSensorTable, given_motion, load
 from palpate.environments import KelvinVoigt
 from palpate.identification import Identification, identify
 from palpate.logs import read_log, write_record
@@ -58,7 +58,7 @@ def press(rows: int, seed: int) -> tuple[Record, LowPass, float]:
     """A log of the motion, with the force sensor's low-pass and its whole lag [s]."""
     nominal = load("foam-chirp").surface
     surface = KelvinVoigt(nominal.stiffness, nominal.damping, nominal.mass)
-    record = given_motion(surface, sensor=ForceSensor(phase=0.0011)).run(path(rows, surface), seed=seed)
+    record = given_motion(surface, sensor=ForceSensorTable(phase=0.0011)).run(path(rows, surface), seed=seed)
     told = record.meta["instruments"]["force"]
     low_pass = LowPass.parse(told["filter"])
     return log_of(record), low_pass, low_pass.lag + told["delay_s"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from presses import FIELDS, NAMES, SPREAD, log_of
 
-from palpate.bench import ForceSensor, given_motion, load
+from palpate.bench import ForceSensorTable, given_motion, load
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
@@ -145,7 +145,7 @@ def poor_log(kind: str, material: str, seed: int) -> PoorLog:
     rng = np.random.default_rng([seed, list(KINDS).index(kind), SURFACES.index(material)])
     surface = _surface(material, rng)
     motion = KINDS[kind].drawn(rng, surface)
-    rig = given_motion(surface, sensor=ForceSensor(phase=float(rng.uniform(0.0, 1.0 / SAMPLING))))
+    rig = given_motion(surface, sensor=ForceSensorTable(phase=float(rng.uniform(0.0, 1.0 / SAMPLING))))
     record = rig.run(motion.path, motion.duration, seed=int(rng.integers(2**31)))
     told = record.meta["instruments"]["force"]
     low_pass = LowPass.parse(told["filter"])

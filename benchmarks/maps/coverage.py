@@ -20,7 +20,7 @@ from itertools import chain
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from palpate.maps import StiffnessMap
+from palpate_maps import StiffnessMap
 
 SIDE, PIXELS = 0.1, 100
 CENTRES = (np.arange(PIXELS) + 0.5) / PIXELS * SIDE

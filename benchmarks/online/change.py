@@ -18,7 +18,7 @@ import numpy as np
 from others import Filterpy, Padasip
 from pressing import NOISE, START, TONES, VAGUE, Array, followed, motion, regressors, samples_to_know
 
-from palpate.bench import ForceSensor, given_motion
+from palpate.bench import ForceSensorTable, given_motion
 from palpate.environments import KelvinVoigt
 from palpate.identifiers import (
     ContactIdentifier,
@@ -99,7 +99,7 @@ def record_of(kind: str, seed: int) -> Record:
     x, _ = motion(random, kind, round(SECONDS * LOOP), LOOP)
     soft, hard = (KelvinVoigt(K, B, 0.1) for B, K in (BEFORE, AFTER))
     rig = given_motion(
-        [(0.0, soft), (CHANGE, hard)], sensor=ForceSensor(phase=random.uniform(0.0, 1.0 / RATE))
+        [(0.0, soft), (CHANGE, hard)], sensor=ForceSensorTable(phase=random.uniform(0.0, 1.0 / RATE))
     )
     return rig.run(x, seed=seed)
 

@@ -61,11 +61,12 @@ def read_log(path: Any, **options: Any) -> Record:
         return read(path, **options)
 
 
-def pool(logs: Sequence[Any], **options: Any) -> Pooled:
+def pool(logs: Sequence[Any], covariates: Mapping[str, Any] | None = None, **options: Any) -> Pooled:
     """One stiffness, damping and mass of many presses, with an interval for the next press.
 
     Args:
         logs: identifications, records, or logs that `palpate.identify` takes.
+        covariates: by name, one number of each log, such as its temperature: the dependence on each is pooled, too.
         options: for those that are not identified yet, see `palpate.identify`.
 
     Raises:
@@ -81,7 +82,7 @@ def pool(logs: Sequence[Any], **options: Any) -> Pooled:
         for log in logs
     ]
     with _in_python():
-        return pool_found(results)
+        return pool_found(results, covariates=covariates)
 
 
 def _fit(record: Record, options: dict[str, Any]) -> Identification:

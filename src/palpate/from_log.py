@@ -8,7 +8,14 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from palpate.contact_frame import Arm, ContactFrame, Payload, identify_contact, load_payload, robot_stiffness
+from palpate.contact_frame import (
+    ArmDynamics,
+    ContactFrame,
+    Payload,
+    identify_contact,
+    load_payload,
+    robot_stiffness,
+)
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification, identify
 from palpate.identification.indenter import Indenter, with_modulus
@@ -38,7 +45,7 @@ class LogIdentifier:
 
     signals: Signals = field(default_factory=Signals)
     frame: ContactFrame = field(default_factory=ContactFrame)
-    arm: Arm = field(default_factory=Arm)
+    arm: ArmDynamics = field(default_factory=ArmDynamics)
     payload: Payload | None = None
     wall: Path | None = None
     indenter: Indenter | None = None
@@ -85,7 +92,7 @@ class LogIdentifier:
         return replace(self, signals=signals, frame=frame, arm=arm), others.get("read_as", "")
 
 
-def _between(job: LogIdentifier, known: dict[str, Any], samples: bool) -> Arm:
+def _between(job: LogIdentifier, known: dict[str, Any], samples: bool) -> ArmDynamics:
     """The arm; with the stiffness from a press on a wall, if one is given."""
     if job.wall is None:
         return job.arm
@@ -124,7 +131,7 @@ def identify_log(path: str | Path, **options: Any) -> Identification:
     Raises:
         InputError: the log or an option is wrong, or something would have to be guessed, in one line.
     """
-    known = {f.name for kind in (Signals, ContactFrame, Arm) for f in fields(kind)} - {"stiffness"}
+    known = {f.name for kind in (Signals, ContactFrame, ArmDynamics) for f in fields(kind)} - {"stiffness"}
     for name in options:
         if name not in known | _OWN | {*signature(identify).parameters}:
             raise unknown("option", name, known | _OWN | {*signature(identify).parameters})
@@ -146,7 +153,7 @@ def log_identifier(options: Mapping[str, Any]) -> LogIdentifier:
     payload = load_payload(Path(payload)) if isinstance(payload, str | Path) else payload
     frame = ContactFrame(**take(*ContactFrame.__dataclass_fields__))
     wall, shape = given.pop("robot_stiffness_from", None), given.pop("indenter", None)
-    arm = Arm(
+    arm = ArmDynamics(
         stiffness=given.pop("robot_stiffness", None),
         mass=given.pop("robot_mass", None),
         tool_mass=given.pop("tool_mass", payload.beyond if payload else None),

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.bench import ForceSensor
+from palpate.bench import ForceSensorTable
 from palpate.bench.given_motion import COLUMNS, given_motion
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState
@@ -26,7 +26,7 @@ SURFACES = {
     "massless": KelvinVoigt(5200, 200, 0),
 }
 OMEGA = 2 * np.pi * 10.0
-IDEAL = {"sensor": ForceSensor(noise=0.0, bits=32), "resolution": 0.0}
+IDEAL = {"sensor": ForceSensorTable(noise=0.0, bits=32), "resolution": 0.0}
 CODE = 200.0 / 2**15
 """Of the converter that reads the sensor's line [N]."""
 
@@ -70,7 +70,7 @@ def test_its_error_falls_with_the_square_of_the_step():
 
 def test_the_reading_is_the_filtered_force_of_its_sample():
     """A sine in steady state: gain and phase of a continuous Butterworth, at the instants that the record states."""
-    rig = given_motion(FOAM, sensor=ForceSensor(noise=0.0, bits=32, phase=4e-4), resolution=0.0)
+    rig = given_motion(FOAM, sensor=ForceSensorTable(noise=0.0, bits=32, phase=4e-4), resolution=0.0)
     fine = rig.line._replace(converter=Converter(32, 200.0))
     record = replace(rig, line=fine).run(sine, 3.0)
     told = record.meta["instruments"]["force"]
@@ -151,7 +151,7 @@ def test_noise_is_there_from_the_first_reading_on():
 
 @pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
 def test_compiled_is_plain_to_the_bit(surface):
-    rig = given_motion([(0.0, surface), (0.05, RUBBER)], sensor=ForceSensor(phase=1e-3))
+    rig = given_motion([(0.0, surface), (0.05, RUBBER)], sensor=ForceSensorTable(phase=1e-3))
     one, other = rig.run(sine, 0.1, 1), rig.run(sine, 0.1, 1, compiled=False)
     for name in COLUMNS:
         np.testing.assert_array_equal(one[name], other[name])
@@ -250,7 +250,7 @@ BAD = {
     "order": (lambda _: given_motion([(0.0, FOAM), (0.0, RUBBER)]), r"growing times \[s\], the first at 0"),
     "late": (lambda _: given_motion([(1.0, FOAM)]), r"growing times .*, got \[1.0\]"),
     "no surface": (lambda _: given_motion([]), r"growing times .*, got \[\]"),
-    "phase": (lambda _: given_motion(FOAM, sensor=ForceSensor(phase=1.0)), "phase must be at least 0"),
+    "phase": (lambda _: given_motion(FOAM, sensor=ForceSensorTable(phase=1.0)), "phase must be at least 0"),
     "rate": (lambda _: given_motion(FOAM, rate=0), "rate must be at least 1, got 0"),
     "resolution": (lambda _: given_motion(FOAM, resolution=-1.0), "resolution must be at least 0"),
 }

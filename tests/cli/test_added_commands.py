@@ -109,3 +109,14 @@ def test_a_scene_without_the_distribution_of_simulators_says_how_to_get_it(monke
     assert printed.out == ""
     assert printed.err.count("\n") == 1
     assert printed.err.endswith("which is not installed: pip install palpate-export\n")
+
+
+@pytest.mark.parametrize("option", ["map", "wire"])
+def test_an_option_whose_distribution_is_missing_says_how_to_get_it(monkeypatch, capsys, option):
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: ())
+    words = ["--arm", "ur5e", "--force", "5:N"] if option == "map" else []
+    assert main(["press", f"--{option}", "there", *words]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
+    assert printed.err.endswith(f"which is not installed: pip install palpate[{option}s]\n")

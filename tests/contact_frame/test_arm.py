@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import pressed, record, shaken
-from palpate.contact_frame import Arm, describe, identify_contact, robot_stiffness
+from palpate.contact_frame import ArmDynamics, describe, identify_contact, robot_stiffness
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
 
@@ -17,7 +17,7 @@ KNOWN = {"lag": 0.0, "model": "kelvin-voigt-mass"}
 def test_the_tool_is_taken_out_of_the_mass():
     """f = (M + tool) a + ...: what is fitted is both."""
     both, _ = identify_contact(shaken(m=1.5), **KNOWN)
-    alone, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(1.0, 0.0)), **KNOWN)
+    alone, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(1.0, 0.0)), **KNOWN)
     fitted, left = both.parameters["M"], alone.parameters["M"]
     assert left.value == pytest.approx(fitted.value - 1.0)
     assert left.ci95 == pytest.approx([end - 1.0 for end in fitted.ci95])
@@ -27,15 +27,15 @@ def test_the_tool_is_taken_out_of_the_mass():
 
 
 def test_the_tool_s_own_uncertainty_widens_the_interval():
-    sure, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(1.0, 0.0)), **KNOWN)
-    vague, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(1.0, 0.05)), **KNOWN)
+    sure, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(1.0, 0.0)), **KNOWN)
+    vague, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(1.0, 0.05)), **KNOWN)
     one, two = sure.parameters["M"], vague.parameters["M"]
     assert two.std == pytest.approx(np.hypot(one.std, 0.05))
     assert (two.ci95[1] - two.ci95[0]) / two.std == pytest.approx((one.ci95[1] - one.ci95[0]) / one.std)
 
 
 def test_a_mass_that_is_lost_beside_the_tool_s_is_not_identified():
-    found, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(1.49, 0.02)), **KNOWN)
+    found, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(1.49, 0.02)), **KNOWN)
     left = found.parameters["M"]
     assert left.verdict is Verdict.NOT_IDENTIFIABLE
     assert left.value is None
@@ -43,7 +43,7 @@ def test_a_mass_that_is_lost_beside_the_tool_s_is_not_identified():
 
 
 def test_a_mass_that_the_tool_nearly_makes_is_wider_than_it_may_be():
-    found, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(1.3, 0.04)), **KNOWN)
+    found, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(1.3, 0.04)), **KNOWN)
     left = found.parameters["M"]
     assert left.verdict is Verdict.NOT_IDENTIFIABLE
     assert left.value == pytest.approx(0.2, abs=0.05)
@@ -51,7 +51,7 @@ def test_a_mass_that_the_tool_nearly_makes_is_wider_than_it_may_be():
 
 
 def test_a_tool_heavier_than_all_is_rejected():
-    found, _ = identify_contact(shaken(m=1.5), arm=Arm(tool_mass=(2.0, 0.01)), **KNOWN)
+    found, _ = identify_contact(shaken(m=1.5), arm=ArmDynamics(tool_mass=(2.0, 0.01)), **KNOWN)
     assert found.parameters["M"].verdict is Verdict.REJECTED
     assert found.parameters["M"].value is None
     assert "is the tool that heavy" in found.parameters["M"].reason
@@ -68,8 +68,8 @@ def test_a_press_on_a_rigid_wall_is_the_arm():
     wall = identify(in_series(40e3, k=4e7, b=0.0, noise=0.02, seed=3), model="kelvin-voigt", lag=0.0)
     arm = robot_stiffness(wall, "wall.csv")
     assert arm[0] == pytest.approx(40e3, rel=0.01)
-    soft, _ = identify_contact(in_series(40e3), arm=Arm(position_from="joints"), lag=0.0)
-    calibrated = Arm(position_from="joints", stiffness=arm)
+    soft, _ = identify_contact(in_series(40e3), arm=ArmDynamics(position_from="joints"), lag=0.0)
+    calibrated = ArmDynamics(position_from="joints", stiffness=arm)
     found, along = identify_contact(in_series(40e3), arm=calibrated, lag=0.0)
     assert soft.parameters["K"].value == pytest.approx(1 / (1 / 5000 + 1 / 40e3), rel=0.05)
     own = found.parameters["K"]
@@ -81,7 +81,7 @@ def test_a_press_on_a_rigid_wall_is_the_arm():
 
 
 def test_a_high_stiffness_of_joints_is_a_lower_bound():
-    found, _ = identify_contact(in_series(40e3), arm=Arm(position_from="joints"))
+    found, _ = identify_contact(in_series(40e3), arm=ArmDynamics(position_from="joints"))
     stiffness = found.parameters["K"]
     assert "series-compliance" in found.codes
     assert stiffness.verdict is Verdict.NOT_IDENTIFIABLE
@@ -93,9 +93,9 @@ def test_a_high_stiffness_of_joints_is_a_lower_bound():
 
 
 def test_a_low_one_stands_and_a_tip_s_is_not_doubted():
-    soft, _ = identify_contact(pressed(k=300, b=3, noise=0.002), arm=Arm(position_from="joints"))
+    soft, _ = identify_contact(pressed(k=300, b=3, noise=0.002), arm=ArmDynamics(position_from="joints"))
     assert soft.parameters["K"].verdict is Verdict.IDENTIFIED
-    tip, _ = identify_contact(pressed(), arm=Arm(position_from="tip"))
+    tip, _ = identify_contact(pressed(), arm=ArmDynamics(position_from="tip"))
     assert "series-compliance" not in tip.codes
 
 
@@ -108,8 +108,8 @@ def test_a_log_that_shows_no_stiffness_calibrates_nothing():
 
 def test_a_negative_mass_is_refused():
     with pytest.raises(InputError, match="tool's mass must be 0 kg or more"):
-        Arm(tool_mass=(-1.0, 0.0))
+        ArmDynamics(tool_mass=(-1.0, 0.0))
     with pytest.raises(InputError, match="robot's mass must be 0 kg or more"):
-        Arm(mass=(-1.0, 0.0))
+        ArmDynamics(mass=(-1.0, 0.0))
     with pytest.raises(InputError, match="give --robot-stiffness too"):
-        identify_contact(in_series(40e3), arm=Arm(mass=(1.0, 0.0)))
+        identify_contact(in_series(40e3), arm=ArmDynamics(mass=(1.0, 0.0)))

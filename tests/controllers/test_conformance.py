@@ -5,10 +5,10 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build, changed
-from palpate.checks import controllers as laws
-from palpate.checks.controllers import TICK, WALL
 from palpate.controllers import ControllerTable
 from palpate.signals.types import example, kinds
+from palpate_checks import controllers as laws
+from palpate_checks.controllers import TICK, WALL
 
 each = pytest.mark.parametrize(
     "table", [example(kind) for kind in kinds(ControllerTable)], ids=lambda t: t.__struct_config__.tag

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.checks import surfaces as laws
-from palpate.checks.surfaces import DT, press, recover
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, SurfaceState, join, touch
 from palpate.environments.surface import alone, members
+from palpate_checks import surfaces as laws
+from palpate_checks.surfaces import DT, press, recover
 
 SURFACES = {
     "foam, solid": StandardLinearSolid(5600, 13, 0.02, 6900, 0.23),

@@ -7,9 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
-from palpate.checks.force_certificate import RefusedError, check
 from palpate.errors import InputError
-from palpate.force import ForceLoop, SlidingLoop
 from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
 from palpate.force.arm import Limits as ArmLimits
 from palpate.force.boundary import radius
@@ -22,7 +20,10 @@ from palpate.force.law import lead_speed
 from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
-from palpate.wires import Limits, Task, checked
+from palpate.force.sliding.paths import directions
+from palpate_certify.force_certificate import RefusedError, check
+from palpate_slide.ground import ground_of
+from palpate_slide.world import figures_of, simulate
 
 
 @pytest.fixture(scope="module")
@@ -204,9 +205,14 @@ def test_it_is_read_from_a_file(gains):
     assert parse_arm(text, "here").kind == "servo"
 
 
-def test_what_does_not_cover_a_servo_refuses_it(gains):
-    with pytest.raises(InputError, match="a slide of a servo is not covered"):
-        SlidingLoop(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)))
-    task = Task(force=15.0, direction=(0.0, 0.0, -1.0), hold=1.0, retreat=0.01)
-    with pytest.raises(InputError, match="the adapting gain of a servo is not proved"):
-        checked(ForceLoop(gains), task, Limits(force=40.0, speed=0.05, travel=0.01, seconds=20.0))
+@pytest.mark.parametrize(("K", "speed", "R"), [(18e3, 0.09, 0.09), (6e3, 0.08, -0.09)])
+def test_a_slide_leads_by_the_lag_of_free_motion_where_the_surface_bends(gains, K, speed, R):
+    """With the lead of a press there, for K_u, it lifts off or digs in by the lag that is left, up to 20 % of F_d."""
+    slow = gains_for(gains.arm, 20.0, cap=2.0 * K)
+    curved = replace(slow, slide=Slide(speed=speed, mu_max=0.9, slope=0.04, radius=abs(R)))
+    ground = ground_of("sphere" if R > 0.0 else "bowl", abs(R), K, friction=0.4)
+    ways = directions("circle", 2.0, gains.arm.rate, speed, 0.03)
+    found = figures_of(simulate(curved, ground, ways, into=[0.03, 0.02, -1.0]), curved, ground)
+    assert found.obeys
+    assert found.most < 0.06
+    assert min(found.cone, found.friction, found.stiffness) > 0.9

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from palpate.checks.force_certificate import RefusedError, check, check_slide
 from palpate.force.arm import load_arm
 from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.sampled_loop import Law
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.slide_proof import MISALIGNED, gain_factors, slide_proof
+from palpate_certify.force_certificate import RefusedError, check, check_slide
 
 MU_MAX = 0.9
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.bench import ForceSensor, GivenMotion, given_motion
+from palpate.bench import ForceSensorTable, GivenMotion, given_motion
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
@@ -63,7 +63,7 @@ PATHS = {"chirp": press_and_chirp, "steps": press_in_steps}
 def rig(seed: int = 0, surface: KelvinVoigt = FOAM, resolution: float = 0.0, **sensor: float) -> GivenMotion:
     """True position, the sensor's noise of 0.6 N, and a phase of the sensor's clock that goes with the seed."""
     phase = float(np.random.default_rng([seed, 7]).uniform(0, 1 / SAMPLING))
-    return given_motion(surface, resolution=resolution, sensor=ForceSensor(**{"phase": phase, **sensor}))
+    return given_motion(surface, resolution=resolution, sensor=ForceSensorTable(**{"phase": phase, **sensor}))
 
 
 def sensor_log(

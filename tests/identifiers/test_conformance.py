@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 
 import palpate.identifiers as room
-from palpate.checks import identifiers as laws
-from palpate.checks.identifiers import NOISE, TRUTH, answers
-from palpate.checks.identifiers import foam as press
 from palpate.errors import InputError
 from palpate.identifiers import (
     ContactIdentifier,
@@ -20,6 +17,9 @@ from palpate.identifiers import (
     RestartingLeastSquares,
     SIFt,
 )
+from palpate_checks import identifiers as laws
+from palpate_checks.identifiers import NOISE, TRUTH, answers
+from palpate_checks.identifiers import foam as press
 
 START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])
 NAMES = ("M", "B", "K")

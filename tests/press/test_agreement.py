@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.force import ForceLoop
 from palpate.press.engines import gains_for, loop_of
-from palpate.press.pressing import Cautious, press
+from palpate.press.pressing import press
+from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.tool import Plan
 from palpate.robots import SerialArm
 
 NAMES = ("ur5e", "panda", "fr3", "iiwa14")
@@ -23,7 +24,8 @@ def pressed(name, physics, mode="torque", resolution=0.0, nudge=0.0, stiffness=5
     cell = cell_of(arm, place, KelvinVoigt(stiffness, 50.0, 0.0), loop)
     simulated = SimulatedArm(arm, loop, place, cell, physics, 0, resolution)
     simulated._body.q[0] += nudge
-    return press(simulated, Cautious(simulated, gains, place.normal), place, Plan(20.0, seconds, 0.0))
+    driver = CautiousDriver(simulated, ForceLoop(gains), place.normal)
+    return press(simulated, driver, place, Plan(20.0, seconds, 0.0))
 
 
 def difference(one, other, column="force"):

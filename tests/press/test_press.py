@@ -13,15 +13,16 @@ from palpate import read_log
 from palpate._vector import ZERO3, Mat3
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate.force import ForceLoop
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, read_sensor
 from palpate.press.prepare import Question, arm_of, prepare_press, surface_of
-from palpate.press.pressing import Cautious, press
+from palpate.press.pressing import press
+from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
-from palpate.press.tool import Command, Plan
 from palpate.robots.serial.from_toml import names
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
@@ -139,45 +140,39 @@ def test_the_folder_and_what_is_printed(tmp_path, capsys):
 
 
 def simulated(arm="fr3", **changes):
-    """A press that is over soon: the arm, its pilot, its place."""
+    """A press that is over soon: the arm, its driver, its place."""
     asked = prepare_press(question(arm=arm)).asked
     robot = replace(asked.arm, **changes)
     cell = cell_of(robot, asked.place, asked.surface, asked.gains.arm)
     one = SimulatedArm(robot, asked.gains.arm, asked.place, cell)
-    return one, Cautious(one, asked.gains, asked.place.normal), asked.place
+    return one, CautiousDriver(one, ForceLoop(asked.gains), asked.place.normal), asked.place
 
 
 def test_it_ends_at_the_end_of_a_joints_range():
     home = prepare_press(question()).asked.arm.home
-    one, pilot, place = simulated(lower=home - 1e-4, upper=home + 1e-4)
-    record = press(one, pilot, place, Plan(20.0, 1.0))
+    one, driver, place = simulated(lower=home - 1e-4, upper=home + 1e-4)
+    record = press(one, driver, place, Plan(20.0, 1.0))
     assert record.meta["end"] == "joint limit"
     assert "reached the end of its range" in record.meta["why"]
 
 
 def test_it_gives_up_where_there_is_no_surface():
-    one, pilot, place = simulated()
-    record = press(one, pilot, place, Plan(20.0, 1.0, longest=0.05))
+    one, driver, place = simulated()
+    record = press(one, driver, place, Plan(20.0, 1.0, longest=0.05))
     assert record.meta["end"] == "no contact"
     assert len(record) == 50
 
 
 def test_an_interrupted_press_keeps_what_there_is():
-    one, pilot, place = simulated()
+    one, driver, place = simulated()
 
     def progress(time, phase):
         if time > 0.3:
             raise KeyboardInterrupt
 
-    record = press(one, pilot, place, Plan(20.0, 1.0), progress)
+    record = press(one, driver, place, Plan(20.0, 1.0), progress)
     assert record.meta["end"] == "interrupted"
     assert len(record) == 400
-
-
-@pytest.mark.parametrize(("velocity", "pose"), [(None, None), (np.zeros(6), np.eye(4))])
-def test_a_command_is_one_of_two(velocity, pose):
-    with pytest.raises(InputError, match="either a velocity or a pose"):
-        simulated()[0].write(Command(velocity, pose))
 
 
 def test_a_commanded_pose_is_reached():
@@ -186,9 +181,9 @@ def test_a_commanded_pose_is_reached():
     goal = place.pose.copy()
     goal[:3, 3] -= 0.002 * place.normal
     for _ in range(500):
-        one.write(Command(pose=goal))
-    assert one.read().pose[:3, 3] == pytest.approx(goal[:3, 3], abs=1e-5)
-    assert one.read().pose == pytest.approx(goal, abs=1e-4)
+        one.move_to(goal)
+    assert one.read().position == pytest.approx(goal[:3, 3], abs=1e-5)
+    assert one.pose == pytest.approx(goal, abs=1e-4)
 
 
 def test_a_place_and_a_normal_of_ones_own():

@@ -13,7 +13,7 @@ from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.press.setting import cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
-from palpate.press.tool import Command, held_tool, with_tool
+from palpate.press.tool import held_tool, with_tool
 from palpate.report.press import notes
 from palpate.robots import SerialArm
 
@@ -83,7 +83,7 @@ def test_in_the_air_the_reading_follows_the_acceleration_of_the_tools_centre(phy
     for k in range(300):
         goal[2, 3] = asked.place.pose[2, 3] + 0.004 * np.sin(2 * np.pi * 4.0 * k * 1e-3)
         goal[:3, :3] = asked.place.pose[:3, :3]
-        arm.write(Command(pose=goal))
+        arm.move_to(goal)
         pose = asked.arm.forward_kinematics(arm.truth.q)
         centre.append((pose[:3, :3] @ np.array(TOOL.centre) + pose[:3, 3]) @ asked.place.normal)
         reading.append(arm.read().force[2] * asked.place.normal[2])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from palpate.contact_frame import Arm
+from palpate.contact_frame import ArmDynamics
 from palpate.contact_frame.arm import with_arm
 from palpate.identification import Code, Parameter, Verdict, Warn
 from palpate.identification.indenter import Indenter, with_modulus
@@ -70,7 +70,7 @@ def test_a_log_without_contact_names_what_to_check():
 
 
 def test_a_stiffness_behind_the_joints_is_a_lower_bound_everywhere():
-    found = with_arm(OUTCOMES["identified"](), Arm(position_from="joints"), 0.25, from_pose=True)
+    found = with_arm(OUTCOMES["identified"](), ArmDynamics(position_from="joints"), 0.25, from_pose=True)
     lines = printed(found)
     assert "stiffness of surface and arm in series   ! lower bound of the surface" in lines[0]
     assert "give --robot-stiffness" in lines[1]

@@ -8,7 +8,8 @@ import pytest
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate_certify import DelayedContact, certify_controller
+from palpate_certify.controller_file import certify_controller
+from palpate_certify.delayed_contact import DelayedContact
 
 ADMITTANCE = """\
 test_admittance_controller:

@@ -23,9 +23,8 @@ from scipy.linalg import expm
 from palpate.arrays import Array
 from palpate.controllers import Neural
 from palpate.force.lyapunov import common
-from palpate_thesis.direct_neural import direct_neural
 from palpate_thesis.figures.fig_4_03 import TICK, TIP, LoopParameters
-from palpate_thesis.one_joint import JOINT_2
+from palpate_thesis.one_joint import JOINT_2, direct_neural
 
 LOW, HIGH, SHARE = 300.0, 3e6, 0.99
 """Softest surface and stiffest that is looked at [N/m], and how far up the exact interval the proof goes."""
@@ -61,7 +60,7 @@ def laws() -> list[ForceLaw]:
     lever = JOINT_2.lever
     own = direct_neural()
     start = own.start()
-    own.step(start, 20.0, 20.0)  # no error, nothing is learned
+    own.step(start, 20.0, 20.0, 0.0)  # no error, nothing is learned
     direct = own.gain(start) / lever
     network = Neural.thesis().network
     state = network.start()

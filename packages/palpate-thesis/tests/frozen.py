@@ -1,7 +1,7 @@
 """Every claim's verdict and numbers as they were last measured, and what has changed since.
 
 `make claims` takes a whole measurement of `palpate thesis` into runs/claims, and
-`python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it.
+`python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it; of some figures alone, those.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from palpate_thesis.claims import ThesisClaim
+from palpate_thesis.figure import studies
 from palpate_thesis.measure import STATE
 
 FILE = Path(__file__).with_name("claims.json")
@@ -74,13 +75,16 @@ def kept() -> dict[str, dict[str, str]]:
 def main(folder: str) -> None:
     """Keep a measurement, and say what is not what it was."""
     done = json.loads((Path(folder) / STATE).read_text("utf-8"))["done"]
-    studies = {number: [ThesisClaim(**claim) for claim in one["claims"]] for number, one in done.items()}
+    measured = {number: [ThesisClaim(**claim) for claim in one["claims"]] for number, one in done.items()}
     before = kept()
-    for number, claims in studies.items():
+    for number, claims in measured.items():
         for line in differences(before.get(number, {}), claims):
             sys.stdout.write(f"{line}\n")
-    new = {number: {claim.id: told(claim) for claim in claims} for number, claims in studies.items()}
-    FILE.write_text(json.dumps(new, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    new = before | {
+        number: {claim.id: told(claim) for claim in claims} for number, claims in measured.items()
+    }
+    kept_now = {one.NUMBER: new[one.NUMBER] for one in studies() if one.NUMBER in new}
+    FILE.write_text(json.dumps(kept_now, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
 if __name__ == "__main__":

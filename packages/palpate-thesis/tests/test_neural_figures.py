@@ -13,7 +13,7 @@ from palpate_studies.metrics.window import SETTLE
 from palpate_thesis.conditions import move_wall, rougher, stops_holding
 from palpate_thesis.explanations import e2_integrator, e3_divergence
 from palpate_thesis.figure import study
-from palpate_thesis.figures import fig_6_10, fig_6_14, fig_6_15, fig_6_17
+from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_14, fig_6_15
 from palpate_thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -137,8 +137,8 @@ def test_an_error_that_changes_sign_is_still_an_error():
 @pytest.mark.parametrize("adapts", [1.0, 4.0])
 def test_the_time_of_adapting_is_found(adapts):
     record = pressed(lambda t, d: d - np.where(t < adapts, 5.0, 0.0), seconds=20.0)
-    assert fig_6_17.adapted_at(fig_6_17.away_from_settled(record)) == pytest.approx(
-        adapts, abs=fig_6_17.SMOOTHED
+    assert fig_6_11_17.adapted_at(fig_6_11_17.away_from_settled(record)) == pytest.approx(
+        adapts, abs=fig_6_11_17.SMOOTHED
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from palpate_thesis import look
 from palpate_thesis.explanations import e4_probe
-from palpate_thesis.figures import fig_6_06, fig_6_08
+from palpate_thesis.figures import fig_6_06, fig_6_07_09
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
@@ -171,7 +171,7 @@ def test_a_sign_is_firm_when_no_noise_seed_turns_it():
 
 
 @pytest.mark.parametrize(
-    "study", [fig_6_06, pytest.param(fig_6_08, marks=pytest.mark.long)], ids=lambda one: one.NUMBER
+    "study", [fig_6_06, pytest.param(fig_6_07_09.ERROR, marks=pytest.mark.long)], ids=lambda one: one.NUMBER
 )
 def test_a_study_runs_and_says_why(study):
     """By one seed; what all come to over ten: test_frozen_claims.py."""

@@ -10,8 +10,15 @@ from palpate.environments import KelvinVoigt, join
 from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.references import ForceSchedule
-from palpate_thesis.direct_neural import DirectIntegral, direct_neural
-from palpate_thesis.one_joint import COLUMNS, JOINT_FRICTION, Joint, Link, one_joint
+from palpate_thesis.one_joint import (
+    COLUMNS,
+    JOINT_FRICTION,
+    DirectIntegral,
+    Joint,
+    Link,
+    direct_neural,
+    one_joint,
+)
 
 FOAM, RUBBER = KelvinVoigt(5200, 200, 0.10), KelvinVoigt(34500, 480, 0.05)
 STEPS = ForceSchedule(20.0, 10.0, 2.5, 0.0, 0.5, 0.0)

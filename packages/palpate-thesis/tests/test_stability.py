@@ -8,8 +8,7 @@ import pytest
 
 from palpate.environments import KelvinVoigt
 from palpate.references import ForceSchedule
-from palpate_thesis.direct_neural import DirectIntegral
-from palpate_thesis.one_joint import JOINT_2, Link, one_joint
+from palpate_thesis.one_joint import JOINT_2, DirectIntegral, Link, one_joint
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 

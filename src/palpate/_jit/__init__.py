@@ -5,10 +5,20 @@ cache; only where the cache has none does it hand Numba every law as it stands a
 overloads, and compile.
 """
 
-from palpate._jit.bound import Bound
+from palpate._jit.bound import BoundKernel
 from palpate._jit.kernels import Kernel, NotCompiled, kernel
 from palpate._jit.registry import law, part
 from palpate._jit.stamp import sources_stamp
 from palpate._jit.stored import reader, writer
 
-__all__ = ["Bound", "Kernel", "NotCompiled", "kernel", "law", "part", "reader", "sources_stamp", "writer"]
+__all__ = [
+    "BoundKernel",
+    "Kernel",
+    "NotCompiled",
+    "kernel",
+    "law",
+    "part",
+    "reader",
+    "sources_stamp",
+    "writer",
+]

@@ -7,7 +7,7 @@ from typing import Any
 from palpate._jit.kernels import Kernel
 
 
-class Bound:
+class BoundKernel:
     """Calls a kernel; from the second call on straight at its machine code, a call costing a third or less.
 
     Args:

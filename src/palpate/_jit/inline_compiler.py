@@ -38,7 +38,7 @@ def _flags() -> tuple[Any, type]:
     from numba.core.compiler import Flags
     from numba.core.registry import cpu_target
 
-    class Inside(Flags):
+    class InsideFlags(Flags):
         """One object for all."""
 
         __hash__ = object.__hash__
@@ -53,7 +53,7 @@ def _flags() -> tuple[Any, type]:
         def copy(self) -> Any:
             return shared
 
-    shared = Inside()
+    shared = InsideFlags()
     cpu_target.options.parse_as_flags(shared, {**INSIDE, "nopython": True})
     return shared, Entered
 
@@ -146,7 +146,7 @@ def _entry_compiler() -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
 
-    class Kernel(JITCodeLibrary):
+    class EntryLibrary(JITCodeLibrary):
         """Code that takes in each function that it calls once, and runs."""
 
         def finalize(self) -> None:
@@ -167,7 +167,7 @@ def _entry_compiler() -> type:
         def __init__(
             self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
         ):
-            library = Kernel(target.codegen(), "kernel")
+            library = EntryLibrary(target.codegen(), "kernel")
             library.enable_object_caching()
             super().__init__(typing, target, library, args, result, _flags()[1](flags), *more)
 
@@ -235,7 +235,7 @@ def _inside_compiler() -> type:
 
     swallowed = _linked_library_type()
 
-    class Inside(Compiler):
+    class InsideCompiler(Compiler):
         """Numba's compiler, its result such code."""
 
         def __init__(
@@ -248,7 +248,7 @@ def _inside_compiler() -> type:
             own = _is_plain(self.state.func_id.code)
             return [_short_pipeline()] if own else super().define_pipelines()
 
-    return Inside
+    return InsideCompiler
 
 
 def _is_plain(code: CodeType) -> bool:

@@ -13,12 +13,12 @@ from palpate.bench.build import build
 from palpate.bench.given_motion import GivenMotion, given_motion
 from palpate.bench.plant import Loop, march, start_at
 from palpate.bench.summary import summarise
-from palpate.bench.tables import Experiment, ForceSensor, changed, load, names, source
+from palpate.bench.tables import Experiment, ForceSensorTable, changed, load, names, source
 
 __all__ = [
     "Bench",
     "Experiment",
-    "ForceSensor",
+    "ForceSensorTable",
     "GivenMotion",
     "Loop",
     "Vec3",

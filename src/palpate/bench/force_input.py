@@ -15,7 +15,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
-from palpate.bench.tables import ForceSensor as ForceSensorTable
+from palpate.bench.tables import ForceSensorTable
 from palpate.instruments import Converter, ForceSensor, ForceSensorState, analog_filter_190, force_sensor
 from palpate.references import Approach
 from palpate.robots.arm3 import Arm3

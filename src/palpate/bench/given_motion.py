@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
-from palpate.bench.tables import ForceSensor
+from palpate.bench.tables import ForceSensorTable
 from palpate.environments import SurfaceState, join
 from palpate.environments.surface import members
 from palpate.environments.surface_state import follow
@@ -98,7 +98,7 @@ COLUMNS = {
     "force": "N",  # true, at t; an impact's impulse has no value at an instant and is in the sampled force only
     "force_sampled": "N",
 }
-SENSOR = ForceSensor()
+SENSOR = ForceSensorTable()
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
 SHALLOW = 1e-6
@@ -247,7 +247,7 @@ def given_motion(
     *,
     wall: float = 0.0,
     resolution: float = 5e-6,
-    sensor: ForceSensor = SENSOR,
+    sensor: ForceSensorTable = SENSOR,
     rate: int = 1000,
     steps: int = 20,
 ) -> GivenMotion:

@@ -232,7 +232,7 @@ class LoopState(NamedTuple):
 
 
 @part
-class Command(NamedTuple):
+class DriveCommand(NamedTuple):
     """A torque before and after its limits."""
 
     wanted: Vec3  # torque that the control law asks for [N m]
@@ -274,7 +274,7 @@ def think(loop, state, signals, sequence):
         controller = loop.controller.rest(controller, sense)
     wanted += loop.compensation.torque(sense.qd)
     applied = loop.output.convert_within(wanted, arm.limits)
-    return Command(wanted, applied), desired, approach, controller
+    return DriveCommand(wanted, applied), desired, approach, controller
 
 
 @law

@@ -101,7 +101,7 @@ class Encoders(Table):
     counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
 
 
-class ForceSensor(Table):
+class ForceSensorTable(Table):
     """Its noise and its chain: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
 
     noise: NotNegative = 0.6
@@ -177,14 +177,14 @@ class DesiredForce(Table):
     multisine: MultisineTable | None = None
 
 
-class Compensation(Table):
+class CompensationTable(Table):
     """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
 
     level: NotNegativeTriple = (0.0, 0.0, 0.0)
     blend: PositiveTriple = (0.002, 0.002, 0.002)
 
 
-class Identification(Table):
+class IdentificationTable(Table):
     """The recursive least squares that watches."""
 
     forgetting: Annotated[float, Meta(gt=0, le=1)] = 1.0
@@ -210,13 +210,13 @@ class Experiment(Table, kw_only=True):
     elastic: ElasticTable | None = None
     wall: Wall = Wall()
     encoders: Encoders = Encoders()
-    force_sensor: ForceSensor = ForceSensor()
+    force_sensor: ForceSensorTable = ForceSensorTable()
     filters: Filters = Filters()
     approach: ApproachTable = ApproachTable()
     force: DesiredForce = DesiredForce()
     controller: AnyController = HybridController()
-    compensation: Compensation = Compensation()
-    identification: Identification = Identification()
+    compensation: CompensationTable = CompensationTable()
+    identification: IdentificationTable = IdentificationTable()
     identifier: AnyIdentifier | None = None
     """One more that watches, on the channels of the matched estimator; its numbers are columns of the record."""
 

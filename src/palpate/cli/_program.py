@@ -33,13 +33,10 @@ COMMANDS = {
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
-    "map": "Map the stiffness of a surface from presses, and choose the next ones.",
     "tune": "Tune a force loop for an arm, and prove where it is stable.",
     "export": "Write an identified surface as the contact of a simulator's scene.",
-    "certify": "Prove where a tuned force loop is stable, or check such a proof.",
     "press": "Press with a desired force: any serial arm in simulation, or a real one over its wire.",
     "run": "Run an experiment: the arm approaches, touches, presses.",
-    "checks": "Check a controller, surface or identifier of your own.",
     "speed": "Measure the time of one tick of the closed loop on this machine.",
     "completion": "Print a shell's completion script for commands, options and files.",
 }
@@ -57,10 +54,13 @@ GROUPS = {
 # Commands of other distributions, by the distribution that has them.
 COMPANIONS = {
     "excite": "palpate-excitation",
+    "certify": "palpate-certify",
+    "checks": "palpate-checks",
     "live": "palpate-live",
+    "map": "palpate-maps",
     "study": "palpate-studies",
     "thesis": "palpate-thesis",
-    "laboratory": "palpate-thesis",
+    "laboratory": "palpate-laboratory",
     "references": "palpate-references",
     "benchmark": "palpate-benchmark",
     "slide": "palpate-slide",
@@ -93,6 +93,23 @@ def added_commands() -> dict[str, str]:
     from importlib.metadata import entry_points
 
     return {e.name: e.value for e in sorted(entry_points(group=ENTRY_POINTS)) if e.name not in COMMANDS}
+
+
+def option_of(name: str, extra: str) -> Any:
+    """The function of another distribution that does what an option of palpate's own commands asks for.
+
+    Args:
+        name: of the option, as `wire`.
+        extra: of palpate, by which that distribution is installed.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    from importlib.metadata import entry_points
+
+    for entry in entry_points(group="palpate.options", name=name):
+        return entry.load()
+    raise InputError(f"--{name} is of palpate-{extra}, which is not installed: pip install palpate[{extra}]")
 
 
 def _file_of(module: str) -> Path:

@@ -21,6 +21,9 @@ from palpate.errors import InputError
 from palpate.files import check_place, write_text
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from palpate.arrays import Array
     from palpate.identification import Identification
     from palpate.report.identification.words import Source
 
@@ -99,6 +102,29 @@ class IdentifyOutput(PictureOptions):
         return self.picture(f"{name}.identify.png", FORMATS)
 
 
+@Parameter(name="*", group=Group("Several logs", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class CovariateOptions:
+    """Conditions that several logs differ in, such as a temperature."""
+
+    covariate: Annotated[tuple[str, ...], Parameter(negative=())] = ()
+    """A column of each log, such as temperature_C, whose mean is the log's; how the results depend on it is
+    pooled, too. May be repeated."""
+    covariates: Path | None = None
+    "CSV table that has the covariates instead: a column log with the logs' file names, and one for each."
+
+    def of(self, logs: Sequence[Path]) -> dict[str, Array]:
+        """One number of each log, by the covariate's name."""
+        from palpate.logs.covariates import read_covariates
+
+        if self.covariates is not None and not self.covariate:
+            raise InputError(
+                "--covariates names a table; name its columns, too, as in --covariate temperature_C"
+            )
+        return read_covariates(logs, self.covariate, self.covariates)
+
+
+# More than seven arguments: one for each group of options.
 def identify(
     *logs: Path,
     source: LogOptions | None = None,
@@ -106,6 +132,7 @@ def identify(
     arm: ArmOptions | None = None,
     fitted: ModelOptions | None = None,
     pressed_by: IndenterOptions | None = None,
+    beside: CovariateOptions | None = None,
     output: IdentifyOutput | None = None,
     cell: CellOptions | None = None,
 ) -> int:
@@ -127,6 +154,8 @@ def identify(
 
     palpate identify presses/ --table presses.csv
 
+    palpate identify presses/ --covariate temperature_C --covariates conditions.csv
+
     Options of a cell can be saved and loaded again:
 
     palpate identify press.csv --preset ur-rtde --tcp 0,0,120:mm --save-options my-cell.toml
@@ -144,6 +173,7 @@ def identify(
     output, cell = output or IdentifyOutput(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
     fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
+    beside = beside or CovariateOptions()
     pressed_by.check()
     cell.check()
     asked = OneLog(fitted, source, frame, arm, pressed_by)
@@ -154,13 +184,17 @@ def identify(
         )
     logs = sheets_as_logs(logs, source.names, source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
+        if beside != CovariateOptions():
+            raise InputError("--covariate is of several logs; name more than one, or a folder of them")
         return _one(log_of(logs[0]), asked, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")
     from palpate.cli.one_log import many
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
-    return many(gather_logs(logs), asked, figure, page, table, json=output.json, dpi=output.dpi)
+    logs = gather_logs(logs)
+    known = beside.of(logs)
+    return many(logs, asked, known, (figure, page, table), json=output.json, dpi=output.dpi)
 
 
 def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:

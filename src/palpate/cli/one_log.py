@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from palpate.errors import InputError, PalpateError
 from palpate.files import read_bytes, write_text
 
 if TYPE_CHECKING:
+    from palpate.arrays import Array
     from palpate.from_log import LogIdentifier
     from palpate.identification import Identification
     from palpate.identification.pooling import Pooled
@@ -109,16 +110,24 @@ def _plain(value: Any) -> Any:
 def many(
     logs: Sequence[Path],
     asked: OneLog,
-    figure: Path | None,
-    page: Path | None,
-    table: Path | None,
+    covariates: Mapping[str, Array],
+    files: tuple[Path | None, Path | None, Path | None],
     *,
     json: bool,
     dpi: int | None = None,
 ) -> int:
     """Identify many logs, and print a row for each and the pooled result.
 
-    A log that fails is a row with the reason, and the others continue. An interruption keeps the finished logs.
+    A log that fails is a row with the reason, and the others continue. An interruption keeps the finished
+    logs, which are pooled without covariates.
+
+    Args:
+        logs: paths of them.
+        asked: options that are common to all.
+        covariates: one number of each log, by name.
+        files: paths of figure, page and table, None for those not wanted.
+        json: whether the result is printed as JSON.
+        dpi: of the figure.
 
     Returns:
         0 if a number is identified; 1 if none is; 130 if it was interrupted.
@@ -146,15 +155,16 @@ def many(
         raise InputError(
             failed[0].error if one else f"none of {len(rows)} logs can be identified: {failed[0].error}"
         )
-    pooled = pool([row.found for row in rows], asked.fitted.tolerance, [row.source.title for row in rows])
+    found, names = [row.found for row in rows], [row.source.title for row in rows]
+    pooled = pool(found, asked.fitted.tolerance, names, None if interrupted else covariates)
     if rows:
-        _print(rows, pooled, _write(rows, pooled, figure, page, table, dpi), json=json)
+        _print(rows, pooled, _write(rows, pooled, files, dpi), json=json)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
     doubtful = any(row.found and unit_warnings(row.found) for row in rows)
-    known = pooled.found or any(row.found and has_number(row.found) for row in rows)
-    return 0 if known and not doubtful else 1
+    has_any = pooled.found or any(row.found and has_number(row.found) for row in rows)
+    return 0 if has_any and not doubtful else 1
 
 
 def _row(log: Path, asked: OneLog) -> LogRow:
@@ -186,11 +196,10 @@ def _light(found: Identification) -> Identification:
 def _write(
     rows: Sequence[LogRow],
     pooled: Pooled,
-    figure: Path | None,
-    page: Path | None,
-    table: Path | None,
+    files: tuple[Path | None, Path | None, Path | None],
     dpi: int | None,
 ) -> list[Path]:
+    figure, page, table = files
     if figure is not None:
         from palpate.report.many.page import write_figure
 
@@ -203,7 +212,7 @@ def _write(
         from palpate.report.many.table import write_table
 
         write_table(rows, pooled, table)
-    return [path for path in (figure, page, table) if path is not None]
+    return [path for path in files if path is not None]
 
 
 def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, json: bool) -> None:

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _terminal
-from palpate.cli._program import command, print_answer
+from palpate.cli._program import command, option_of, print_answer
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import bar, console, place, show_answer
-from palpate.cli._terminal import place as show_place
-from palpate.cli.map import MapOptions
+from palpate.cli._terminal import console, place, show_answer
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.press import (
     AskOptions,
@@ -21,62 +19,12 @@ from palpate.cli.options.press import (
     only,
 )
 from palpate.cli.options.values import FLAG
-from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json, write_text
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate.maps.result import MapResult
     from palpate.press.prepare import Pressing
     from palpate.records import Record
-
-
-def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
-    """Press a phantom at places that the map chooses, and write presses, map and page into the folder of results.
-
-    Returns:
-        0; 130 if it was interrupted: the map of the presses until then is written.
-
-    Raises:
-        InputError: the phantom, the arm or an option is wrong, or an interruption before a map could be drawn.
-    """
-    from palpate.environments.kelvin_voigt import KelvinVoigt
-    from palpate.maps.phantom import load_phantom, palpate_phantom
-    from palpate.report import map as page
-    from palpate.report.numbers import plain
-
-    assert phantom.map is not None
-    if phantom.page is not None:
-        check_place(phantom.page, "--page", ending=".html")
-    surface = load_phantom(phantom.map)
-    title = f"Phantom {phantom.map.stem}, {' × '.join(plain(1e3 * side, 3) for side in surface.size)} mm"
-    request = MapOptions(stiffer_than=phantom.stiffer_than).request()
-    question = simulated.question(asked, KelvinVoigt(surface.stiffness, surface.damping, 0.0))
-    folder = simulated.out if simulated.out is not None else Path("runs") / f"map-{phantom.map.stem}"
-    with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
-        with bar(console(stderr=True)) as progress:
-            task = progress.add_task("pressing", total=phantom.presses)
-
-            def show(done: int, last: str) -> bool:
-                progress.update(task, completed=done, description=last)
-                return not interrupted()
-
-            def grow(result: MapResult) -> None:
-                if phantom.page is not None:
-                    write_text(phantom.page, page.page(result, title, command(), live=True))
-
-            result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
-        result.write_presses(fresh / "places.csv")
-        result.write_csv(fresh / "map.csv")
-        write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
-        for path in filter(None, (fresh / "report.html", phantom.page)):
-            write_text(path, page.page(result, title, command()))
-    if json:
-        print_answer(result.to_json())
-    else:
-        text = f": {page.sentence(result)}"
-        screen = show_answer(f"{len(result.map)} presses", text, page.tables(result), page.warnings(result))
-        show_place(screen, "report:", folder / "report.html")
-    return interrupted.code if interrupted() else 0
 
 
 def press(
@@ -124,15 +72,13 @@ def press(
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
         if phantom is not None and phantom.map is not None:
-            code = press_map(asked, simulated, phantom, json=json)
+            code = option_of("map", "maps")(asked, simulated, phantom, json=json)
         else:
             only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
             code = _simulate(asked, simulated, json)
     else:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
-        from palpate.cli._press_wire import press_over
-
-        code = press_over(asked, wire, limits, json=json)
+        code = option_of("wire", "wires")(asked, wire, limits, json=json)
     cell.save((asked, simulated, wire, limits), "press")
     return code
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from palpate.cli._program import command, print_answer
+from palpate.cli._program import command, option_of, print_answer
 from palpate.cli._terminal import (
     COMPILING,
     STYLE,
@@ -26,6 +26,7 @@ __all__ = [
     "confirmed",
     "console",
     "head",
+    "option_of",
     "place",
     "print_answer",
     "print_lines",

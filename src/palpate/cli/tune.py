@@ -11,10 +11,10 @@ from palpate.cli._terminal import console, place
 from palpate.cli.one_log import read_found
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import (
-    ArmOptions,
     ColumnOptions,
+    LoopArmOptions,
     PressOptions,
-    SlideNumberOptions,
+    SlideTuningOptions,
     SurfaceOptions,
     TuningOutputOptions,
 )
@@ -32,11 +32,11 @@ def tune(
     found: Path | None = None,
     /,
     *,
-    arm: ArmOptions,
+    arm: LoopArmOptions,
     press: PressOptions,
     surface: SurfaceOptions | None = None,
     columns: ColumnOptions | None = None,
-    slide: SlideNumberOptions | None = None,
+    slide: SlideTuningOptions | None = None,
     output: TuningOutputOptions | None = None,
     page: ReportOption | None = None,
 ) -> int:
@@ -85,8 +85,7 @@ def tune(
         surface_speed=surface.surface_speed,
         theta=None if theta is None else theta.high,
     )
-    if slide is not None and slide.slide:
-        told = replace(told, gains=slide.added_to(told.gains))
+    told = replace(told, gains=(slide or SlideTuningOptions()).tuned_for(told.gains))
     written = _write(told, output.out, report)
     loop = None if inner is None else inner.to_json() | ({"theta_s": theta.to_json()} if theta else {})
     _print(told, loop, written, output)

@@ -11,11 +11,11 @@ from palpate.contact_frame.arm import describe, robot_stiffness, with_arm
 from palpate.contact_frame.load import Payload, load_payload
 from palpate.contact_frame.load_files import compare, load_text, read_load
 from palpate.contact_frame.projecting import identify_contact, project
-from palpate.contact_frame.signals_in_base import Arm, ContactFrame
+from palpate.contact_frame.signals_in_base import ArmDynamics, ContactFrame
 from palpate.contact_frame.tool_payload import Weighed, weigh
 
 __all__ = [
-    "Arm",
+    "ArmDynamics",
     "ContactFrame",
     "Payload",
     "Weighed",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.contact_frame.signals_in_base import Arm
+from palpate.contact_frame.signals_in_base import ArmDynamics
 from palpate.errors import InputError
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.signals.types import NORMAL
@@ -20,7 +20,7 @@ _STIFF = 1000.0
 """Above this an arm's own compliance, of 20 to 100 kN/m in a light one, takes more than some percent [N/m]."""
 
 
-def with_arm(found: Identification, arm: Arm, tolerance: float, *, from_pose: bool) -> Identification:
+def with_arm(found: Identification, arm: ArmDynamics, tolerance: float, *, from_pose: bool) -> Identification:
     """An identification with the tool's mass taken out of M, and K bounded where the arm's compliance is in it.
 
     Args:
@@ -64,7 +64,7 @@ def robot_stiffness(wall: Identification, name: str) -> tuple[float, float]:
     return stiffness.value, stiffness.std
 
 
-def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
+def _without_tool(mass: Parameter, arm: ArmDynamics, tolerance: float) -> Parameter:
     """M of the environment alone; said to be that of both, if the tool's is not known."""
     if arm.tool_mass is None:
         if mass.value is None:
@@ -96,7 +96,7 @@ def _without_tool(mass: Parameter, arm: Arm, tolerance: float) -> Parameter:
     return Parameter(value, std, (low, high), mass.unit, mass.verdict, f"{taken}; {mass.reason}")
 
 
-def _of_swing(mass: Parameter, arm: Arm) -> Parameter:
+def _of_swing(mass: Parameter, arm: ArmDynamics) -> Parameter:
     """M below zero, as caused by an undeclared swinging mass of the arm."""
     if arm.stiffness is None or arm.mass is not None or "below zero" not in mass.reason:
         return mass
@@ -104,7 +104,7 @@ def _of_swing(mass: Parameter, arm: Arm) -> Parameter:
     return replace(mass, reason=f"{mass.reason}; {why}")
 
 
-def _compliance(parameters: Mapping[str, Parameter], arm: Arm, from_pose: bool) -> Warn | None:
+def _compliance(parameters: Mapping[str, Parameter], arm: ArmDynamics, from_pose: bool) -> Warn | None:
     """Warning about an arm of unknown compliance."""
     stiffness = parameters.get("K")
     if arm.stiffness is not None or arm.position_from == "tip" or stiffness is None:

@@ -24,7 +24,7 @@ from palpate.contact_frame.free_motion import (
 from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
 from palpate.contact_frame.signals_in_base import (
     FORCE,
-    Arm,
+    ArmDynamics,
     BaseSignals,
     ContactFrame,
     Unloaded,
@@ -258,7 +258,7 @@ def _about(
 def identify_contact(
     record: Record,
     frame: ContactFrame | None = None,
-    arm: Arm | None = None,
+    arm: ArmDynamics | None = None,
     *,
     tolerance: float = 0.25,
     calibration: float = 0.0,
@@ -280,7 +280,7 @@ def identify_contact(
     Raises:
         InputError: the record or an argument is wrong, in one line.
     """
-    arm = arm or Arm()
+    arm = arm or ArmDynamics()
     arm = replace(
         arm,
         position_from=arm.position_from or record.meta.get("position_from"),
@@ -350,7 +350,7 @@ def _all_free(found: Identification, record: Record) -> tuple[Identification, Re
     return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
 
 
-def _about_arm(arm: Arm) -> dict[str, Any]:
+def _about_arm(arm: ArmDynamics) -> dict[str, Any]:
     """Properties of the arm, as plain values."""
     return {
         "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,

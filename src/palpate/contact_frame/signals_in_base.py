@@ -79,7 +79,7 @@ class ContactFrame:
 
 
 @dataclass(frozen=True)
-class Arm:
+class ArmDynamics:
     """Mass and stiffness between the sensors and the surface.
 
     Args:

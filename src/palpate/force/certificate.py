@@ -22,7 +22,7 @@ _LARGEST = 1 << 26
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CertificateVerdict:
     """Result of a check.
 
     Args:
@@ -105,27 +105,29 @@ class Certificate(Table):
                     f"the certificate is of another {name}{what} than the gains; certify them again"
                 )
 
-    def check(self) -> Verdict:
+    def check(self) -> CertificateVerdict:
         """Whether it holds, by norms alone."""
         worst, rounding, count = 0.0, 0.0, 0
         if not self.claims:
-            return Verdict(False, np.inf, 0.0, 0, "it claims nothing")
+            return CertificateVerdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
             fault = claim.fault(self.proved_gains)
             prover = claim.prover(self.proved_gains)
             if fault or (claim.state, claim.units) != (prover.loop.state, prover.loop.units):
                 why = fault or "the state is another"
-                return Verdict(False, np.inf, 0.0, count, f"{why}, in its {claim.kind} claim")
+                return CertificateVerdict(False, np.inf, 0.0, count, f"{why}, in its {claim.kind} claim")
             if not all(claim.tiled(box) for box in claim.boxes(self.proved_gains)):
-                return Verdict(False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap")
+                return CertificateVerdict(
+                    False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap"
+                )
             for proved in claim.cells:
                 if [len(row) for row in proved.norm] != [prover.loop.size] * prover.loop.size:
-                    return Verdict(False, np.inf, 0.0, count, "a norm is not of the loop's size")
+                    return CertificateVerdict(False, np.inf, 0.0, count, "a norm is not of the loop's size")
                 size, moved = _contraction(prover, proved.cell)
                 worst, rounding, count = max(worst, size), max(rounding, moved), count + 1
                 if not size + moved < 1.0:
-                    return Verdict(False, worst, rounding, count, "a cell does not contract")
-        return Verdict(True, worst, rounding, count)
+                    return CertificateVerdict(False, worst, rounding, count, "a cell does not contract")
+        return CertificateVerdict(True, worst, rounding, count)
 
 
 def _contraction(prover: Prover, cell: Cell) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.force.certificate import Certificate, Verdict
+from palpate.force.certificate import Certificate, CertificateVerdict
 from palpate.force.claims import Claim
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_proof import slide_proof, slide_proof_sentence
@@ -84,7 +84,7 @@ def sentence(claim: Claim, gains: Gains) -> str:
     )
 
 
-def lines(certificate: Certificate, verdict: Verdict) -> list[str]:
+def lines(certificate: Certificate, verdict: CertificateVerdict) -> list[str]:
     """The certificate in words."""
     gains = certificate.proved_gains
     found = [f"proved stable, {sentence(c, gains)} ({len(c.cells)} cells)" for c in certificate.claims]
@@ -100,7 +100,7 @@ def lines(certificate: Certificate, verdict: Verdict) -> list[str]:
     return [*found, "not covered: " + "; ".join(UNCOVERED)]
 
 
-def as_json(certificate: Certificate, verdict: Verdict) -> dict[str, Any]:
+def as_json(certificate: Certificate, verdict: CertificateVerdict) -> dict[str, Any]:
     """The certificate as plain JSON values, without its norms."""
     return {
         "holds": verdict.holds,

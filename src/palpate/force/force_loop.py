@@ -151,6 +151,19 @@ class ForceLoop(Readable):
             )
         self._desired = value
 
+    def limit_speed(self, speed: float) -> None:
+        """Lets no command be faster than this [m/s], where that is below the arm's own limit.
+
+        Raises:
+            InputError: it is below the approach.
+        """
+        if not speed >= self.gains.approach:
+            raise InputError(
+                f"the speed must be at least the approach of {self.gains.approach:g} m/s, got {speed:g}"
+            )
+        own = self.gains.cautious()
+        self._numbers = flattened(own._replace(speed=min(own.speed, speed)))
+
     def update(self, force: float, position: float, missed: float = 0.0) -> float:
         """The speed of the commanded position for this tick [m/s].
 

@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.lag import worst_stiffness, yielding_lag
 from palpate.force.sampled_loop import held
+from palpate.signals.types import NORMAL
 
 BLOCKS = 8
 """Parts of a log whose scores tell how far each number may be off, whatever the noise's colour."""
@@ -33,7 +34,7 @@ Chosen on 79 logs of the kind of `benchmarks/arms/servo_logs.py`, which counts o
 
 
 @dataclass(frozen=True)
-class Parameter:
+class LoopParameter:
     """A number and its 95 % interval."""
 
     value: float
@@ -49,10 +50,10 @@ class Parameter:
         """As plain JSON values."""
         return {"value": self.value, "ci95": [self.low, self.high]}
 
-    def beside(self, std: float) -> Parameter:
+    def beside(self, std: float) -> LoopParameter:
         """The number with another error beside its own, of this standard deviation."""
-        wider = hypot(self.half, 1.96 * std) - self.half
-        return Parameter(self.value, max(self.low - wider, 0.0), self.high + wider)
+        wider = hypot(self.half, NORMAL * std) - self.half
+        return LoopParameter(self.value, max(self.low - wider, 0.0), self.high + wider)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +70,12 @@ class FitErrors:
         std = max(float(slope @ self.covariance @ slope) ** 0.5, 0.5 * abs(float(slope @ self.halves)))
         return float(student.ppf(0.975, BLOCKS - 1)) * std
 
-    def factor(self, value: float, *slope: float) -> Parameter:
+    def factor(self, value: float, *slope: float) -> LoopParameter:
         """A number whose logarithm has this slope in the first of them."""
         wide = np.zeros(len(self.halves))
         wide[: len(slope)] = slope
         grow = exp(min(self.half(wide), 50.0))
-        return Parameter(value, value / grow, value * grow)
+        return LoopParameter(value, value / grow, value * grow)
 
 
 @dataclass(frozen=True)
@@ -86,15 +87,15 @@ class InnerLoop:
     K_s of a servo [N/m], None where nothing was pushed.
     """
 
-    bandwidth: Parameter
-    damping: Parameter
-    delay: Parameter
-    lag: Parameter
-    gain: Parameter
+    bandwidth: LoopParameter
+    damping: LoopParameter
+    delay: LoopParameter
+    lag: LoopParameter
+    gain: LoopParameter
     explained: float
     rate: float
     errors: FitErrors
-    stiffness: Parameter | None
+    stiffness: LoopParameter | None
 
     def to_json(self) -> dict[str, object]:
         """As plain JSON values."""
@@ -136,7 +137,7 @@ class InnerLoop:
         delay = max(self.delay.value + float(shift[2]), 0.0)
         return ServoLoop(mass=K / w**2, stiffness=K, damping=2.0 * z / w * K, delay=delay)
 
-    def theta(self, arm: Arm) -> Parameter:
+    def theta(self, arm: Arm) -> LoopParameter:
         """Whole lag of the force loop of an arm that `of` has made a servo of, led by these numbers [s].
 
         Raises:
@@ -153,7 +154,7 @@ class InnerLoop:
                 f"{arm.title}: the lag of the force loop is {1e3 * value:.3g} +- {1e3 * half:.2g} ms; record steps, or "
                 f"a sweep to {self.bandwidth.value:.2g} Hz and more, for longer"
             )
-        return Parameter(value, value - half, value + half).beside(ONE_MASS["theta"] * value)
+        return LoopParameter(value, value - half, value + half).beside(ONE_MASS["theta"] * value)
 
 
 # More than five arguments: the columns of a log, and its name.
@@ -180,7 +181,10 @@ def identify_inner_loop(
     errors, best, gain_std = _errors(log_, p, [_fitted(part, p) for part in log_.cut(2)])
     w, z, late, gain = exp(p[0]), exp(p[1]), float(p[2]), float(best[0])
     half = errors.half(np.eye(len(errors.halves))[2])
-    delay, lag = Parameter(late, max(late - half, 0.0), late + half), errors.factor(2.0 * z / w, -1.0, 1.0)
+    delay, lag = (
+        LoopParameter(late, max(late - half, 0.0), late + half),
+        errors.factor(2.0 * z / w, -1.0, 1.0),
+    )
     stiffness = None
     if force is not None:
         K = 1.0 / abs(float(best[4]))
@@ -191,7 +195,7 @@ def identify_inner_loop(
         damping=errors.factor(z, 0.0, 1.0),
         delay=delay,
         lag=lag,
-        gain=Parameter(gain, gain - gain_std, gain + gain_std),
+        gain=LoopParameter(gain, gain - gain_std, gain + gain_std),
         explained=1.0 - float(np.mean(_residual(log_, p) ** 2) / gain**2 / np.mean(log_.behind**2)),
         rate=1.0 / log_.tick,
         errors=errors,

@@ -4,15 +4,18 @@ Each press has an error of its own, with a variance that it states, and beside i
 another moisture). The variance between them is found by Paule and Mandel (J. Res. NBS 87, 1982), the mean's deviation
 by Hartung and Knapp (Statist. Med. 20, 2001), never below what equal effects would have (Roever, Knapp and Friede, BMC
 Med. Res. Methodol. 15, 2015); the next press by Higgins, Thompson and Spiegelhalter (J. R. Statist. Soc. A 172, 2009).
+Where covariates are given (a temperature, a humidity), the mean is a plane over them, and the presses differ about it
+(random-effects meta-regression, Knapp and Hartung, Statist. Med. 22, 2003).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -42,12 +45,13 @@ class Mean:
     """Mean of effects that differ.
 
     Args:
-        value: of the mean.
+        value: of the mean; with covariates, of where they have their mean.
         std: its standard deviation.
         freedom: degrees of freedom of that.
         between: standard deviation of the effects themselves, their own errors left aside.
         count: of the effects.
         share: of the mean's variance that is due to the effects' differences.
+        slopes: by each covariate, with its standard deviation.
     """
 
     value: float
@@ -56,6 +60,7 @@ class Mean:
     between: float
     count: int
     share: float = 0.0
+    slopes: tuple[tuple[float, float], ...] = ()
 
     @property
     def half(self) -> float:
@@ -64,42 +69,55 @@ class Mean:
 
     @property
     def next_half(self) -> float | None:
-        """95 % half-width of where the next effect falls; None for fewer than three."""
-        if self.count < 3:
+        """95 % half-width of where the next effect falls; None for fewer than three and the covariates."""
+        if self.freedom < 2 or self.count < 3:
             return None
-        return student(self.count - 2) * float(np.hypot(self.between, self.std))
+        return student(self.freedom - 1) * float(np.hypot(self.between, self.std))
 
 
-def random_effects(values: Array, variances: Array) -> Mean:
+def random_effects(values: Array, variances: Array, covariates: Array | None = None) -> Mean:
     """Mean of effects that differ.
 
     Args:
         values: one of each effect, shape (n,).
         variances: of their own errors, shape (n,).
+        covariates: of each effect, shape (n, c) with c < n - 1; none of them constant or a combination of the others.
     """
     n = len(values)
     if n == 1:
         return Mean(float(values[0]), float(np.sqrt(variances[0])), _ALONE, 0.0, 1)
     scale = float(max(np.ptp(values) ** 2, variances.max())) or 1.0
-    centre = float(values.mean())
-    y, own = (values - centre) / np.sqrt(scale), np.maximum(variances / scale, _EXACT)
-    between = _between(y, own)
+    centre, size = float(values.mean()), float(np.sqrt(scale))
+    y, own = (values - centre) / size, np.maximum(variances / scale, _EXACT)
+    offsets = np.empty((n, 0)) if covariates is None else covariates - covariates.mean(axis=0)
+    spans = offsets.std(axis=0)
+    design = np.column_stack([np.ones(n), offsets / spans])
+    freedom = n - design.shape[1]
+    between = _between(y, own, design)
     weight = 1 / (own + between)
-    mean = float(weight @ y / weight.sum())
-    spread = float(weight @ (y - mean) ** 2) / (n - 1)
-    std = np.sqrt(max(spread, 1.0) / float(weight.sum()) * scale)
-    share = between * float(weight @ weight) / float(weight.sum())
-    size = float(np.sqrt(scale))
-    return Mean(centre + mean * size, float(std), n - 1.0, float(np.sqrt(between)) * size, n, share)
+    theta, inverse = _least_squares(y, weight, design)
+    excess = max(float(weight @ (y - design @ theta) ** 2) / freedom, 1.0)
+    stds = size * np.sqrt(excess * np.diag(inverse))
+    pull = design @ inverse[0] * weight  # of each effect on the mean
+    share = between * float(pull @ pull) / float(inverse[0, 0])
+    slopes = zip((size * theta[1:] / spans).tolist(), (stds[1:] / spans).tolist(), strict=True)
+    value, deviation = centre + size * float(theta[0]), size * float(np.sqrt(between))
+    return Mean(value, float(stds[0]), float(freedom), deviation, n, share, tuple(slopes))
 
 
-def _between(y: Array, own: Array) -> float:
-    """Variance between effects at which their weighted spread is what it should be: n - 1 (Newton from below)."""
-    between = 0.0
+def _least_squares(y: Array, weight: Array, design: Array) -> tuple[Array, Array]:
+    """Weighted fit, shape (p,), and the inverse of its normal matrix, shape (p, p)."""
+    inverse = np.asarray(np.linalg.inv(design.T @ (weight[:, None] * design)), np.float64)
+    return inverse @ (design.T @ (weight * y)), inverse
+
+
+def _between(y: Array, own: Array, design: Array) -> float:
+    """Variance between effects at which their weighted spread is what it should be: n - p (Newton from below)."""
+    between, freedom = 0.0, len(y) - design.shape[1]
     for _ in range(_ROUNDS):
         weight = 1 / (own + between)
-        left = y - float(weight @ y / weight.sum())
-        excess = float(weight @ left**2) - (len(y) - 1)
+        left = y - design @ _least_squares(y, weight, design)[0]
+        excess = float(weight @ left**2) - freedom
         if excess <= 1e-9 * len(y):
             break
         between += excess / float(weight**2 @ left**2)
@@ -113,14 +131,18 @@ class PooledParameter:
     Args:
         parameter: mean, interval and verdict.
         prediction95: where the next log's own falls; None for fewer than three.
-        between: standard deviation between logs, in the parameter's unit.
+        between: standard deviation between logs, in the parameter's unit; with covariates, about the plane over them.
         logs: places of those that it is from.
+        slopes: change for each unit of a covariate, by its name.
+        at: values of the covariates that the mean belongs to.
     """
 
     parameter: Parameter
     prediction95: Interval | None
     between: float | None
     logs: tuple[int, ...]
+    slopes: dict[str, Parameter] = field(default_factory=dict)
+    at: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -129,6 +151,7 @@ class PooledParameter:
             "prediction95": list(self.prediction95) if self.prediction95 else None,
             "between_std": self.between,
             "logs": list(self.logs),
+            "covariates": {name: {"at": self.at[name], **p.to_json()} for name, p in self.slopes.items()},
         }
 
 
@@ -189,33 +212,73 @@ class Pooled(Result, shown_by="palpate.report.many.page"):
         }
 
 
-def pool(logs: Sequence[Identification | None], tolerance: float = 0.25, names: Sequence[str] = ()) -> Pooled:
+def pool(
+    logs: Sequence[Identification | None],
+    tolerance: float = 0.25,
+    names: Sequence[str] = (),
+    covariates: Mapping[str, ArrayLike] | None = None,
+) -> Pooled:
     """Pool identifications of one thing.
 
     Args:
         logs: one of each; None for a log that could not be read.
         tolerance: largest half-width of an identified mean's 95 % interval, as a share of its value.
         names: of the logs, by which tables and figures call them.
+        covariates: by name, one number of each log, such as its temperature: the dependence on each is pooled, too.
 
     Raises:
-        InputError: as many names as there are logs, or none, are wanted.
+        InputError: as many names, or numbers of a covariate, as there are logs are wanted; a covariate is not finite,
+            or does not vary by itself.
     """
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
+    beside = _Covariates.of(covariates or {}, len(logs))
     own = {
-        name: _pool([_one(found, name) for found in logs], tolerance)
+        name: _pool([_one(found, name) for found in logs], tolerance, beside)
         for name in POOLED
         if any(found is not None and name in found.parameters for found in logs)
     }
-    return Pooled(own, _point(logs, tolerance), tuple(logs), tuple(names))
+    return Pooled(own, _point(logs, tolerance, beside), tuple(logs), tuple(names))
 
 
-def _point(logs: Sequence[Identification | None], tolerance: float) -> PooledPoint | None:
+@dataclass(frozen=True)
+class _Covariates:
+    """Covariates by name, and their numbers, shape (logs, covariates)."""
+
+    names: tuple[str, ...]
+    numbers: Array
+
+    @classmethod
+    def of(cls, given: Mapping[str, ArrayLike], count: int) -> _Covariates:
+        columns = {name: np.asarray(values, np.float64) for name, values in given.items()}
+        for name, column in columns.items():
+            if column.shape != (count,) or not np.isfinite(column).all():
+                raise InputError(f"the covariate {name} must be a number for each of the {count} logs")
+        found = cls(tuple(columns), np.column_stack([np.empty((count, 0)), *columns.values()]))
+        for i, name in enumerate(columns):
+            if not cls(found.names[: i + 1], found.numbers[:, : i + 1]).vary(range(count)):
+                raise InputError(
+                    f"the covariate {name} is the same in all {count} logs, or a combination of others; leave it out"
+                )
+        return found
+
+    def vary(self, logs: Sequence[int]) -> bool:
+        """Whether these logs tell the effect of each from the others'."""
+        own = self.numbers[list(logs)]
+        spread = own.std(axis=0)
+        if (spread <= _EXACT * abs(own).max(axis=0, initial=0.0)).any():
+            return False
+        return int(np.linalg.matrix_rank((own - own.mean(axis=0)) / spread)) == len(self.names)
+
+
+def _point(
+    logs: Sequence[Identification | None], tolerance: float, beside: _Covariates
+) -> PooledPoint | None:
     points = [found.working_point if found else None for found in logs]
     there = [point for point in points if point is not None]
     if not there:
         return None
-    stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance)
+    stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance, beside)
     used = [p for i in stiffness.logs if (p := points[i]) is not None] or there
 
     def range_of(values: list[float]) -> Interval:
@@ -256,41 +319,57 @@ class _Given:
         return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
 
 
-def _pool(own: Sequence[tuple[Parameter, str] | None], tolerance: float) -> PooledParameter:
+def _pool(
+    own: Sequence[tuple[Parameter, str] | None], tolerance: float, beside: _Covariates
+) -> PooledParameter:
     """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
     given = {i: found for i, pair in enumerate(own) if pair is not None and (found := _Given.of(*pair))}
     unit = next((pair[0].unit for pair in own if pair is not None), "1")
     kinds = [found.kind for found in given.values()]
     kind = max(kinds, key=kinds.count, default=(unit, ""))
     used = {i: found for i, found in given.items() if found.kind == kind}
-    if len(used) < 2:
+    least = 2 + len(beside.names)
+    if len(used) < least or not beside.vary(tuple(used)):
         few = f"{len(used)} of {len(own)} logs give{'s' * (len(used) == 1)} it a number; pooling takes two or more"
+        if beside.names:
+            few += f", and with {', '.join(beside.names)} {least} in which each of these varies by itself"
         none = Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, few)
         return PooledParameter(none, None, None, tuple(used))
     values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
-    mean, alike = random_effects(values, (halves / NORMAL) ** 2), float(shared.mean())
+    numbers = beside.numbers[list(used)]
+    mean, alike = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
     prediction = None
     if mean.next_half is not None:
         again = float(np.hypot(mean.next_half, alike))
         prediction = mean.value - again, mean.value + again
-    return PooledParameter(
-        _judge(mean, alike, len(own), kind, tolerance), prediction, mean.between, tuple(used)
-    )
-
-
-def _judge(mean: Mean, alike: float, count: int, kind: tuple[str, str], tolerance: float) -> Parameter:
-    """A verdict on a mean; `alike` is the 95 % half-width of what all logs err by together."""
-    of = f"{mean.count} of {count} logs{f', as of {kind[1]}' if kind[1] else ''}"
+    of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
     freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
         "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), freedom),
         "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
         "common to all logs": Contribution.within(alike),
     }
-    found = Parameter.of(mean.value, kind[0], Verdict.IDENTIFIED, "", parts)
-    share = Measurement(mean.value, parts).relative_half
-    if share >= 1 and found.ci95 is not None:
-        reason = f"95 %: {found.ci95[0]:.3g} to {found.ci95[1]:.3g}; zero is within it ({of})"
+    together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
+    slopes = {}
+    for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
+        scaled = (
+            alike * abs(slope / mean.value) if mean.value else 0.0
+        )  # an error common to all logs is of the scale
+        parts = {
+            "between logs": Contribution(std, mean.freedom),
+            "common to all logs": Contribution.within(scaled),
+        }
+        slopes[name] = _judge(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
+    at = dict(zip(beside.names, numbers.mean(axis=0).tolist(), strict=True))
+    return PooledParameter(together, prediction, mean.between, tuple(used), slopes, at)
+
+
+def _judge(own: Measurement, unit: str, of: str, tolerance: float) -> Parameter:
+    """A verdict on a number; `of` names the logs that it is from."""
+    share = own.half / abs(own.value) if own.value else np.inf
+    found = Parameter.of(own.value, unit, Verdict.IDENTIFIED, "", own.contributions)
+    if share >= 1:
+        reason = f"95 %: {own.value - own.half:.3g} to {own.value + own.half:.3g}; zero is within it ({of})"
         return found.without_number(reason, ci95=found.ci95)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"

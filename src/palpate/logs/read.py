@@ -155,8 +155,8 @@ def read_run(path: Path, **options: Any) -> Record:
         fact = (
             "a press over a wire: force and position along its direction, the force relative to free motion"
         )
-        wire = about.meta["wire"]
-        meta = {**record.meta, "facts": [fact], "position_from": "joints", **_arm(path, wire)}
+        source = "tip" if about.meta.get("position_from") == "tip" else "joints"
+        meta = {**record.meta, "facts": [fact], "position_from": source, **_arm(path, about.meta["wire"])}
         return Record(record.columns, record.units, meta)
     fact = f"a run's record: {RUN['position']} and {RUN['force']}, with the record's own instruments"
     # Without a tool the bench's force is that on the surface itself.

@@ -12,7 +12,7 @@ from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
-from palpate.robots.serial.chain import Chain, Room, axis_of, chain_motion, room_for
+from palpate.robots.serial.chain import KinematicChain, Room, axis_of, chain_motion, room_for
 from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward_both, product
 
 
@@ -70,7 +70,7 @@ NO_TOOL = HeldTool(ZERO3, ZERO3, 0.0, ZERO3)
 
 
 @part
-class Cell(NamedTuple):
+class Workcell(NamedTuple):
     """Arm, surface and sensor.
 
     Args:
@@ -90,7 +90,7 @@ class Cell(NamedTuple):
         second: 2 z w [1/s].
     """
 
-    chain: Chain
+    chain: KinematicChain
     normal: Vec3
     place: float
     surface: KelvinVoigt
@@ -124,7 +124,7 @@ class Body(NamedTuple):
 
 
 @part
-class Touch(NamedTuple):
+class TouchState(NamedTuple):
     """State of surface and sensor, and the last force."""
 
     surface: SurfaceState
@@ -271,7 +271,7 @@ def measured_by(sensor, share, touch, surface, force, held, depth, time, noise):
     """The touch after a step that is this share of a tick; `held` is what the tool adds to the reading [N]."""
     felt = max(force, 0.0)
     reading = read_sensor(sensor, touch.reading, felt + held, time, noise)
-    return Touch(surface, reading, force, touch.mean + share * felt, depth)
+    return TouchState(surface, reading, force, touch.mean + share * felt, depth)
 
 
 @law
@@ -282,7 +282,7 @@ def tick(cell, body, touch, setpoint, k, noise):
     """
     # What a function with a branch in it is handed is counted at each step, if it is an array; so it is handed none.
     sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
-    touch = Touch(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
+    touch = TouchState(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
         apply_drive(cell, body, setpoint)
         tip = chain_motion(cell.chain, body.q, body.qd, body.room)

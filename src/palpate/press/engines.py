@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import msgspec
 import numpy as np
 
-from palpate._jit import Bound, kernel, law
+from palpate._jit import BoundKernel, kernel, law
 from palpate._vector import Mat3, Vec3, Vec6
 from palpate.arrays import Array
 from palpate.controllers.controller import controller
@@ -16,11 +16,11 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, approach_speed, free_motion_level
 from palpate.force.lag import lag_of
-from palpate.press.cell import Body, Cell, Touch, compiled_foreign, compiled_tick
+from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
-from palpate.signals.types import Sense
+from palpate.signals.types import Sense, triple
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9
@@ -30,7 +30,9 @@ _HELD = 1e9
 class Engine(Protocol):
     """Moves an arm through a tick."""
 
-    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+    def tick(
+        self, cell: Workcell, body: Body, touch: TouchState, setpoint: Array, k: int, noise: Array
+    ) -> TouchState:
         """The k-th tick under a set-point that holds; the body is changed in place."""
         ...
 
@@ -39,11 +41,13 @@ class Own:
     """Physics by palpate's own laws."""
 
     def __init__(self) -> None:
-        self._tick = Bound(compiled_tick)
+        self._tick = BoundKernel(compiled_tick)
 
-    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+    def tick(
+        self, cell: Workcell, body: Body, touch: TouchState, setpoint: Array, k: int, noise: Array
+    ) -> TouchState:
         """One tick, as `Engine` describes it."""
-        after: Touch = self._tick(cell, body, touch, setpoint, k, noise)
+        after: TouchState = self._tick(cell, body, touch, setpoint, k, noise)
         return after
 
 
@@ -59,11 +63,11 @@ class ByMuJoCo:
         q: joint positions at the start.
     """
 
-    def __init__(self, arm: SerialArm, cell: Cell, q: Array):
+    def __init__(self, arm: SerialArm, cell: Workcell, q: Array):
         from palpate.robots.serial.loading import mujoco
         from palpate.robots.serial.serial_arm import scene_of
 
-        self._engine, self._step = mujoco(), Bound(compiled_foreign)
+        self._engine, self._step = mujoco(), BoundKernel(compiled_foreign)
         scene = scene_of(arm)
         model = copy(scene.model)
         flags = self._engine.mjtDisableBit
@@ -78,7 +82,9 @@ class ByMuJoCo:
         self._dofs, self._positions, self._scene = scene.dofs, scene.positions, scene
         self._M, self._J, self._Jdot = np.zeros((model.nv, model.nv)), *np.zeros((2, 6, model.nv))
 
-    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+    def tick(
+        self, cell: Workcell, body: Body, touch: TouchState, setpoint: Array, k: int, noise: Array
+    ) -> TouchState:
         """One tick, as `Engine` describes it."""
         from palpate.robots.serial.loading import refusals
 
@@ -97,13 +103,20 @@ class ByMuJoCo:
 
     # More than seven arguments: those of the compiled step.
     def _contact(
-        self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
-    ) -> Touch:
+        self,
+        cell: Workcell,
+        body: Body,
+        touch: TouchState,
+        tip: Tip,
+        setpoint: Array,
+        time: float,
+        noise: Array,
+    ) -> TouchState:
         """Drives, contact and sensor after a step."""
-        after: Touch = self._step(cell, body, touch, tip, setpoint, time, noise)
+        after: TouchState = self._step(cell, body, touch, tip, setpoint, time, noise)
         return after
 
-    def _load(self, body: Body, touch: Touch) -> Array:
+    def _load(self, body: Body, touch: TouchState) -> Array:
         """Torques of the contact force [N m, N], shape (n,)."""
         return np.asarray(body.normal * max(touch.force, 0.0))
 
@@ -120,14 +133,10 @@ class ByMuJoCo:
         body.room.h[:] = (data.qfrc_bias - data.qfrc_passive)[dofs]
         body.room.J[:] = J[:, dofs]
         bias, velocity = Jdot @ data.qvel, J @ data.qvel
-        R = Mat3(*(_three(row) for row in axes))
+        R = Mat3(*map(triple, axes))
         return Tip(
-            _three(at), R, _three(velocity[:3]), _three(velocity[3:]), _three(bias[:3]), _three(bias[3:])
+            triple(at), R, triple(velocity[:3]), triple(velocity[3:]), triple(bias[:3]), triple(bias[3:])
         )
-
-
-def _three(values: Any) -> Vec3:
-    return Vec3(*map(float, values))
 
 
 MODES = ("torque", "position")

@@ -14,12 +14,13 @@ from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
-from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, pilot_of, press
+from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, driver_of, press
+from palpate.press.sequence import Plan, plan_for
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import Asked
 from palpate.press.tare import SURE, check_drift, check_range, fitting, noise_and_drift
-from palpate.press.tool import Plan, held_tool, plan_for, with_tool
+from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
@@ -89,8 +90,8 @@ class Pressing:
             most = self.plan.force + SURE * loop.sensor.noise
             check_range(abs(arm.zero), most, loop.sensor.full_scale)
         gains = fit_gains(asked.gains, resting.at_rest(), self.plan)
-        pilot = pilot_of(asked.controller, arm, gains, asked.place, self.plan.force)
-        record = press(arm, pilot, asked.place, self.plan, progress)
+        driver = driver_of(asked.controller, arm, gains, asked.place, self.plan.force)
+        record = press(arm, driver, asked.place, self.plan, progress)
         meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
         return Record(record.columns, record.units, meta)
 

@@ -13,9 +13,10 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, held
-from palpate.press.cell import NO_TOOL, Cell, HeldTool, WristSensor
+from palpate.press.cell import NO_TOOL, HeldTool, Workcell, WristSensor
 from palpate.robots.serial.inverse import checked_pose
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.signals.types import triple
 
 GAP = 0.003
 """Between tip and surface at the start [m]."""
@@ -133,7 +134,9 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
         )
 
 
-def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL) -> Cell:
+def cell_of(
+    arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL
+) -> Workcell:
     """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
     motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if motors else arm.chain
@@ -153,8 +156,8 @@ def cell_of(arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool:
         damper = loop.inner.lag * spring
         fastest = max(fastest, _fastest(links, damper))
     steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
-    return Cell(
-        chain=chain, normal=_three(place.normal), place=place.place, surface=surface,
+    return Workcell(
+        chain=chain, normal=triple(place.normal), place=place.place, surface=surface,
         sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps,
         elastic=float(motors or servo), yields=float(servo), spring=spring, damper=damper, first=float(first),
         second=float(second),
@@ -178,7 +181,7 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return WristSensor(
-        E=Mat3(*(_three(row) for row in wide)), e=_pad(e), c=_pad(c), d=0.0 if len(b) else 1.0,
+        E=Mat3(*map(triple, wide)), e=_pad(e), c=_pad(c), d=0.0 if len(b) else 1.0,
         step=float(step), sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
         full_scale=float(loop.sensor.full_scale),
     )  # fmt: skip
@@ -213,8 +216,4 @@ def _unit(direction: Array) -> Array:
 
 
 def _pad(values: Array) -> Vec3:
-    return _three(np.concatenate([values, np.zeros(3 - len(values))]))
-
-
-def _three(values: Array) -> Vec3:
-    return Vec3(*(float(v) for v in values))
+    return triple(np.concatenate([values, np.zeros(3 - len(values))]))

@@ -1,4 +1,4 @@
-"""An arm of the simulation behind the protocol of a real one."""
+"""A simulated arm, read and moved as a real one."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from palpate._jit import Bound
-from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate._jit import BoundKernel
+from palpate._vector import ZERO3, Mat3, Vec6
 from palpate.arrays import Array
 from palpate.bench.given_motion import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
-from palpate.press.cell import Cell, Reading, Touch, body_at
+from palpate.press.cell import Reading, TouchState, Workcell, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
+from palpate.press.sequence import TipSample
 from palpate.press.setting import Place
 from palpate.press.tare import TARE
-from palpate.press.tool import Command, Sense
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
-from palpate.signals.types import Task
+from palpate.signals.types import Task, alike, triple
 
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
@@ -55,7 +55,7 @@ class Truth:
 
 
 class SimulatedArm:
-    """Reads and commands as `protocol.Wire`; `write` is a tick of the simulation.
+    """A simulated arm: each command is a tick of the simulation.
 
     Args:
         arm: what moves.
@@ -72,7 +72,7 @@ class SimulatedArm:
         arm: SerialArm,
         loop: Arm,
         place: Place,
-        cell: Cell,
+        cell: Workcell,
         physics: str | Engine = "own",
         seed: int = 0,
         resolution: float = ENCODER,
@@ -85,7 +85,9 @@ class SimulatedArm:
         self._sag = sag
         self._body = body_at(place.q, place.q + sag)
         first = Reading(ZERO3, 0.0, 0.0, 0.0)
-        self._touch = Touch(UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place)
+        self._touch = TouchState(
+            UNTOUCHED, first, 0.0, 0.0, float(place.normal @ place.pose[:3, 3]) - place.place
+        )
         by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._engine: Engine = by_name if isinstance(physics, str) else physics
         self._k, self.zero = 0, 0.0
@@ -96,12 +98,15 @@ class SimulatedArm:
         rest = place.q + sag if self._tip is None else arm.gravity_torque(place.q)
         self._line = deque([rest] * loop.delay_ticks)
 
-    def read(self) -> Sense:
+    def read(self) -> TipSample:
         """The readings at this tick."""
-        force = np.zeros(6)
-        force[:3] = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
-        seen = self._seen
-        return Sense(self._k * self.loop.tick, force, self.arm.forward_kinematics(seen), seen)
+        force = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
+        return TipSample(self._k * self.loop.tick, force, self.pose[:3, 3])
+
+    @property
+    def pose(self) -> Array:
+        """Pose of the tip by the encoders, homogeneous, shape (4, 4)."""
+        return self.arm.forward_kinematics(self._seen)
 
     def at_rest(self) -> Array:
         """Readings of the sensor in the second half of a rest in free motion, tick by tick [N], shape (n,).
@@ -110,7 +115,7 @@ class SimulatedArm:
         """
         shown = []
         for _ in range(round(TARE / self.loop.tick)):
-            self.write(Command(velocity=np.zeros(6)))
+            self.move(np.zeros(3))
             shown.append(self._touch.reading.value)
         return np.array(shown[len(shown) // 2 :], dtype=np.float64)
 
@@ -118,20 +123,24 @@ class SimulatedArm:
         """Rests in free motion, and takes what the sensor shows in the second half of that for zero."""
         self.zero = float(self.at_rest().mean())
 
-    def write(self, command: Command) -> None:
-        """Moves as told for a tick.
+    def move(self, velocity: Array) -> None:
+        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
+        self._goal[:3, 3] += self.loop.tick * np.asarray(velocity)
+        self._follow_goal()
 
-        Raises:
-            InputError: neither a velocity nor a pose, or both.
-        """
-        self._aim(command)
+    def move_to(self, pose: Array) -> None:
+        """Moves the tip for a tick towards a pose, homogeneous, shape (4, 4)."""
+        self._goal = np.array(pose, dtype=float)
+        self._follow_goal()
+
+    def _follow_goal(self) -> None:
         if self._tip is None:
             self._advance(self._follow() + self._sag)
         else:
             self._act(self._tip.spring, self._tip.towards(self._goal))
 
     def act(self, controller: Any, task: Task) -> None:
-        """Moves for a tick under a controller of torques, told in the task's axes.
+        """Moves for a tick under a controller of torques, in the task's axes.
 
         Raises:
             InputError: the arm takes positions.
@@ -140,10 +149,7 @@ class SimulatedArm:
             raise InputError("a controller of torques needs --mode torque")
         self._act(controller, task)
 
-    def close(self) -> None:
-        """Nothing is left to do."""
-
-    def change_surface(self, cell: Cell) -> None:
+    def change_surface(self, cell: Workcell) -> None:
         """Puts the surface of another cell in the place of this one's, such that it bears the force of this moment.
 
         Palpate's own physics alone can; MuJoCo keeps the step it began with.
@@ -164,16 +170,6 @@ class SimulatedArm:
             body.q.copy(), body.qd.copy(), touch.mean, touch.depth, touch.surface.contact == 1.0,
             body.drive.copy(), self._saturated.copy(),
         )  # fmt: skip
-
-    def _aim(self, command: Command) -> None:
-        if (command.velocity is None) == (command.pose is None):
-            raise InputError("a command is either a velocity or a pose")
-        if command.pose is not None:
-            self._goal = np.array(command.pose, dtype=float)
-            return
-        moved = self.loop.tick * np.asarray(command.velocity)
-        self._goal[:3, 3] += moved[:3]
-        self._goal[:3, :3] = _turn(moved[3:]) @ self._goal[:3, :3]
 
     def _follow(self) -> Array:
         """Set-points of the motors whose pose follows the goal, by resolved rates of least size."""
@@ -217,22 +213,21 @@ class _TipLoop:
         J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
         mobility = J @ np.linalg.solve(M, J.T)
         turning = float(1.0 / np.linalg.eigvalsh(mobility[3:, 3:])[-1]) / inner.mass
-        one = Vec3(1.0, 1.0, 1.0)
+        spring, damper = float(inner.stiffness), float(inner.damping)
         self.spring = Spring(
-            Vec6(float(inner.stiffness) * one, float(inner.stiffness * turning) * one),
-            Vec6(float(inner.damping) * one, float(inner.damping * turning) * one),
+            Vec6(alike(spring), alike(spring * turning)), Vec6(alike(damper), alike(damper * turning))
         )
         self._chain, self._axes = arm.chain, place.axes
-        self._rows, self._held = _matrix(place.axes), _matrix(place.pose[:3, :3])
+        self._rows, self._held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
         n = arm.joints
         self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
-        self._laws: dict[type, Bound] = {}
+        self._laws: dict[type, BoundKernel] = {}
         self._n = n
 
     def towards(self, goal: Array) -> Task:
         """The task of standing at a pose; the tip keeps its turn."""
-        x: Any = Vec6(Vec3(*(float(v) for v in self._axes @ goal[:3, 3])), ZERO3)
+        x: Any = Vec6(triple(self._axes @ goal[:3, 3]), ZERO3)
         nothing = 0.0 * x
         return Task(x, nothing, nothing, nothing, nothing)
 
@@ -240,7 +235,7 @@ class _TipLoop:
         """Of the joints [N m], shape (n,)."""
         kind = type(controller)
         if kind not in self._states:
-            self._states[kind], self._laws[kind] = controller.start(), Bound(compiled_tip_torque)
+            self._states[kind], self._laws[kind] = controller.start(), BoundKernel(compiled_tip_torque)
         state = self._states[kind]
         torque = np.zeros(self._n)
         compiled_description(self._chain, q, qd, self._found)
@@ -249,17 +244,3 @@ class _TipLoop:
             self._room, torque,
         )  # fmt: skip
         return torque
-
-
-def _turn(vector: Array) -> Array:
-    """The rotation of a rotation vector [rad] (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
-
-
-def _matrix(rows: Array) -> Mat3:
-    return Mat3(*(Vec3(*(float(v) for v in row)) for row in rows))

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
-from palpate.force.describe import UNCOVERED, bounds, sentence
+from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.sliding.slide_proof import slide_proof
 from palpate.force.steps import BAND
-from palpate.force.tuning import RIGID, Tuning, surface_ends
+from palpate.force.tuning import RIGID, Tuning
 from palpate.report import style
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.figure_panels.panels import panels_of
@@ -22,13 +21,8 @@ from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
     from rich.console import Console
-
-    from palpate.force import Certificate
-    from palpate.force.certificate import Verdict
 
 
 def rows(told: Tuning) -> list[tuple[str, str]]:
@@ -125,52 +119,6 @@ def lines(told: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
 def _span(low: float, high: float) -> str:
     end = "up" if high >= RIGID else f"to {quantity(high, 'N/m')}"
     return f"{quantity(low, 'N/m')} {end}"
-
-
-def proof_lines(certificate: Certificate, verdict: Verdict, written: Path | None = None) -> Iterator[Text]:
-    """A certificate: whether it holds, and the surfaces that each of its claims covers, a line each."""
-    gains, place = certificate.gains, f"   written: {written}" if written else ""
-    if not certificate.claims:
-        yield Text("✕ Nothing could be proved.", "bold red")
-    elif verdict.holds:
-        title = (
-            f"✓ The certificate holds: {verdict.cells} cells, each contracts by more than its rounding error."
-        )
-        yield Text(title, "bold green").append(printable(place), "default")
-        yield Text(f"Stable on surfaces with K + B/theta (theta {1e3 * gains.theta:.2g} ms) of")
-    else:
-        yield Text(printable(f"✕ The certificate does not hold: {verdict.why}."), "bold red")
-    for i, claim in enumerate(certificate.claims):
-        if claim.kind == "held" and i > 0:
-            continue  # that of a slide, below
-        low, high = surface_ends(gains.arm, claim.low, claim.high)
-        times, span = "", _span(low, high)
-        if claim.kind == "one-sided":
-            span = (
-                f"up to {quantity(high, 'N/m')}, over gaps of up to {quantity(gains.force / claim.low, 'm')}"
-            )
-        elif claim.kind == "adapting":
-            least, most = bounds(claim, gains)
-            end = f" to {most:.3g}" if isfinite(most) else " and more"
-            times = (
-                f", K_u {least:.3g}{end} times theirs, readings {claim.ages[0]} to {claim.ages[1]} ticks old"
-            )
-            span = "any stiffness" if gains.arm.kind == "position" else span
-        if claim.kind != "adapting" and claim.shares[1] > 1.0:
-            times = f", at up to {claim.shares[1]:g} times the gain"
-        damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
-        yield Text(f"  {_CLAIMS[claim.kind]:24}{span}{times}{damping}")
-    if (slide := slide_proof(certificate)) is not None:
-        ends, (least, most) = slide["felt_stiffness"], slide["gain_factor"]
-        span = "no surface" if ends is None else _span(*surface_ends(gains.arm, *ends))
-        off = (
-            f"normal off by up to {slide['angle_deg']:g}\N{DEGREE SIGN}, friction up to {slide['friction']:g}"
-        )
-        yield Text(f"  {'slide':24}{span}, {off}, both changing (gain x {least:.2g} to {most:.3g}); B = 0")
-    yield Text(f"Not covered: {len(UNCOVERED)} cases, which --verbose lists.")
-
-
-_CLAIMS = {"held": "constant gain", "one-sided": "contact lost and found", "adapting": "adapting gain"}
 
 
 def show_all(told: Tuning, console: Console) -> None:

@@ -26,7 +26,7 @@ FIRM = 0.5
 
 
 @dataclass(frozen=True)
-class Touch:
+class TouchMetrics:
     """The transition from free motion to contact.
 
     Args:
@@ -51,7 +51,7 @@ class Touch:
         return self.settling is not None and self.overshoot <= OVER and not self.lost
 
 
-def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> Touch:
+def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> TouchMetrics:
     """Metrics of a touch.
 
     Args:
@@ -64,11 +64,13 @@ def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> Touch
     last = force[-round(rate) :]
     if not contact.any() or not np.isfinite(force).all():
         finite = np.isfinite(force).all()
-        return Touch(None, 0.0 if finite else math.inf, 0, 0, -desired if finite else math.nan, math.nan)
+        return TouchMetrics(
+            None, 0.0 if finite else math.inf, 0, 0, -desired if finite else math.nan, math.nan
+        )
     start, over = int(np.argmax(contact)), force > FIRM * desired
     firm = int(np.argmax(over)) if over.any() else len(force)
     ends = np.flatnonzero(contact[:-1] & ~contact[1:])
-    return Touch(
+    return TouchMetrics(
         settling_time(force[start:], desired, rate),
         float(force.max() / desired - 1.0),
         int((ends < firm).sum()),
@@ -154,7 +156,7 @@ class RunMetrics:
         disturbance: rms error while the surface moves, over the one of a tip that rests; None where nothing moved it.
     """
 
-    touch: Touch
+    touch: TouchMetrics
     up: ForceStep
     down: ForceStep
     bandwidth: float | None

@@ -14,7 +14,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import RECORD
 from palpate.logs import read_record
-from palpate.press.tool import Plan
+from palpate.press.sequence import Plan
 from palpate.records import Record
 from palpate_benchmark.metrics import ForceStep, RunMetrics, step, touch
 from palpate_benchmark.plan import ForcePlan

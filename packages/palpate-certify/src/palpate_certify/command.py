@@ -1,22 +1,210 @@
-"""`palpate certify FILE.yaml --controller ...`: what the command does with a controller of others."""
+"""`palpate certify`: where a tuned force loop, or a controller of others, is stable: the proof, and its check."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from palpate.cli.toolkit import command, print_answer, print_lines
+from cyclopts import Group, Parameter
+
+from palpate.cli.options.common import ReportOption
+from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
+from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.toolkit import command, console, print_answer, print_lines
+from palpate.errors import InputError
 from palpate.files import MADE, write_text
-from palpate_certify.controller_file import STIFFEST, certify_controller
-from palpate_certify.report import lines, page
 
 if TYPE_CHECKING:
-    from palpate.cli.certify import OthersOptions, ProofOptions
-    from palpate.cli.options.force import TuningOutputOptions
+    from palpate.force import Certificate
+    from palpate.force.certificate import CertificateVerdict
 
 
-def certify_file(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
+@Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
+@dataclass(frozen=True, kw_only=True)
+class ProofOptions:
+    """Surfaces, gains and delays of the proof."""
+
+    stiffness: Annotated[str | None, SIGNED] = None
+    """Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability
+    limit if not given."""
+    damping_time: Annotated[str | None, SIGNED] = None
+    "Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0)."
+    jitter: Annotated[int, SIGNED] = 1
+    "Ticks by which a reading may be older than the sensor's period while the law adapts."
+    margin: Annotated[float, SIGNED] = 1.0
+    "Factor by which the gains may grow."
+    held_only: Annotated[bool, FLAG] = False
+    "Leave out the proof of the adapting law."
+    loop_from: Path | None = None
+    """A log of commanded and measured position in free motion: the proof uses the inner loop identified from
+    it."""
+
+    def check(self) -> None:
+        """Finds numbers out of range."""
+        if not 0 <= self.jitter <= 10:
+            raise InputError(f"--jitter must be from 0 to 10 ticks, got {self.jitter}")
+        if not 1.0 <= self.margin <= 10.0:
+            raise InputError(f"--margin must be from 1 to 10, got {self.margin:g}")
+
+    @property
+    def surfaces(self) -> tuple[float, float] | None:
+        """K + B/theta [N/m]."""
+        from palpate.cli.options.values import spread
+
+        if self.stiffness is None:
+            return None
+        low, high = spread("--stiffness", self.stiffness, "stiffness")
+        if not 0.0 < low < high:
+            raise InputError(
+                f"--stiffness must be an interval above 0 N/m with its lower end first, got {self.stiffness!r}"
+            )
+        return low, high
+
+    @property
+    def longest(self) -> float | None:
+        """Longest damping time B/K [s]."""
+        from palpate.cli.options.values import spread
+
+        if self.damping_time is None:
+            return None
+        low, high = spread("--damping-time", self.damping_time, "time")
+        if not 0.0 == low <= high:
+            raise InputError(f"--damping-time must be 0:T in seconds, got {self.damping_time!r}")
+        return high
+
+
+@Parameter(name="*", group=Group("Another controller", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class OthersOptions(ReportOption):
+    """A controller of others, by its parameter file.
+
+    Parameters
+    ----------
+    controller
+        ros2-admittance, fzi, crisp or franka: the file is its YAML file, --stiffness the surfaces that the corrected
+        numbers are for, --damping-time their damping, --out a file with these numbers.
+    delay
+        Everything that is late between contact and motion, such as 24:ms.
+    mass
+        Mass of the tip along the normal, for crisp and franka, such as 3:kg.
+    report
+        Where to write a page about that controller, an HTML file.
+    """
+
+    controller: str | None = None
+    delay: str | None = None
+    mass: str | None = None
+    report: Path | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Everything late between contact and motion [s]."""
+        from palpate.cli.options.values import quantity
+
+        if self.delay is None:
+            raise InputError(
+                "--controller needs --delay, everything late between contact and motion, such as 24:ms"
+            )
+        return quantity("--delay", self.delay, "time")
+
+    @property
+    def kilograms(self) -> float | None:
+        """Mass of the tip along the normal [kg]."""
+        from palpate.cli.options.values import quantity
+
+        return None if self.mass is None else quantity("--mass", self.mass, "mass")
+
+
+def certify(
+    gains: Path | None = None,
+    /,
+    *,
+    others: OthersOptions | None = None,
+    proof: ProofOptions | None = None,
+    columns: ColumnOptions | None = None,
+    output: TuningOutputOptions | None = None,
+    check: Path | None = None,
+) -> int:
+    """Prove where a tuned force loop is stable, or check such a proof.
+
+    palpate certify gains.toml --out certificate.json
+
+    palpate certify gains.toml --check certificate.json
+
+    palpate certify force_loop/palpate_force.h --check certificate.json
+
+    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --out corrected.yaml --report page.html
+
+    A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
+    has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
+    part could not be proved, or the certificate does not hold.
+
+    Parameters
+    ----------
+    gains
+        The file of palpate tune, or the parameter file of --controller; for a check also the header of a law in C.
+    check
+        A certificate to check.
+    """
+    proof, output = proof or ProofOptions(), output or TuningOutputOptions()
+    if check is not None:
+        return _check(check, gains, output)
+    if gains is None:
+        raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
+    if others is not None and others.controller is not None:
+        return _others(gains, others, proof, output)
+    if others is not None and others.report is not None:
+        raise InputError("--report is of --controller; palpate tune writes a page about gains")
+    output.check_new(output.out, ending=".json")
+    proof.check()
+    return _prove(gains, proof, columns or ColumnOptions(), output)
+
+
+def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: TuningOutputOptions) -> int:
+    from palpate.force import certify as proved
+    from palpate.force import load_gains
+    from palpate.force.arm import PositionLoop
+
+    gains = load_gains(path)
+    surfaces, longest = asked.surfaces, asked.longest
+    measured = None
+    if asked.loop_from is not None:
+        arm = inner_loop(asked.loop_from, columns).of(gains.arm, asked.loop_from.name)
+        measured = arm.inner if isinstance(arm.inner, PositionLoop) else None
+    with console(stderr=True).status("proving") as status:
+        made = proved(
+            gains,
+            surfaces,
+            longest,
+            asked.jitter,
+            asked.margin,
+            adapting=not asked.held_only,
+            measured=measured,
+            progress=lambda what: status.update(f"proving {what}"),
+        )
+    if output.out is not None and made.claims:
+        made.save(output.out)
+    _print(made, made.check(), output, output.out)
+    kinds = {claim.kind for claim in made.claims}
+    wanted = {"one-sided" if measured is not None else "held"} | (set() if asked.held_only else {"adapting"})
+    missing = wanted - kinds
+    if kinds and missing and not output.json:
+        names = {
+            "adapting": "the adapting gain",
+            "held": "the constant gain",
+            "one-sided": "contact lost and found",
+        }
+        why = "; no proof covers that of a servo" if gains.arm.kind == "servo" else ""
+        print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}{why}.")
+    return 1 if missing else 0
+
+
+def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
     """Print where a controller of others is stable; 1 if it is not proved on all surfaces asked for."""
+    from palpate_certify.controller_file import STIFFEST, certify_controller
+    from palpate_certify.report import lines, page
+
     output.check_new(output.out, ending=".yaml")
     report, delay, mass = others.page(), others.seconds, others.kilograms
     stiffest = STIFFEST if asked.surfaces is None else asked.surfaces[1]
@@ -34,3 +222,56 @@ def certify_file(path: Path, others: OthersOptions, asked: ProofOptions, output:
         print_lines(*lines(answer, written))
     proved = answer["proved"]["stiffness"]
     return 0 if proved is not None and proved[1] >= stiffest else 1
+
+
+def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
+    from palpate.force import Certificate, load_gains
+
+    certificate = Certificate.load(path)
+    if gains is not None and gains.suffix == ".h":
+        from palpate.force.c_header import check_header
+
+        check_header(certificate, gains)
+    elif gains is not None:
+        certificate.check_of(load_gains(gains))
+    with console(stderr=True).status("checking"):
+        verdict = confirm(path, certificate)
+    _print(certificate, verdict, output)
+    return 0 if verdict.holds else 1
+
+
+def confirm(path: Path, certificate: Certificate) -> CertificateVerdict:
+    """The verdict, if the independent check has the same."""
+    from palpate.force.sliding.slide_proof import slide_proof
+    from palpate_certify.force_certificate import RefusedError, check, check_slide
+
+    verdict, slide = certificate.check(), slide_proof(certificate)
+    try:
+        check(path.read_bytes())
+        if slide is not None and slide["felt_stiffness"] is not None:
+            check_slide(path.read_bytes(), *slide["felt_stiffness"])
+    except RefusedError as error:
+        return replace(verdict, holds=False, why=verdict.why or f"by the independent check, {error}")
+    return verdict
+
+
+def _print(
+    certificate: Certificate,
+    verdict: CertificateVerdict,
+    output: TuningOutputOptions,
+    written: Path | None = None,
+) -> None:
+    if output.json:
+        from palpate.force.describe import as_json
+
+        print_answer(as_json(certificate, verdict))
+        return
+    if output.verbose:
+        from palpate.force.describe import lines
+
+        print_lines(*lines(certificate, verdict))
+        return
+    from palpate.report.terminal import print_hanging
+    from palpate_certify.report import proof_lines
+
+    print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())

@@ -9,16 +9,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from rich.text import Text
 
+from palpate.force.describe import UNCOVERED as CASES
+from palpate.force.describe import bounds
+from palpate.force.sliding.slide_proof import slide_proof
+from palpate.force.tuning import RIGID, surface_ends
 from palpate.report import style
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.numbers import quantity
+from palpate.text import printable
 from palpate_certify.controller_file import UNCOVERED, ControllerVerdict
 from palpate_certify.delayed_contact import DelayedContact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from palpate.force import Certificate
+    from palpate.force.certificate import CertificateVerdict
 
 DELAYS = np.geomspace(0.25, 4.0, 33)
 """Of the delay, for which the edge is drawn."""
@@ -160,3 +169,56 @@ def _edge_at(loop: DelayedContact, delay: float) -> float:
     """Stiffness from which a loop is unstable with another delay [N/m]; not a number where none or all are."""
     found = replace(loop, delay=delay).first_unstable()
     return found if isfinite(found) and found > 0.0 else float("nan")
+
+
+def proof_lines(
+    certificate: Certificate, verdict: CertificateVerdict, written: Path | None = None
+) -> Iterator[Text]:
+    """A certificate: whether it holds, and the surfaces that each of its claims covers, a line each."""
+    gains, place = certificate.gains, f"   written: {written}" if written else ""
+    if not certificate.claims:
+        yield Text("✕ Nothing could be proved.", "bold red")
+    elif verdict.holds:
+        title = (
+            f"✓ The certificate holds: {verdict.cells} cells, each contracts by more than its rounding error."
+        )
+        yield Text(title, "bold green").append(printable(place), "default")
+        yield Text(f"Stable on surfaces with K + B/theta (theta {1e3 * gains.theta:.2g} ms) of")
+    else:
+        yield Text(printable(f"✕ The certificate does not hold: {verdict.why}."), "bold red")
+    for i, claim in enumerate(certificate.claims):
+        if claim.kind == "held" and i > 0:
+            continue  # that of a slide, below
+        low, high = surface_ends(gains.arm, claim.low, claim.high)
+        times, span = "", _stretch(low, high)
+        if claim.kind == "one-sided":
+            span = (
+                f"up to {quantity(high, 'N/m')}, over gaps of up to {quantity(gains.force / claim.low, 'm')}"
+            )
+        elif claim.kind == "adapting":
+            least, most = bounds(claim, gains)
+            end = f" to {most:.3g}" if isfinite(most) else " and more"
+            times = (
+                f", K_u {least:.3g}{end} times theirs, readings {claim.ages[0]} to {claim.ages[1]} ticks old"
+            )
+            span = "any stiffness" if gains.arm.kind == "position" else span
+        if claim.kind != "adapting" and claim.shares[1] > 1.0:
+            times = f", at up to {claim.shares[1]:g} times the gain"
+        damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
+        yield Text(f"  {_CLAIMS[claim.kind]:24}{span}{times}{damping}")
+    if (slide := slide_proof(certificate)) is not None:
+        ends, (least, most) = slide["felt_stiffness"], slide["gain_factor"]
+        span = "no surface" if ends is None else _stretch(*surface_ends(gains.arm, *ends))
+        off = (
+            f"normal off by up to {slide['angle_deg']:g}\N{DEGREE SIGN}, friction up to {slide['friction']:g}"
+        )
+        yield Text(f"  {'slide':24}{span}, {off}, both changing (gain x {least:.2g} to {most:.3g}); B = 0")
+    yield Text(f"Not covered: {len(CASES)} cases, which --verbose lists.")
+
+
+_CLAIMS = {"held": "constant gain", "one-sided": "contact lost and found", "adapting": "adapting gain"}
+
+
+def _stretch(low: float, high: float) -> str:
+    end = "up" if high >= RIGID else f"to {quantity(high, 'N/m')}"
+    return f"{quantity(low, 'N/m')} {end}"

@@ -7,24 +7,30 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from palpate_excitation.designs import Design, Remedy, design, remedies
-    from palpate_excitation.force_loops import ForceLoop, HybridLoop, KnownBandwidth, Surface, SurfaceRange
-    from palpate_excitation.problem import Budget, Problem, Sensors
+    from palpate_excitation.force_loops import (
+        ExcitedLoop,
+        HybridLoop,
+        KnownBandwidth,
+        LinearSurface,
+        SurfaceRange,
+    )
+    from palpate_excitation.problem import Budget, DesignProblem, Sensors
 
 _NAMES = {
     "designs": ("Design", "Remedy", "design", "remedies"),
-    "force_loops": ("ForceLoop", "HybridLoop", "KnownBandwidth", "Surface", "SurfaceRange"),
-    "problem": ("Budget", "Problem", "Sensors"),
+    "force_loops": ("ExcitedLoop", "HybridLoop", "KnownBandwidth", "LinearSurface", "SurfaceRange"),
+    "problem": ("Budget", "DesignProblem", "Sensors"),
 }
 __all__ = [
     "Budget",
     "Design",
-    "ForceLoop",
+    "DesignProblem",
+    "ExcitedLoop",
     "HybridLoop",
     "KnownBandwidth",
-    "Problem",
+    "LinearSurface",
     "Remedy",
     "Sensors",
-    "Surface",
     "SurfaceRange",
     "design",
     "remedies",

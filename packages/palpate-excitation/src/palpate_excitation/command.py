@@ -17,7 +17,7 @@ from palpate.files import write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate_excitation import Budget, Design, ForceLoop, Problem, Remedy, Sensors, SurfaceRange
+    from palpate_excitation import Budget, Design, DesignProblem, ExcitedLoop, Remedy, Sensors, SurfaceRange
 
 
 _FASTEST = 200_000
@@ -158,7 +158,7 @@ class LoopOptions:
     integral: Annotated[float | None, SIGNED] = None
     "Of the force error, 1/s."
 
-    def loop(self) -> ForceLoop:
+    def loop(self) -> ExcitedLoop:
         """Force loop that follows the desired force."""
         from palpate_excitation import HybridLoop, KnownBandwidth
 
@@ -222,14 +222,14 @@ def excite(
     Exit code 1: the precision cannot be reached within the limits; the remedies are printed.
     """
     from palpate.cli.options.values import shares
-    from palpate_excitation import Problem
+    from palpate_excitation import DesignProblem
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
     robot, output = robot or LoopOptions(), output or ExcitationOutput()
     picture = output.picture("excite.png")
     output.check_all()
     surfaces = surface.range()
-    problem = Problem(
+    problem = DesignProblem(
         surfaces,
         limits.budget(),
         shares("--precision", goal.precision, surfaces.names),
@@ -244,7 +244,7 @@ def excite(
     return _answer(problem, sensor.rate, output, picture)
 
 
-def _answer(problem: Problem, rate: int, output: ExcitationOutput, picture: Path | None) -> int:
+def _answer(problem: DesignProblem, rate: int, output: ExcitationOutput, picture: Path | None) -> int:
     from palpate_excitation import design, remedies
 
     found = design(problem)

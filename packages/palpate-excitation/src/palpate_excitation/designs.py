@@ -17,13 +17,13 @@ from palpate.references import Chirp, Multisine
 from palpate_excitation import multisine
 from palpate_excitation.force_loops import Made, SurfaceResponse, Wave
 from palpate_excitation.multisine import error_of_sweep
-from palpate_excitation.problem import LONGEST, Problem, used_up
+from palpate_excitation.problem import LONGEST, DesignProblem, used_up
 
 _ENDS = 6  # places for each end of the sweep
 _FINE = 64  # frequencies of a sweep that are looked at
 
 
-def best_chirp(problem: Problem, seconds: float) -> Made:
+def best_chirp(problem: DesignProblem, seconds: float) -> Made:
     """The best sweep of so many seconds: from where to where, and whether evenly or logarithmically."""
     budget = problem.budget
     grid = np.geomspace(budget.lowest, budget.highest, _ENDS)
@@ -44,7 +44,7 @@ def _frequencies(sweep: Chirp) -> Array:
     return 2 * np.pi * (sweep.low + share * (sweep.high - sweep.low))
 
 
-def _within_budget(problem: Problem, sweep: Chirp) -> Chirp:
+def _within_budget(problem: DesignProblem, sweep: Chirp) -> Chirp:
     omega = _frequencies(sweep)
 
     def share(amplitude: float) -> float:
@@ -54,11 +54,11 @@ def _within_budget(problem: Problem, sweep: Chirp) -> Chirp:
     return sweep._replace(amplitude=used_up(share, problem.budget.desired_swing))
 
 
-def _share(problem: Problem, sweep: Chirp) -> float:
+def _share(problem: DesignProblem, sweep: Chirp) -> float:
     return problem.budget.share(sweep.amplitude, 2 * np.pi * sweep.high * sweep.amplitude)
 
 
-def _predict_chirp(problem: Problem, sweep: Chirp) -> Made:
+def _predict_chirp(problem: DesignProblem, sweep: Chirp) -> Made:
     omega = _frequencies(sweep)
     forces = problem.forces(omega, np.full(_FINE, sweep.amplitude))
     sensors, predictions = problem.sensors, []
@@ -98,7 +98,7 @@ class Design:
         seconds: of the part that counts.
     """
 
-    problem: Problem
+    problem: DesignProblem
     made: Made
     seconds: float
 
@@ -139,7 +139,7 @@ class Design:
         return time, self.problem.budget.mean + eased * self.wave.at(time)
 
 
-def design(problem: Problem) -> Design:
+def design(problem: DesignProblem) -> Design:
     """The excitation that reaches the precision in the shortest time, or the best one in the time given.
 
     Raises:
@@ -161,7 +161,7 @@ def design(problem: Problem) -> Design:
     return found
 
 
-def seconds_needed(made: Made, problem: Problem) -> float:
+def seconds_needed(made: Made, problem: DesignProblem) -> float:
     """Seconds of a wave that reach the precision: more of them never give less information."""
     low, high = 1e-3, FOREVER
     if made.excess(high, problem.precision) > 1:
@@ -172,7 +172,7 @@ def seconds_needed(made: Made, problem: Problem) -> float:
     return high
 
 
-def _whole(problem: Problem, seconds: float) -> float:
+def _whole(problem: DesignProblem, seconds: float) -> float:
     """At least so many seconds, as a whole number of periods or steps, and no more than the longest."""
     step = max(multisine.PERIOD, 1 / problem.budget.lowest) if problem.kind == "multisine" else _STEP
     return min(ceil(seconds / step - 1e-6) * step if seconds < FOREVER else np.inf, problem.longest)
@@ -225,7 +225,7 @@ def remedies(found: Design) -> list[Remedy]:
     return helpful
 
 
-def _try_remedy(words: str, problem: Problem, seconds: float) -> Remedy:
+def _try_remedy(words: str, problem: DesignProblem, seconds: float) -> Remedy:
     made = MAKERS[problem.kind](problem, seconds)
     enough = made.excess(seconds, problem.precision) <= 1
     limit = made.excess(FOREVER, problem.precision)
@@ -236,7 +236,7 @@ def _excess(tried: Remedy, found: Design) -> float:
     return max(tried.reached[name] / asked for name, asked in found.problem.precision.items())
 
 
-def _stronger(problem: Problem, excess: float) -> tuple[str, Problem]:
+def _stronger(problem: DesignProblem, excess: float) -> tuple[str, DesignProblem]:
     budget, more = problem.budget, min(1.1 * excess, _MUCH)
     swing = more * budget.swing
     mean = max(budget.mean, budget.least + swing)
@@ -248,28 +248,28 @@ def _stronger(problem: Problem, excess: float) -> tuple[str, Problem]:
     return words, replace(problem, budget=replace(budget, mean=mean, peak=mean + swing, drive=drive))
 
 
-def _steeper(problem: Problem, excess: float) -> tuple[str, Problem]:
+def _steeper(problem: DesignProblem, excess: float) -> tuple[str, DesignProblem]:
     rate = problem.budget.rate
     faster = min(1.1 * excess, _MUCH) * rate
     words = f"a force that changes by {faster:.3g} N/s instead of {rate:g} N/s"
     return words, replace(problem, budget=replace(problem.budget, rate=faster))
 
 
-def _wider(problem: Problem, _excess: float) -> tuple[str, Problem]:
+def _wider(problem: DesignProblem, _excess: float) -> tuple[str, DesignProblem]:
     budget = problem.budget
     highest = max(budget.highest, min(2 * budget.highest, 0.45 * problem.sensors.force.sampling))
     words = f"frequencies up to {highest:g} Hz instead of {budget.highest:g} Hz"
     return words, replace(problem, budget=replace(budget, highest=highest))
 
 
-def _synchronous(problem: Problem, _excess: float) -> tuple[str, Problem]:
+def _synchronous(problem: DesignProblem, _excess: float) -> tuple[str, DesignProblem]:
     sensors = problem.sensors
     exact = replace(sensors, lag_std=0.0, force=replace(sensors.force, phase_std=0.0))
     words = f"a lag between force and position known exactly, not to {1e6 * sensors.lag_error:.0f} us"
     return words, replace(problem, sensors=exact)
 
 
-def _finer(problem: Problem, _excess: float) -> tuple[str, Problem]:
+def _finer(problem: DesignProblem, _excess: float) -> tuple[str, DesignProblem]:
     sensors = problem.sensors
     step = sensors.position_step / _MUCH
     words = f"a position in steps of {1e6 * step:.3g} um instead of {1e6 * sensors.position_step:.3g} um"

@@ -22,7 +22,7 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Surface:
+class LinearSurface:
     """One surface: f = M a + B v + K x.
 
     Args:
@@ -76,11 +76,11 @@ class SurfaceRange:
         """Parameters to identify: K and B, and M if there is one."""
         return ("K", "B") if self.mass is None else ("K", "B", "M")
 
-    def surfaces(self) -> tuple[Surface, ...]:
+    def surfaces(self) -> tuple[LinearSurface, ...]:
         """The middle (of the logarithms) and the corners, each once."""
         ranges = (self.stiffness, self.damping, self.mass or (0.0, 0.0))
-        corners = [Surface(*corner) for corner in product(*ranges)]
-        middle = Surface(*(sqrt(low * high) for low, high in ranges))
+        corners = [LinearSurface(*corner) for corner in product(*ranges)]
+        middle = LinearSurface(*(sqrt(low * high) for low, high in ranges))
         return tuple(dict.fromkeys([middle, *corners]))
 
 
@@ -92,7 +92,7 @@ _SETTLED = 1e-4
 _STILL = 1e-9  # m/s; friction is never divided by less
 
 
-class ForceLoop(Protocol):
+class ExcitedLoop(Protocol):
     """Any robot under force control that is linear at a given speed."""
 
     def transfer(self, omega: Array, impedance: Complex, speed: Array) -> Complex:
@@ -107,7 +107,7 @@ class ForceLoop(Protocol):
             Shape (C, F).
         """
 
-    def stable(self, surface: Surface) -> bool:
+    def stable(self, surface: LinearSurface) -> bool:
         """Whether the loop comes to rest on a surface."""
 
 
@@ -160,7 +160,7 @@ class HybridLoop:
         correction = self.gain + self.integral / s
         return (1 + correction) / (1 + correction * self._measured_loop(omega) + tip / impedance)
 
-    def stable(self, surface: Surface) -> bool:
+    def stable(self, surface: LinearSurface) -> bool:
         """By Nyquist: how far 1 + L turns from slow to fast, L that of the loop without friction, whose tip is stable.
 
         It turns by a quarter forwards, from the integral's -90 degrees to 0, or not at all without an integral; each
@@ -199,13 +199,13 @@ class KnownBandwidth:
         gain = LowPass(((2, self.bandwidth),)).at(omega)
         return np.broadcast_to(gain, impedance.shape)
 
-    def stable(self, surface: Surface) -> bool:
+    def stable(self, surface: LinearSurface) -> bool:
         """Stability, which is taken for granted."""
         return True
 
 
 def contact_force(
-    loop: ForceLoop, omega: Array, impedance: Complex, amplitudes: Array, together: bool
+    loop: ExcitedLoop, omega: Array, impedance: Complex, amplitudes: Array, together: bool
 ) -> Complex:
     """Phasors of the force on each surface under a desired force of given amplitudes [N], shape (C, F).
 
@@ -250,7 +250,7 @@ class SurfaceResponse:
         travel: of the tip, from end to end [m].
     """
 
-    surface: Surface
+    surface: LinearSurface
     names: tuple[str, ...]
     information: Array
     prior: Array

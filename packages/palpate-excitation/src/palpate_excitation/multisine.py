@@ -17,7 +17,7 @@ from palpate.arrays import Array, Complex
 from palpate.errors import InputError
 from palpate.references import Multisine
 from palpate_excitation.force_loops import Made, SurfaceResponse
-from palpate_excitation.problem import Problem, used_up
+from palpate_excitation.problem import DesignProblem, used_up
 from palpate_excitation.spectra import optimal
 
 _POINTS_A_CYCLE = 8  # of the period a cycle of the highest harmonic
@@ -140,7 +140,7 @@ _POINTS = 32  # a cycle of the highest line
 _WIDTHS = (0.01, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a line, in the frequency's logarithm
 
 
-def best_multisine(problem: Problem, seconds: float) -> Made:
+def best_multisine(problem: DesignProblem, seconds: float) -> Made:
     """The best multisine of so many seconds, a whole number of its periods.
 
     Where the budget limits the rate of change, power at high frequencies is made dearer until it pays no more.
@@ -155,7 +155,7 @@ def best_multisine(problem: Problem, seconds: float) -> Made:
     )
 
 
-def _multisine(problem: Problem, seconds: float, mix: float) -> Made:
+def _multisine(problem: DesignProblem, seconds: float, mix: float) -> Made:
     harmonics, base = _harmonics(problem, seconds), 2 * np.pi / _period(problem, seconds)
     places = np.unique(np.round(np.geomspace(1, len(harmonics), _LINES)).astype(np.intp)) - 1
     omega = base * harmonics[places].astype(np.float64)
@@ -191,7 +191,7 @@ def _spread(omega: Array, powers: Array, dense: Array, width: float) -> Array:
 
 
 def _within_budget(
-    problem: Problem, harmonics: Harmonics, seconds: float, amplitudes: Array, phases: Array, gap: float
+    problem: DesignProblem, harmonics: Harmonics, seconds: float, amplitudes: Array, phases: Array, gap: float
 ) -> Made:
     """As strong as the budget allows, for the desired force and for the force on every surface."""
     period, sensors = _period(problem, seconds), problem.sensors
@@ -228,13 +228,13 @@ def _within_budget(
     return Made(wave, tuple(predictions), gap)
 
 
-def _period(problem: Problem, seconds: float) -> float:
+def _period(problem: DesignProblem, seconds: float) -> float:
     """The usual period, or the one next to it of which `seconds` are a whole number [s]."""
     usual = max(PERIOD, 1 / problem.budget.lowest)
     return seconds / max(1, floor(seconds / usual + 1e-9))
 
 
-def _harmonics(problem: Problem, seconds: float) -> Harmonics:
+def _harmonics(problem: DesignProblem, seconds: float) -> Harmonics:
     """Those of the period that lie in the band; of many, every second, third or so."""
     budget, period = problem.budget, _period(problem, seconds)
     first, last = max(ceil(budget.lowest * period - 1e-9), 1), floor(budget.highest * period + 1e-9)

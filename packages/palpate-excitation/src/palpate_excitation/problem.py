@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Complex
 from palpate.errors import InputError, unknown
 from palpate.identifiers.octave_system import SEEN
-from palpate_excitation.force_loops import ALL, ForceLoop, HybridLoop, Surface, SurfaceRange, contact_force
+from palpate_excitation.force_loops import (
+    ALL,
+    ExcitedLoop,
+    HybridLoop,
+    LinearSurface,
+    SurfaceRange,
+    contact_force,
+)
 from palpate_excitation.spectra import CRITERIA, ForceChain, covariance, phase_std
 
 LAG_UNIT = 1e-4
@@ -47,7 +54,7 @@ class Sensors:
                 raise InputError(f"{name} of the sensors must be {low:g} or above, got {getattr(self, name)}")
 
     def information(
-        self, surface: Surface, omega: Array, force: Complex, rounding: Array | float | None = None
+        self, surface: LinearSurface, omega: Array, force: Complex, rounding: Array | float | None = None
     ) -> Array:
         """Fisher information about (ln K, ln B, ln M, lag) of a second at each frequency, shape (F, 4, 4).
 
@@ -64,14 +71,14 @@ class Sensors:
         density = self.density(surface, omega, rounding)
         return self.moments(surface, omega, force / Z) / density[:, None, None]
 
-    def density(self, surface: Surface, omega: Array, rounding: Array | float | None = None) -> Array:
+    def density(self, surface: LinearSurface, omega: Array, rounding: Array | float | None = None) -> Array:
         """Noise of both sensors as a force, as `information` has it, shape (F,) [N^2/Hz], of both signs."""
         if rounding is None:
             rounding = self.position_step**2 / (12 * self.rate)
         gain = np.abs(surface.impedance(omega) * self.force.low_pass.at(omega)) ** 2
         return np.asarray(self.force.noise**2 / self.force.sampling + gain * rounding)
 
-    def columns(self, surface: Surface, omega: Array, motion: Complex) -> Complex:
+    def columns(self, surface: LinearSurface, omega: Array, motion: Complex) -> Complex:
         """The regressors of (ln K, ln B, ln M, lag) under a motion, phasors of shape (F, 4) [N].
 
         Args:
@@ -84,7 +91,7 @@ class Sensors:
         columns = np.stack([K + 0 * s, B * s, M * s**2, -s * Z * LAG_UNIT], axis=-1)
         return np.asarray(columns * (self.force.low_pass.at(omega) * motion)[:, None])
 
-    def moments(self, surface: Surface, omega: Array, motion: Complex) -> Array:
+    def moments(self, surface: LinearSurface, omega: Array, motion: Complex) -> Array:
         """Mean products of the regressors under a motion, shape (F, 4, 4) [N^2]; see `columns`."""
         columns = self.columns(surface, omega, motion)
         found: Array = np.real(columns[:, :, None] * np.conj(columns[:, None, :])) / 2
@@ -193,7 +200,7 @@ LONGEST = 3600.0
 
 
 @dataclass(frozen=True)
-class Problem:
+class DesignProblem:
     """An excitation for a range of surfaces, by a robot with its sensors, within a budget, to a precision.
 
     Args:
@@ -217,7 +224,7 @@ class Problem:
     budget: Budget
     precision: Mapping[str, float]
     sensors: Sensors = field(default_factory=Sensors)
-    loop: ForceLoop = field(default_factory=HybridLoop)
+    loop: ExcitedLoop = field(default_factory=HybridLoop)
     kind: str = "multisine"
     criterion: str = "worst"
     duration: float | None = None
@@ -288,7 +295,13 @@ class Problem:
         return found[:, :, self.free[:, None], self.free]
 
     def predicted(
-        self, surface: Surface, omega: Array, force: Complex, error: Complex, seconds: float, together: bool
+        self,
+        surface: LinearSurface,
+        omega: Array,
+        force: Complex,
+        error: Complex,
+        seconds: float,
+        together: bool,
     ) -> tuple[Array, Array, Array]:
         """Information of a second about `free`, and the errors of `free` by rounding.
 

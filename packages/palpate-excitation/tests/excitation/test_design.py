@@ -11,9 +11,9 @@ from palpate.errors import InputError
 from palpate.references import Chirp, Multisine
 from palpate_excitation import (
     Budget,
+    DesignProblem,
     HybridLoop,
     KnownBandwidth,
-    Problem,
     Sensors,
     SurfaceRange,
     design,
@@ -26,7 +26,7 @@ RANGE = SurfaceRange((3000.0, 8000.0), (50.0, 300.0), (0.1, 0.3))
 KNOWN = SurfaceRange((5200.0, 5200.0), (200.0, 200.0), (0.1, 0.1))
 LIMITS = Budget(15.0, 20.0)
 ASKED = {"K": 0.05, "B": 0.1, "M": 0.3}
-PROBLEM = Problem(RANGE, LIMITS, ASKED)
+PROBLEM = DesignProblem(RANGE, LIMITS, ASKED)
 
 
 @pytest.fixture(scope="module")
@@ -155,13 +155,15 @@ def test_every_criterion_makes_an_excitation(criterion, ten_seconds):
 
 
 def test_surfaces_without_a_mass_are_not_asked_for_one():
-    found = design(Problem(SurfaceRange((3000.0, 8000.0), (50.0, 300.0)), LIMITS, {"K": 0.05}))
+    found = design(DesignProblem(SurfaceRange((3000.0, 8000.0), (50.0, 300.0)), LIMITS, {"K": 0.05}))
     assert set(found.predictions[0].half_widths(1.0)) == {"K", "B"}
 
 
 def test_what_is_not_asked_is_estimated_all_the_same():
     """K alone is found sooner when M is known to be none than when it must be found too."""
-    free = Problem(SurfaceRange((5e3, 5e3), (200.0, 200.0), (0.1, 0.1)), LIMITS, {"K": 0.01}, duration=10.0)
+    free = DesignProblem(
+        SurfaceRange((5e3, 5e3), (200.0, 200.0), (0.1, 0.1)), LIMITS, {"K": 0.01}, duration=10.0
+    )
     none = replace(free, surfaces=SurfaceRange((5e3, 5e3), (200.0, 200.0)))
     assert design(none).excess <= design(free).excess
 

@@ -7,11 +7,11 @@ import pytest
 
 from palpate.bench import build, changed, load
 from palpate.errors import InputError
-from palpate_excitation import HybridLoop, KnownBandwidth, Surface
+from palpate_excitation import HybridLoop, KnownBandwidth, LinearSurface
 from palpate_excitation.force_loops import contact_force
 from palpate_excitation.multisine import low_peak
 
-RUBBER = Surface(34500.0, 480.0, 0.05)
+RUBBER = LinearSurface(34500.0, 480.0, 0.05)
 OMEGA = 2 * np.pi * np.array([0.5, 5.0, 40.0])
 SLOW = np.full((1, 1), 1e-3)
 
@@ -101,7 +101,7 @@ def test_it_foretells_what_the_arm_on_the_bench_lets_through(name):
     own = experiment.controller
     omega = 2 * np.pi * frequencies
     s = experiment.surface
-    Z = Surface(s.stiffness, s.damping, s.mass).impedance(omega)[None]
+    Z = LinearSurface(s.stiffness, s.damping, s.mass).impedance(omega)[None]
     loop = HybridLoop(gain=own.kf, integral=1000 * own.ki)
     foretold = contact_force(loop, omega, Z, amplitudes, together=True)
     # Friction is not linear; a tenth is what its linearisation was fitted to, on other amplitudes.

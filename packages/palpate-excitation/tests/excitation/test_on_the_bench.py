@@ -10,7 +10,7 @@ from palpate.bench import build
 from palpate.bench.tables import changed, parse
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
-from palpate_excitation import Budget, Problem, SurfaceRange, design
+from palpate_excitation import Budget, DesignProblem, SurfaceRange, design
 from palpate_excitation.report.table import experiment
 
 FOAM = {"K": 5200.0, "B": 200.0, "M": 0.1}
@@ -21,7 +21,9 @@ RUNS = 8
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
 def test_the_spread_over_seeds_is_the_predicted_one(kind):
     surfaces = SurfaceRange(*((value, value) for value in FOAM.values()))
-    found = design(Problem(surfaces, Budget(15.0, 20.0), dict.fromkeys("KBM", 0.1), kind=kind, duration=10.0))
+    found = design(
+        DesignProblem(surfaces, Budget(15.0, 20.0), dict.fromkeys("KBM", 0.1), kind=kind, duration=10.0)
+    )
     asked = parse(experiment(found), "the design")
     sensor = LowPass.parse("butterworth3:120")
     rng = np.random.default_rng(5)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate_excitation import Sensors, Surface
+from palpate_excitation import LinearSurface, Sensors
 from palpate_excitation.problem import LAG_UNIT
 from palpate_excitation.spectra import ForceChain, covariance, cramer_rao_bound
 
-FOAM = Surface(5200.0, 200.0, 0.1)
+FOAM = LinearSurface(5200.0, 200.0, 0.1)
 
 
 def test_it_is_that_of_the_samples_of_the_same_motion():
@@ -44,7 +44,7 @@ def test_a_coarse_position_tells_less_most_of_all_at_high_frequencies():
 
 def test_position_noise_is_a_force_of_its_own():
     """Quantisation q of the position and a stiff spring alone: a white force of K q / sqrt(12) at the log's rate."""
-    spring = Surface(1e5, 1e-9)
+    spring = LinearSurface(1e5, 1e-9)
     q, omega = 1e-4, 2 * np.pi * np.array([0.01])
     noisy = Sensors(ForceChain(noise=1e-9), position_step=q, rate=1000.0)
     found = noisy.information(spring, omega, np.ones(1, complex))[0, 0, 0]

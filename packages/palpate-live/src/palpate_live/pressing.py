@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -11,11 +12,13 @@ from palpate.arrays import Array
 from palpate.bench.force_input import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
+from palpate.force import ForceLoop
 from palpate.force.gains import Gains
 from palpate.identifiers import ContactIdentifier
 from palpate.press.engines import series_of
 from palpate.press.prepare import Question, prepare_press
-from palpate.press.pressing import JOINT_LIMIT, Cautious
+from palpate.press.pressing import JOINT_LIMIT
+from palpate.press.sequence import CautiousDriver, PressSequence
 from palpate.press.setting import Place, cell_of
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.robots.serial.serial_arm import SerialArm as Serial
@@ -45,7 +48,65 @@ _LOOKS = 20.0
 """Of the estimator, a second of simulated time."""
 
 
-class PressingArm:
+class WatchedArm:
+    """A serial arm that somebody watches: its view, its sliders and its time.
+
+    Args:
+        arm: what moves.
+        place: where it starts.
+        gains: of its force loop.
+        sliders: of the page.
+        about: the law, in words.
+        seed: of the noise.
+        more: of the view.
+
+    Raises:
+        InputError: an arm of more joints than are drawn.
+    """
+
+    # More than seven arguments: of an arm, and of its page.
+    def __init__(
+        self,
+        arm: Serial,
+        place: Place,
+        gains: Gains,
+        sliders: tuple[Slider, ...],
+        about: str,
+        seed: int,
+        **more: Any,
+    ):
+        if arm.joints > JOINTS:
+            raise InputError(f"{arm.title} has {arm.joints} joints; at most {JOINTS} are drawn")
+        self._arm, self._place, self._gains = arm, place, gains
+        self._stride, self._k = max(1, round(STRIDE * gains.arm.rate)), 0
+        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
+        self.view = View(
+            title=printable(arm.title), about=printable(f"{gains.arm.title}; {about}"), kind="simulation",
+            rate=float(gains.arm.rate), stride=self._stride * gains.arm.tick, sliders=sliders,
+            rest=tuple(float(v) for v in place.q), scene=scene_of(arm, place), **more,
+        )  # fmt: skip
+
+    def bones(self, row: Array) -> Array:
+        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
+        return self._arm.joint_places(row[AT["q1"] : AT["q1"] + self._arm.joints])
+
+    def advance(self, seconds: float) -> Array:
+        """The rows of the time to come: one a stride."""
+        raise NotImplementedError
+
+    def seek(self, time: float) -> None:
+        """Runs on to a moment, as fast as it goes.
+
+        Raises:
+            InputError: it lies behind, or beyond a run's longest.
+        """
+        tick = self._gains.arm.tick
+        check_ahead(self._k * tick, time)
+        while self._k * tick < time - self.view.stride and not self.state.ended:
+            self.advance(min(1.0, time - self._k * tick))
+
+
+class PressingArm(WatchedArm):
     """A serial arm that presses with the cautious law as long as somebody watches.
 
     Args:
@@ -63,26 +124,12 @@ class PressingArm:
         asked = prepare_press(
             Question(arm=name, force=FORCE, surface=KelvinVoigt(STIFFNESS, DAMPING, 0.0), probe=0.0)
         ).asked
-        if asked.arm.joints > JOINTS:
-            raise InputError(f"{asked.arm.title} has {asked.arm.joints} joints; at most {JOINTS} are drawn")
+        sliders, notes = _sliders(asked.gains), tuple(printable(note) for note in asked.notes)
+        about = "the cautious law of palpate tune, own physics"
+        super().__init__(asked.arm, asked.place, asked.gains, sliders, about, seed, notes=notes)
         if waiting is not None:
             waiting()
-        self._arm, self._place, self._gains = asked.arm, asked.place, asked.gains
         self._series = series_of(asked.gains.arm)
-        self._stride = max(1, round(STRIDE * asked.gains.arm.rate))
-        sliders = _sliders(asked.gains)
-        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
-        self.view = View(
-            title=printable(asked.arm.title),
-            about=printable(f"{asked.gains.arm.title}; the cautious law of palpate tune, own physics"),
-            kind="simulation",
-            rate=float(asked.gains.arm.rate),
-            stride=self._stride * asked.gains.arm.tick,
-            sliders=sliders,
-            rest=tuple(float(v) for v in asked.place.q),
-            scene=scene_of(asked.arm, asked.place),
-            notes=tuple(printable(note) for note in asked.notes),
-        )
         self.reset()
 
     @property
@@ -91,18 +138,21 @@ class PressingArm:
         values = self.state.values
         return OfArm(self._gains, values["surface.stiffness"], values["surface.damping"])
 
-    def bones(self, row: Array) -> Array:
-        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
-        return self._arm.joint_places(row[AT["q1"] : AT["q1"] + self._arm.joints])
-
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
         loop, cell = self._gains.arm, cell_of(self._arm, self._place, self._surface, self._gains.arm)
         self._simulated = SimulatedArm(self._arm, loop, self._place, cell, "own", self.state.seed or 0)
-        self._pilot = Cautious(self._simulated, self._gains, self._place.normal)
         self._k, self._phase, self._high = 0, 0.0, True
+        self._take_gains()
         self._forget()
+
+    def _take_gains(self) -> None:
+        """A new loop with the gains as they now are, and a new sequence with it."""
+        self._loop = ForceLoop(self._gains)
+        driver = CautiousDriver(self._simulated, self._loop, self._place.normal)
+        desired, tick = (lambda _: self.state.values["force"]), self._gains.arm.tick
+        self._sequence = PressSequence(self._simulated, driver, desired, tick)
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come: one a stride."""
@@ -128,28 +178,17 @@ class PressingArm:
             return
         self.state.values[key] = value
         if key == "force":
-            self._pilot.loop.desired = value
+            self._loop.desired = value
         elif key == "gain":
             self._gains = replace(self._gains, alpha=value)
-            before = self._pilot.loop.state
-            self._pilot = Cautious(self._simulated, self._gains, self._place.normal)
-            self._pilot.loop.state = before
-            self._pilot.loop.desired = self.state.values["force"]
+            before = self._loop.state
+            self._take_gains()
+            self._loop.state = before
+            self._loop.desired = self.state.values["force"]
         else:
             cell = cell_of(self._arm, self._place, self._surface, self._gains.arm)
             self._simulated.change_surface(cell)
             self._forget()
-
-    def seek(self, time: float) -> None:
-        """Runs on to a moment, as fast as it goes.
-
-        Raises:
-            InputError: it lies behind, or beyond a run's longest.
-        """
-        here = self._k * self._gains.arm.tick
-        check_ahead(here, time)
-        while self._k * self._gains.arm.tick < time - self.view.stride and not self.state.ended:
-            self.advance(min(1.0, time - self._k * self._gains.arm.tick))
 
     @property
     def _surface(self) -> KelvinVoigt:
@@ -171,12 +210,10 @@ class PressingArm:
 
     def _tick(self) -> float:
         """One tick; the force reading before it [N]."""
-        sense = self._simulated.read()
-        normal = self._place.normal
-        reading = float(sense.force[:3] @ normal)
-        self._identifier.update(float(normal @ sense.pose[:3, 3]), reading)
-        acted = self._pilot.step(sense, self.state.values["force"])
-        self._note(acted.phase)
+        tick, normal = self._sequence.tick(), self._place.normal
+        reading = float(tick.sample.force @ normal)
+        self._identifier.update(float(normal @ tick.sample.position), reading)
+        self._note(tick.action.phase)
         self._k += 1
         if self._k % round(self._gains.arm.rate / _LOOKS) == 0:
             self._known = self._estimate()
@@ -222,7 +259,7 @@ class PressingArm:
         if saturated.any():
             joints = " and ".join(self._arm.names[i] for i in np.flatnonzero(saturated))
             return f"{printable(joints)} is at its torque limit; the desired force is out of reach."
-        return self._pilot.loop.trouble
+        return self._loop.trouble
 
     def _note(self, phase: float) -> None:
         now = self._k * self._gains.arm.tick

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.checks.check import Check, require
-from palpate.wires.protocol import Command, EndedError, Sense, SilentError, unreadable
+from palpate.wires import Command, EndedError, Sense, SilentError, unreadable
+from palpate_checks.check import Check, require
 
 _READINGS, _PATIENCE = 50, 5.0
 """Of one look, and for how long they may take [s]."""

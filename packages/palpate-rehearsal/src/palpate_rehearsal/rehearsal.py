@@ -12,11 +12,11 @@ import numpy as np
 
 from palpate._vector import ZERO3
 from palpate.arrays import Array
-from palpate.force.arm import Arm, load_arm
+from palpate.force.arm import Arm, ServoLoop, load_arm
 from palpate.force.simulated_press import surface, world_of
 from palpate.force.touching import BodyState, Surface, World, moved
 from palpate.robots import SerialArm
-from palpate.wires.realtime import realtime_priority
+from palpate_wires.realtime import realtime_priority
 
 START = 0.3
 """Height of the surface in the base [m]."""
@@ -35,7 +35,7 @@ _BEHIND = 1.0
 
 
 class ToolAxisArm:
-    """An arm that moves along its tool's axis, -z of the base, towards a plane, and at once along it.
+    """An arm that moves along its tool's axis, -z of the base, towards a plane, and along that; a servo follows late.
 
     Friction is Coulomb's, behind a spring as stiff as the plane.
 
@@ -54,12 +54,16 @@ class ToolAxisArm:
         self._rng = np.random.default_rng(seed)
         self.body: Any = BodyState(-gap, 0.0, 0.0, 0.0, ZERO3, 0.0, 0.0, 0.0)
         self.command, self.time = -gap, 0.0
-        self.at, self.bent = np.array([0.4, 0.0]), np.zeros(2)
-        self._line = [-gap if self.world.torque == 0.0 else 0.0] * max(self.world.delay, 1)
+        self.at, self.aside, self.bent = np.array([0.4, 0.0]), np.array([0.4, 0.0]), np.zeros(2)
+        self._follows = 1.0
+        if isinstance(arm.inner, ServoLoop):
+            self._follows = 1.0 - float(np.exp(-arm.tick / arm.inner.lag))
+        self._by_torque = self.world.torque > 0.0 and self.world.yields == 0.0
+        self._line = [0.0 if self._by_torque else -gap] * max(self.world.delay, 1)
 
     def velocity_to(self, place: Any) -> Array:
         """Velocity of the command that leads to a place within a tick, shape (3,) [m/s]."""
-        here = np.array([*self.at, START - self.command])
+        here = np.array([*self.aside, START - self.command])
         velocity: Array = (np.asarray(place, dtype=float) - here) / self.world.tick
         return velocity
 
@@ -68,13 +72,15 @@ class ToolAxisArm:
         world = self.world
         speed, aside = -float(velocity[2]), np.asarray(velocity[:2], dtype=float)
         aside = aside * min(1.0, world.speed / max(float(np.hypot(*aside)), 1e-12))
-        self.at += world.tick * aside
-        bent = self.bent + world.tick * aside
+        self.aside += world.tick * aside
+        way = self._follows * (self.aside - self.at)
+        self.at += way
+        bent = self.bent + way
         most = FRICTION * abs(self.body.reading) / self.surface.stiffness
         self.bent = bent * min(1.0, most / max(np.hypot(*bent), 1e-12))
         self.command += world.tick * min(max(speed, -world.speed), world.speed)
         into = self.command
-        if world.torque > 0.0:
+        if self._by_torque:
             into = world.stiffness * (self.command - self.body.x) - world.second * self.body.v
         held = self._line[0] if world.delay > 0 else into
         self._line = [*self._line[1:], into]

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires.ros2 import SENT
 from palpate_rehearsal.rehearsal import REST, Joints, ToolAxisArm, arm_of, ready, ticks, turns, words_of
+from palpate_wires.ros2 import SENT
 
 _SILENT = 10
 """Ticks without a command after which it rests."""
@@ -41,7 +41,7 @@ class Node:
         from cyclonedds.sub import DataReader
         from cyclonedds.topic import Topic
 
-        from palpate.wires import ros2_messages
+        from palpate_wires import ros2_messages
 
         self._m: Any = ros2_messages
         self._kind, self._joints, self._begun, self._named = kind, joints, time.time_ns(), False

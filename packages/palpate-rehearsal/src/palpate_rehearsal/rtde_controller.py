@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires.at_rest import from_rotation_vector
 from palpate_rehearsal.rehearsal import REST, START, Joints, ToolAxisArm, turns
 from palpate_rehearsal.rtde_dictionary import CODES, OUTPUTS
+from palpate_wires.orientation import from_rotation_vector
 
 _RUNNING, _STOPPED = 2, 1
 _MODE_RUNNING, _JOINT_RUNNING = 7, 253

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires import sim as protocol
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm, arm_of, ready, ticks, words_of
+from palpate_wires import sim as protocol
 
 _REST = 10
 """Ticks without a command after which it rests."""

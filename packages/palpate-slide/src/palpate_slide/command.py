@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from palpate.cli.options.common import QUIET, LoopArm, Physics
-from palpate.cli.options.force import with_slide
+from palpate.cli.options.force import SlideLimits
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
-from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.cli.toolkit import command, console, option_of, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
@@ -44,15 +44,13 @@ _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
 
 @Parameter(name="*", group=Group("The slide", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
-class SlideOptions:
+class SlideOptions(SlideLimits):
     """Arm, force and path."""
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
     "ur5e, fr3, panda, iiwa14, or a TOML file."
     force: Annotated[str | None, SIGNED] = None
     "Desired force, as 20:N; that of the gains if left out, or 15 N."
-    speed: Annotated[str, SIGNED] = "30:mm/s"
-    "Along the surface, as 30:mm/s."
     shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
     """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
     mesh:FILE:mm, an STL or OBJ in that unit, from above (extra: arms)."""
@@ -68,14 +66,6 @@ class SlideOptions:
     normal: Annotated[str | None, SIGNED] = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
-    mu_max: Annotated[float, SIGNED] = 0.9
-    "Largest friction coefficient that there may be."
-    tilt: Annotated[float, SIGNED] = 7.0
-    "Standard deviation of --normal in degrees."
-    step: Annotated[str, SIGNED] = "0:mm"
-    "Highest step that is expected, as 1:mm: the slide is slow enough to stop on it."
-    touches: Annotated[str, SIGNED] = "10:mm"
-    "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
     """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
     which palpate map --table reads; 0 for none."""
@@ -177,9 +167,7 @@ class SlideOptions:
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
         gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
-        return with_slide(
-            gains, self.mu_max, self.speed, f"{abs(self.radius):g}", self.tilt, self.step, self.touches
-        )
+        return self.gains_with(gains, abs(self.radius))
 
 
 def slide(
@@ -279,14 +267,14 @@ def _watch(asked: SlideOptions) -> int:
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:
-    from palpate.cli._press_wire import press_over
-    from palpate.wires.order import Path as SlidePath
-
     other = next((name for name in options_given((asked,)) if name not in _OF_WIRE), None)
     if other is not None:
         raise InputError(
             f"--{other} is for a simulated slide, and --wire names a real arm; leave out --{other}"
         )
+    press_over = option_of("wire", "wires")
+    from palpate_wires.order import Path as SlidePath
+
     path = SlidePath(asked.path, asked.extent, asked.seconds)
     press = AskOptions(force=asked.force, gains=asked.gains, normal=asked.normal, seconds=asked.seconds)
     return press_over(press, wire, limits, json=json, path=path)

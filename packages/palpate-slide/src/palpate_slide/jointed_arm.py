@@ -7,13 +7,14 @@ one has the joints' inertia, their drive trains, a tip that tilts, and resolved 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Bound, kernel, law, part
+from palpate._jit import BoundKernel, kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
@@ -22,15 +23,16 @@ from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
-from palpate.press.cell import Body, Cell, Reading, Touch, apply_drive, read_sensor
+from palpate.press.cell import Body, Reading, TouchState, Workcell, apply_drive, read_sensor
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
+from palpate.press.sequence import PressSequence, SlidingDriver, TipSample
 from palpate.press.setting import Place, cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.tool import Command
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.signals.types import triple
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, Carried, contact, note
 
@@ -74,7 +76,7 @@ def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
 
 
 compiled_slid, compiled_note = kernel(slid), kernel(note)
-_UPRIGHT = Mat3(*(Vec3(*map(float, row)) for row in np.eye(3)))
+_UPRIGHT = Mat3(*map(triple, np.eye(3)))
 _NOTHING = Carried(ZERO3, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
 
 
@@ -91,18 +93,20 @@ class OnGround(ByMuJoCo):
 
     # More than seven arguments: arm and surface.
     def __init__(
-        self, arm: SerialArm, cell: Cell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
+        self, arm: SerialArm, cell: Workcell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
     ):
         super().__init__(arm, cell, q)
         none = Reading(ZERO3, 0.0, 0.0, 0.0)
-        self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), Bound(compiled_slid)
+        self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), BoundKernel(compiled_slid)
         # the links' place is known here, and no spring lies between it and the surface
         world = world_of(inner, noise=0.0)._replace(torque=1.0)
         self.ground, self._world, self._frame = ground, world, frame
         self._axes, self._noise = np.array(frame.axes), np.zeros((3, 8))
         self._generator = np.random.default_rng(seed)
 
-    def tick(self, cell: Cell, body: Body, touch: Touch, setpoint: Array, k: int, noise: Array) -> Touch:
+    def tick(
+        self, cell: Workcell, body: Body, touch: TouchState, setpoint: Array, k: int, noise: Array
+    ) -> TouchState:
         """One tick, as `Engine` describes it; noise is drawn for three axes here."""
         self.slid = self.slid._replace(mean=0.0)
         self._noise = self._generator.standard_normal((3, 8))
@@ -114,8 +118,15 @@ class OnGround(ByMuJoCo):
         return np.array([axis.value for axis in (self.slid.x, self.slid.y, self.slid.z)])
 
     def _contact(
-        self, cell: Cell, body: Body, touch: Touch, tip: Tip, setpoint: Array, time: float, noise: Array
-    ) -> Touch:
+        self,
+        cell: Workcell,
+        body: Body,
+        touch: TouchState,
+        tip: Tip,
+        setpoint: Array,
+        time: float,
+        noise: Array,
+    ) -> TouchState:
         self.slid = self._law(
             cell, self._world, self.ground, self._frame, body, self.slid, tip, setpoint, time, self._noise
         )
@@ -128,9 +139,9 @@ class OnGround(ByMuJoCo):
         at = self._scene.tip(data)[0]
         self._engine.mj_jac(self._model, data, J, None, at, self._scene.body)
         v = J @ data.qvel
-        return Tip(_three(at), _UPRIGHT, _three(v), ZERO3, ZERO3, ZERO3)
+        return Tip(triple(at), _UPRIGHT, triple(v), ZERO3, ZERO3, ZERO3)
 
-    def _load(self, body: Body, touch: Touch) -> Array:
+    def _load(self, body: Body, touch: TouchState) -> Array:
         return np.asarray((self._axes @ self._J[:3, self._dofs]).T @ np.array(self.slid.tip.force))
 
 
@@ -164,12 +175,13 @@ class JointedArm:
         Raises:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
-        run = JointedSlide(self, gains, ground, into, seed)
-        rows = np.zeros((len(ways) + round(LONGEST * gains.arm.rate), len(COLUMNS)))
+        rate = gains.arm.rate
+        run = JointedSlide(self, gains, ground, lambda since: ways[round(since * rate)], into, seed)
+        rows = np.zeros((len(ways) + round(LONGEST * rate), len(COLUMNS)))
         for k, row in enumerate(rows):
-            if run.ticks >= len(ways):
+            if round(run.sequence.next_since * rate) >= len(ways):
                 return rows[:k]
-            run.tick(ways[run.ticks], row)
+            run.tick(row)
         return rows
 
     def frame(self) -> Frame:
@@ -177,55 +189,66 @@ class JointedArm:
         n, axes = self.place.normal, self.place.axes
         at = self.place.pose[:3, 3]
         at = at + (self.place.place - n @ at) * n
-        return Frame(Mat3(_three(axes[2]), _three(axes[1]), _three(-n)), _three(at))
-
-    def check_range(self, q: Array, time: float) -> None:
-        """Refuses joints at the end of their range, shape (n,), at a time [s]."""
-        beyond = np.flatnonzero(~((q >= self.arm.lower) & (q <= self.arm.upper)))
-        if len(beyond):
-            raise InputError(
-                f"{self.arm.names[beyond[0]]} reached the end of its range at {time:.3f} s; make --length smaller"
-            )
+        return Frame(Mat3(triple(axes[2]), triple(axes[1]), triple(-n)), triple(at))
 
 
 class JointedSlide:
-    """A slide that goes on tick by tick.
+    """A slide that goes on tick by tick, and the arm of its sequence, in the surface's axes.
 
     Args:
         at: the arm before the surface.
+        direction: in the surface's axes, at a time since the slide began [s].
         gains, ground, into, seed: as of `JointedArm.slide`.
 
     Raises:
         InputError: gains of another kind of arm.
     """
 
-    def __init__(self, at: JointedArm, gains: Gains, ground: Ground, into: ArrayLike = DOWN, seed: int = 0):
-        check_mode(gains, at.inner.kind)
-        self._at, self.loop, self.ticks, self._k = at, SlidingLoop(gains, into), 0, 0
-        frame = at.frame()
+    # More than seven arguments: those of a slide, and the path.
+    def __init__(
+        self,
+        at: JointedArm,
+        gains: Gains,
+        ground: Ground,
+        direction: Callable[[float], ArrayLike],
+        into: ArrayLike = DOWN,
+        seed: int = 0,
+    ):
+        if gains.arm.kind != "servo":  # which takes the place of any arm's own loop
+            check_mode(gains, at.inner.kind)
+        self.loop, frame = SlidingLoop(gains, into), at.frame()
         cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
         self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
         self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
         self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
+        driver = SlidingDriver(self, self.loop, direction)
+        self.sequence = PressSequence(self, driver, lambda _: self.loop.desired, gains.arm.tick)
 
-    def tick(self, direction: ArrayLike, row: Array) -> None:
-        """A tick in a direction of the surface's axes; fills a row of `world.COLUMNS`.
+    def read(self) -> TipSample:
+        """The readings at this tick."""
+        time, _, position, _ = self.tip.read()
+        return TipSample(time, self.engine.reading, self._axes @ (position - self._origin))
+
+    def move(self, velocity: Array) -> None:
+        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
+        self.tip.move(velocity @ self._axes)
+
+    def tick(self, row: Array) -> None:
+        """A tick; fills a row of `world.COLUMNS`.
 
         Raises:
             InputError: a joint reached the end of its range.
         """
-        reading, loop = self.engine.reading, self.loop
-        seen = self._axes @ (self.tip.read().pose[:3, 3] - self._origin)
-        velocity = loop.update(reading, seen, direction)
-        self.ticks += int(loop.sliding or self.ticks > 0)
-        self.tip.write(Command(velocity=np.concatenate([velocity @ self._axes, np.zeros(3)])))
-        self._at.check_range(self.tip.truth.q, self._k * loop.gains.arm.tick)
-        self._k += 1
-        after = self.engine.slid
-        v, f = _three(velocity), _three(reading)
+        sample, desired, action = self.sequence.tick()
+        loop, after, arm, q = self.loop, self.engine.slid, self.tip.arm, self.tip.truth.q
+        beyond = np.flatnonzero(~((q >= arm.lower) & (q <= arm.upper)))
+        if len(beyond):
+            at = f"reached the end of its range at {sample.time:.3f} s"
+            raise InputError(f"{arm.names[beyond[0]]} {at}; make --length smaller")
+        v, f = triple(action.velocity), triple(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
-        row[20] = loop.desired
-        row[13] = (1.0 if loop.sliding else 2.0) * min(self.ticks, 1)
+        row[20] = desired
+        row[13] = (1.0 if loop.sliding else 2.0) * (self.sequence.touch is not None)
 
 
 def jointed_arm(name: str) -> JointedArm:
@@ -242,7 +265,3 @@ def jointed_arm(name: str) -> JointedArm:
     arm = SerialArm.named(name)
     place = place_of(arm, None, None)
     return JointedArm(arm, place, loop_of(name, arm.title, usual_mode(name), place.mass))
-
-
-def _three(values: Array) -> Vec3:
-    return Vec3(*map(float, values))

@@ -13,20 +13,14 @@ from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.sliding_loop import Z_95
-from palpate.text import printable
-from palpate_live.pressing import scene_of
+from palpate_live.pressing import WatchedArm
 from palpate_live.stability import OfArm
 from palpate_live.view import (
     AT,
-    JOINTS,
     LONGEST,
     OVER,
-    STRIDE,
     Happened,
     Slider,
-    SourceState,
-    View,
-    check_ahead,
 )
 from palpate_live.view import COLUMNS as SHOWN
 from palpate_slide.ground import Ground
@@ -38,7 +32,7 @@ FRICTION = 1.0
 """Largest friction of the slider; above mu_max the law refutes its normal."""
 
 
-class WatchedSlide:
+class WatchedSlide(WatchedArm):
     """An arm that slides around a circle.
 
     Args:
@@ -55,12 +49,9 @@ class WatchedSlide:
 
     # More than seven arguments: as of a slide, and the circle.
     def __init__(self, at: JointedArm, gains: Gains, ground: Ground, radius: float, into: Any, seed: int = 0):
-        if at.arm.joints > JOINTS:
-            raise InputError(f"{at.arm.title} has {at.arm.joints} joints; at most {JOINTS} are drawn")
-        self._at, self._gains, self._ground, self._radius, self._into = at, gains, ground, radius, into
+        self._at, self._ground, self._radius, self._into = at, ground, radius, into
         self._speed, self._tick = numbers_of(gains).speed, gains.arm.tick
         self._series = gains.arm.series if gains.arm.kind == "position" else np.inf
-        self._stride = max(1, round(STRIDE * gains.arm.rate))
         least, K = max(1.0, 10.0 * gains.arm.sensor.noise), ground.stiffness
         sliders = (
             Slider("force", "desired force", "N", least, 0.8 * gains.force_limit, gains.force),
@@ -68,18 +59,9 @@ class WatchedSlide:
             Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
             Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
         )  # fmt: skip
-        self.state = SourceState(values={slider.key: slider.value for slider in sliders}, seed=seed)
-        self.view = View(
-            title=printable(at.arm.title),
-            about=printable(f"{gains.arm.title}; the law of palpate tune --slide around a circle, MuJoCo"),
-            kind="simulation",
-            rate=float(gains.arm.rate),
-            stride=self._stride * self._tick,
-            sliders=sliders,
-            rest=tuple(float(v) for v in at.place.q),
-            scene=scene_of(at.arm, at.place),
-            quantities={"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")},
-        )
+        about = "the law of palpate tune --slide around a circle, MuJoCo"
+        quantities = {"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")}
+        super().__init__(at.arm, at.place, gains, sliders, about, seed, quantities=quantities)
         self.reset()
 
     @property
@@ -87,16 +69,18 @@ class WatchedSlide:
         """The loop as it now is, for `palpate_live.stability`."""
         return OfArm(self._gains, self.state.values["stiffness"], self._ground.damping)
 
-    def bones(self, row: Array) -> Array:
-        """Places of the arm's joints and its tip at a row [m], shape (n + 2, 3)."""
-        return self._at.arm.joint_places(row[AT["q1"] : AT["q1"] + self._at.arm.joints])
-
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
-        self._run = JointedSlide(self._at, self._gains, self._surface, self._into, self.state.seed or 0)
+        self._run = JointedSlide(
+            self._at, self._gains, self._surface, self._direction, self._into, self.state.seed or 0
+        )
         self._run.loop.desired = self.state.values["force"]
         self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))
+
+    def _direction(self, _: float) -> list[float]:
+        share = 1e-3 * self.state.values["speed"] / self._speed
+        return [share * cos(self._angle), share * sin(self._angle), 0.0]
 
     def advance(self, seconds: float) -> Array:
         """The rows of the time to come: one a stride."""
@@ -120,16 +104,6 @@ class WatchedSlide:
             self._run.loop.desired = value
         self._run.engine.ground = self._surface
 
-    def seek(self, time: float) -> None:
-        """Runs on to a moment, as fast as it goes.
-
-        Raises:
-            InputError: it lies behind, or beyond a run's longest.
-        """
-        check_ahead(self._k * self._tick, time)
-        while self._k * self._tick < time - self.view.stride and not self.state.ended:
-            self.advance(min(1.0, time - self._k * self._tick))
-
     @property
     def _surface(self) -> Ground:
         values = self.state.values
@@ -138,14 +112,14 @@ class WatchedSlide:
         )
 
     def _step(self) -> None:
-        share, before = 1e-3 * self.state.values["speed"] / self._speed, self._run.ticks
+        before = self._run.sequence.touch
         try:
-            self._run.tick([share * cos(self._angle), share * sin(self._angle), 0.0], self._own)
+            self._run.tick(self._own)
         except InputError as error:
             self.state.ended = str(error)
         self._k += 1
         now = self._k * self._tick
-        if self._run.ticks and not before:
+        if self._run.sequence.touch is not None and before is None:
             self.state.note(Happened(now, "slides"))
         self._angle += self._own[PLACE["speed"]] * self._tick / self._radius
         trouble = self._run.loop.trouble

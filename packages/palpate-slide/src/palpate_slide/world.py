@@ -138,11 +138,12 @@ def slide_run(world, ground, control, s, course, out):
         out: shape (n, 21).
     """
     h, ticks, samples = world.tick / world.steps, 0, 0.0
+    torque = world.torque * (1.0 - world.yields)
     line, x, y, z = course.line, ZERO3, ZERO3, ZERO3
     tip = Carried(course.start, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
     reading, command = world.noise * vector_at(course.noise[0], 0), tip.x
     for i in range(world.delay + 1):
-        put_vector(line[i], 0, (1.0 - world.torque) * command)
+        put_vector(line[i], 0, (1.0 - torque) * command)
     for k in range(len(out)):
         if ticks >= len(course.directions):
             return k
@@ -152,8 +153,8 @@ def slide_run(world, ground, control, s, course, out):
         velocity = control.step(s, course.work, desired, reading, seen, wanted)
         ticks += 1 if s[PHASE] == SLIDE or ticks > 0 else 0
         command = command + world.tick * velocity
-        pulled = world.torque * (world.stiffness * (command - seen) - world.second * tip.v)
-        put_vector(line[world.delay], 0, (1.0 - world.torque) * command + pulled)
+        pulled = torque * (world.stiffness * (command - seen) - world.second * tip.v)
+        put_vector(line[world.delay], 0, (1.0 - torque) * command + pulled)
         held = vector_at(line[0], 0)
         for i in range(world.delay):
             put_vector(line[i], 0, vector_at(line[i + 1], 0))
@@ -178,8 +179,10 @@ def moved_tip(world, ground, tip, held, h):
     """The tip after a step of the physics under what the delay lets through: places [m], or a pull [N]."""
     if world.torque == 0.0:
         rate = world.first * (held - tip.x) - world.second * tip.v
-    else:
+    elif world.yields == 0.0:
         rate = (held - tip.force) / world.first
+    else:
+        rate = (world.stiffness * (held - tip.x) - world.second * tip.v - tip.force) / world.first
     v = tip.v + h * rate
     return contact(world, ground, tip, tip.x + h * v, v, h)
 

@@ -11,7 +11,7 @@ from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
-from palpate.maps.presses import read_table
+from palpate_maps.presses import read_table
 from palpate_slide.dither import dither_frequency, stiffness_along
 from palpate_slide.ground import ground_of
 from palpate_slide.world import figures_of, simulate

@@ -1,4 +1,7 @@
-"""A bench of one joint: a motor turns a lever that presses on a surface (thesis, sec. 2.2; Yabuta and Yamada)."""
+"""A bench of one joint: a motor turns a lever that presses on a surface; and its direct neural force control.
+
+Thesis, sec. 2.2, fig. 2.3 and 2.4; after Yabuta and Yamada. The network gives the torque.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,13 @@ import numpy as np
 from palpate._jit import kernel, law, part
 from palpate._vector import clip
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
-from palpate.bench.tables import ForceSensor
+from palpate.bench.tables import ForceSensorTable
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface
 from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
 from palpate.errors import InputError
 from palpate.friction import LuGre
+from palpate.networks import Network, NetworkState, network, random_layers
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.signals.filters import Biquad, BiquadState, butterworth2
@@ -100,7 +104,7 @@ class JointLoop(NamedTuple):
         force: the force's way into the controller.
         filter: of the sampled force.
         schedule: desired force.
-        controller: ``step(state, desired, f) -> (torque, state)`` and ``gain(state)``.
+        controller: ``step(state, desired, f, x) -> (torque, state)``, x the depth [m], and ``gain(state)``.
         limit: largest torque of the motor [N m].
         tick: [s].
         steps: of the plant between ticks.
@@ -140,7 +144,9 @@ def tick(loop, state, k, noise, out):
     sampled = loop.force.reading(state.force)
     measured, filtered = loop.filter.step(state.filter, sampled)
     desired = loop.schedule.force(k * loop.tick)
-    wanted, controller = loop.controller.step(state.controller, desired, measured)
+    wanted, controller = loop.controller.step(
+        state.controller, desired, measured, loop.joint.lever * state.joint.q
+    )
     torque = clip(wanted, loop.limit)
     joint, felt = state.joint, state.felt
     out[0], out[1], out[2], out[3] = k * loop.tick, joint.q, joint.qd, loop.joint.lever * joint.q
@@ -171,12 +177,13 @@ class OneJoint:
 
     loop: JointLoop
 
-    def run(self, duration: float, seed: int = 0, *, compiled: bool = True) -> Record:
-        """Runs from rest at the surface.
+    def run(self, duration: float, seed: int = 0, *, gap: float = 0.0, compiled: bool = True) -> Record:
+        """Runs from rest at the surface, or before it.
 
         Args:
             duration: [s].
             seed: of the noise; the same seed gives the same record, bit for bit.
+            gap: between tip and surface at the start [m].
             compiled: False runs the same code in plain Python.
 
         Returns:
@@ -189,7 +196,9 @@ class OneJoint:
             raise InputError(f"duration must be at least one tick ({self.loop.tick} s), got {duration}")
         noise = np.random.default_rng(seed).standard_normal(round(duration / self.loop.tick))
         rows = np.empty((len(noise), len(COLUMNS)))
-        (compiled_march if compiled else march_joint)(self.loop, start_loop(self.loop), noise, rows)
+        state = start_loop(self.loop)
+        state = state._replace(joint=state.joint._replace(q=-gap / self.loop.joint.lever))
+        (compiled_march if compiled else march_joint)(self.loop, state, noise, rows)
         finite = np.isfinite(rows).all(axis=1)
         end = "done" if finite.all() else "diverged"
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
@@ -257,7 +266,111 @@ def one_joint(
         steps: of the plant between ticks.
     """
     require_positive(rate=rate, steps=steps)
-    force = force_input(ForceSensor(noise=noise), rate * steps)
+    force = force_input(ForceSensorTable(noise=noise), rate * steps)
     joint = Joint(float(link.inertia), float(link.lever), link.friction.checked(), join(surface))
     smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
     return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))
+
+
+INPUTS = 4
+
+
+@part
+class DirectNeuralState(NamedTuple):
+    network: NetworkState
+    f: float  # measured force of the tick before [N]
+    torque: float  # of the tick before [N m]
+
+
+@part
+class DirectNeural(NamedTuple):
+    """No other controller stands beside the network: it learns from the force error alone what torque presses so.
+
+    The network sees the desired force, the measured one, that of the tick before and its own last torque. Of the plant
+    it knows only that more torque presses harder.
+
+    Args:
+        force: what forces are divided by before the network sees them [N].
+        network: of 4 inputs and 1 output, the amplitude being the largest torque [N m]; `direct_neural` makes it.
+    """
+
+    force: float
+    network: Network
+
+    def start(self):
+        return DirectNeuralState(self.network.start(), 0.0, 0.0)
+
+    def step(self, state, desired, f, x):
+        """Torque [N m] for the desired and the measured force [N]; learns on the way."""
+        net, memory = self.network, state.network
+        see(
+            memory.signals,
+            desired / self.force,
+            f / self.force,
+            state.f / self.force,
+            state.torque / net.amplitude[0],
+        )
+        net.forward(memory)
+        torque = net.output(memory, 0)
+        net.want(memory, 0, desired - f)
+        net.learn(memory)
+        return torque, DirectNeuralState(memory, f, torque)
+
+    def gain(self, state):
+        """Its integral gain, here and now [N m per N and sample]: what one step of learning adds to the torque."""
+        return self.network.gain(state.network, 0)
+
+
+@law
+def see(signals, desired, f, f_before, torque):
+    """Writes the network's four inputs."""
+    signals[0], signals[1], signals[2], signals[3] = desired, f, f_before, torque
+
+
+@part
+class DirectIntegral(NamedTuple):
+    """First-order equivalent of `DirectNeural`: the integral of the force error, as a torque.
+
+    Args:
+        ki: [N m per N and sample].
+    """
+
+    ki: float
+
+    def start(self):
+        return 0.0
+
+    def step(self, state, desired, f, x):
+        """Torque [N m] for the desired and the measured force [N]."""
+        torque = state + self.ki * (desired - f)
+        return torque, torque
+
+    def gain(self, state):
+        """Its integral gain [N m per N and sample]."""
+        return self.ki
+
+
+def direct_neural(
+    learning_rate: float = 5e-5,
+    torque: float = 9.8,
+    hidden: int = 6,
+    force: float = 20.0,
+    seed: int = 0,
+    scale: float = 0.3,
+) -> DirectNeural:
+    """A direct neural controller whose weights are drawn evenly from -scale ... scale.
+
+    Args:
+        learning_rate: eta.
+        torque: the largest it can give [N m]; well above what is needed, or the sigmoid flattens and learns no more.
+        hidden: neurons of the hidden layer.
+        force: scale of the forces [N].
+        seed: of the weights.
+        scale: of the weights.
+
+    Raises:
+        InputError: a learning rate or a torque not above 0, no hidden neuron.
+    """
+    return DirectNeural(
+        float(force), network(list(random_layers((INPUTS, hidden, 1), seed, scale)), torque, learning_rate)
+    )

@@ -12,7 +12,7 @@ from palpate.cli.options.values import FLAG, SIGNED, span, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Arm, ContactFrame, Payload
+    from palpate.contact_frame import ArmDynamics, ContactFrame, Payload
 
 
 @Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
@@ -104,14 +104,14 @@ class ArmOptions:
 
         return None if self.payload is None else load_payload(self.payload)
 
-    def arm(self) -> Arm:
+    def arm(self) -> ArmDynamics:
         """The arm as given; a press on a wall is another log."""
-        from palpate.contact_frame import Arm
+        from palpate.contact_frame import ArmDynamics
 
         if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
             raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
         hung = self.weighed_tool()
-        return Arm(
+        return ArmDynamics(
             tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
             stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
             mass=with_std("robot-mass", self.robot_mass, "3.7:0.4"),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @Parameter(name="*", group=Group("The arm", sort_key=1))
 @dataclass(frozen=True, kw_only=True)
-class ArmOptions:
+class LoopArmOptions:
     """The arm whose loop is tuned."""
 
     arm: Annotated[LoopArm, QUIET]
@@ -97,19 +97,14 @@ class PressOptions:
         return in_si_if_given("--peak", self.peak, "force")
 
 
-@Parameter(name="*", group=Group("A slide along the surface", sort_key=4))
 @dataclass(frozen=True, kw_only=True)
-class SlideNumberOptions:
-    """Numbers of a slide, for palpate slide and palpate.force.SlidingLoop."""
+class SlideLimits:
+    """Numbers that every slide has, in palpate tune --slide and in palpate slide."""
 
-    slide: Annotated[bool, FLAG] = False
-    "Tune for a slide too, and print on which surfaces it holds the force within 3 % rms."
     mu_max: Annotated[float, SIGNED] = 0.9
-    "Largest friction coefficient there may be."
+    "Largest friction coefficient that there may be."
     speed: Annotated[str, SIGNED] = "30:mm/s"
     "Speed along the surface, as 30:mm/s."
-    radius: Annotated[str, SIGNED] = "100:mm"
-    "Smallest radius of curvature of the surface, as 100:mm."
     tilt: Annotated[float, SIGNED] = 7.0
     "Standard deviation of the given normal, in degrees."
     step: Annotated[str, SIGNED] = "0:mm"
@@ -117,47 +112,58 @@ class SlideNumberOptions:
     touches: Annotated[str, SIGNED] = "10:mm"
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
 
-    def added_to(self, gains: Gains) -> Gains:
+    def gains_with(self, gains: Gains, radius: float) -> Gains:
+        """The gains with a table `slide`.
+
+        Args:
+            gains: of the force loop.
+            radius: smallest radius of curvature of the surface [m].
+
+        Raises:
+            InputError: a number out of range.
+        """
+        from math import radians
+
+        from msgspec.structs import replace
+
+        from palpate.force.slide_table import Slide
+
+        v, most = in_si("--speed", self.speed, "velocity"), gains.arm.limits.speed
+        lengths = {
+            f"--{name}": in_si(f"--{name}", getattr(self, name), "length") for name in ("step", "touches")
+        }
+        if not 0.0 < self.mu_max <= 2.0:
+            raise InputError(
+                f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {self.mu_max:g}"
+            )
+        if not 0.0 < v <= most:
+            raise InputError(f"--speed must be above 0 and at most the arm's {most:g} m/s, got {v:g} m/s")
+        if not 1e-3 <= radius < 1e4:
+            raise InputError(f"--radius must be from 1 mm to 10 km, got {radius:g} m")
+        if not 0.1 <= self.tilt <= 25.0:
+            raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {self.tilt:g}")
+        for name, length in lengths.items():
+            if not 0.0 <= length <= 0.1:
+                raise InputError(f"{name} must be from 0 to 100 mm, got {1e3 * length:g} mm")
+        step, touches = lengths.values()
+        slope = radians(self.tilt)
+        slide = Slide(speed=v, mu_max=self.mu_max, radius=radius, slope=slope, step=step, touches=touches)
+        return replace(gains, slide=slide)
+
+
+@Parameter(name="*", group=Group("A slide along the surface", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class SlideTuningOptions(SlideLimits):
+    """A slide, for palpate slide and palpate.force.SlidingLoop."""
+
+    slide: Annotated[bool, FLAG] = False
+    "Tune for a slide too, and print on which surfaces it holds the force within 3 % rms."
+    radius: Annotated[str, SIGNED] = "100:mm"
+    "Smallest radius of curvature of the surface, as 100:mm."
+
+    def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        numbers = self.mu_max, self.speed, self.radius, self.tilt, self.step, self.touches
-        return with_slide(gains, *numbers) if self.slide else gains
-
-
-# More than seven arguments: each is an option as typed.
-def with_slide(
-    gains: Gains, mu_max: float, speed: str, radius: str, tilt: float, step: str, touches: str
-) -> Gains:
-    """Gains with the numbers of a slide, as typed.
-
-    Raises:
-        InputError: a number out of range.
-    """
-    from math import radians
-
-    from msgspec.structs import replace
-
-    from palpate.force.slide_table import Slide
-
-    v, R = in_si("--speed", speed, "velocity"), in_si("--radius", radius, "length")
-    lengths = {"--step": in_si("--step", step, "length"), "--touches": in_si("--touches", touches, "length")}
-    if not 0.0 < mu_max <= 2.0:
-        raise InputError(
-            f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {mu_max:g}"
-        )
-    if not 0.0 < v <= gains.arm.limits.speed:
-        raise InputError(
-            f"--speed must be above 0 and at most the arm's {gains.arm.limits.speed:g} m/s, got {v:g} m/s"
-        )
-    if not 1e-3 <= R < 1e4:
-        raise InputError(f"--radius must be from 1 mm to 10 km, got {R:g} m")
-    if not 0.1 <= tilt <= 25.0:
-        raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {tilt:g}")
-    for name, length in lengths.items():
-        if not 0.0 <= length <= 0.1:
-            raise InputError(f"{name} must be from 0 to 100 mm, got {1e3 * length:g} mm")
-    height, spacing = lengths.values()
-    numbers = Slide(speed=v, mu_max=mu_max, radius=R, slope=radians(tilt), step=height, touches=spacing)
-    return replace(gains, slide=numbers)
+        return self.gains_with(gains, in_si("--radius", self.radius, "length")) if self.slide else gains
 
 
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))
@@ -187,18 +193,11 @@ class ColumnOptions:
 
 @Parameter(name="*", group=WRITTEN)
 @dataclass(frozen=True, kw_only=True)
-class OutputOptions(FileOptions):
-    """Where gains or a certificate are written."""
+class TuningOutputOptions(FileOptions):
+    """Files to write, and how much to print."""
 
     out: Path | None = None
     "Where to write the gains (a TOML file) or the certificate (a JSON file)."
-
-
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
-class TuningOutputOptions(OutputOptions):
-    """Files to write, and how much to print."""
-
     verbose: Annotated[bool, FLAG] = False
     "Print every figure, every warning, and the cases that no proof covers."
 

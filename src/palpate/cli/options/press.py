@@ -17,11 +17,6 @@ if TYPE_CHECKING:
     from palpate.contact_frame import Payload
     from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.press.prepare import Question
-    from palpate.wires import Limits, Task
-
-
-RETREAT = 0.002
-"""Distance of the retreat if none is given [m]."""
 
 
 @Parameter(name="*", group=Group("The press", sort_key=1))
@@ -188,38 +183,3 @@ def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, o
     given = next(iter(options_given((part,))), None)
     if given is not None:
         raise InputError(f"--{given} is for {of}, or leave out --{given}")
-
-
-def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[Task, Limits]:
-    """The task of a real arm; the direction and every limit have to be given.
-
-    Raises:
-        InputError: one is missing or invalid.
-    """
-    from palpate.force.gains import load_gains
-    from palpate.wires import Limits, Task
-    from palpate.wires.order import travel_for
-
-    needed = {
-        "--wire": wire.wire, "--gains": asked.gains, "--force": asked.force, "--normal": asked.normal,
-        "--force-limit": limits.force_limit, "--speed-limit": limits.speed_limit,
-        "--time-limit": limits.time_limit,
-    }  # fmt: skip
-    lacking = [name for name, value in needed.items() if value is None]
-    if lacking:
-        raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
-    normal = vector("normal", asked.normal, "number")
-    assert normal is not None
-    force = in_si("--force-limit", str(limits.force_limit), "force")
-    if limits.travel_limit is None:
-        travel = travel_for(load_gains(Path(str(asked.gains))), force)
-    else:
-        travel = in_si("--travel-limit", limits.travel_limit, "length")
-    most = Limits(
-        force,
-        in_si("--speed-limit", str(limits.speed_limit), "velocity"),
-        travel,
-        in_si("--time-limit", str(limits.time_limit), "time"),
-    )
-    retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
-    return Task(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most

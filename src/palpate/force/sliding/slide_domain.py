@@ -67,10 +67,8 @@ def numbers_of(gains: Gains) -> Slide:
     """The table `slide` of gains.
 
     Raises:
-        InputError: gains without it, or of a servo, whose lead the law of a slide does not know.
+        InputError: gains without it.
     """
-    if gains.arm.kind == "servo":
-        raise InputError(f"{gains.arm.title}: a slide of a servo is not covered; press with it by ForceLoop")
     if gains.slide is None:
         raise InputError("these gains have no numbers for a slide; tune again with --slide --mu-max .9")
     return gains.slide

@@ -9,6 +9,8 @@ F_d sqrt(1 + mu_max^2).
 
 A jump of the force and a refuted normal halt the slide: the tip stops at once, nothing is estimated, and the force
 alone is controlled along n. Once it is held for the loop's lag, the filter begins again at an uncertain normal.
+
+The command of a servo that yields leads its tip, along n as in a press, along the surface as in free motion.
 """
 
 from palpate._jit import law
@@ -26,7 +28,7 @@ from palpate.force.guard import (
     STALE,
     safe_step,
 )
-from palpate.force.law import gain
+from palpate.force.law import gain, lead_speed
 from palpate.force.sliding.slide_state import (
     ALL,
     ALONG,
@@ -45,9 +47,11 @@ from palpate.force.sliding.slide_state import (
     MOVE,
     NORMAL,
     ORIGIN,
+    PACE,
     PHASE,
     POSITION,
     PRESS,
+    PRESSING,
     READ_AT,
     REFUTED,
     ROUGH,
@@ -171,7 +175,27 @@ def slide_step(law, s, work, desired, force, position, direction, missed):
     if not fast < 1e9:  # nothing that is not finite leaves
         press_again(law, s, law.into, BLIND)
         return ZERO3
+    if c.lead > 0.0 and s[PHASE] != PRESS:
+        velocity = lead_velocity(c, s, velocity)
+        fast = sqrt(velocity @ velocity)
     return velocity * (c.speed / fast) if fast > c.speed else velocity
+
+
+@law
+def lead_velocity(c, s, wanted):
+    """Velocity of a servo's command whose tip is to have this one [m/s]; see `law.lead_speed`.
+
+    What presses works against the surface's spring, what follows the surface does not, however that bends.
+    """
+    n, pace, v = vector_at(s, NORMAL), vector_at(s, PACE), wanted
+    if s[PHASE] == SLIDE:
+        v = vector_at(s, VELOCITY)
+    press, s[PRESSING] = lead_speed(c, s[PRESSING], (wanted - v) @ n, s[BOUND], c.speed)
+    x, pace_x = lead_speed(c, pace.x, v.x, 0.0, c.speed)
+    y, pace_y = lead_speed(c, pace.y, v.y, 0.0, c.speed)
+    z, pace_z = lead_speed(c, pace.z, v.z, 0.0, c.speed)
+    put_vector(s, PACE, Vec3(pace_x, pace_y, pace_z))
+    return press * n + Vec3(x, y, z)
 
 
 @law
@@ -194,11 +218,14 @@ def press_tick(law, s, late, desired, force, position, missed):
         stiffness, sd = stiffness_in(c, press)
         if s[TOUCHES] < ALL:
             over = press.watch.mean - press.watch.rest - desired
+            put_vector(s, PACE, ZERO3)
             enter_touch(law, s, late - over / (stiffness + 2.0 * sd) * n, c.noise / stiffness)
             return ZERO3
         tilt = 2.0 * s[SLOPE] * s[SLOPE] * (1.0 + c.compliance * stiffness)
         relative = min(sqrt((sd / stiffness) ** 2 + tilt * tilt), 0.5)
         s[PHASE], s[BOUND] = SLIDE, press.bound.used
+        s[PRESSING] = press.pace
+        put_vector(s, PACE, ZERO3)
         start = n if law.spacing > 0.0 else unit(force, n)
         slide_from(law, s, start, size, stiffness, relative, s[SLOPE], LIKELY[0], LIKELY[1])
     return speed * n

@@ -112,7 +112,9 @@ AXIS = POINTS + 9
 """The sensor's low-pass of three axes."""
 ALL = 3.0
 """Touches that make a normal."""
-LAW = AXIS + 9
+PACE, PRESSING = AXIS + 9, AXIS + 12
+"""Smoothed velocity along the surface, and speed along the normal, which a servo's command leads [m/s]."""
+LAW = PRESSING + 1
 SAFETY = LAW + STATE
 SIZE = SAFETY + GUARD
 """Places of the cautious law's state and of its guard's; numbers of a state."""

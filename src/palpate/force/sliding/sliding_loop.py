@@ -53,10 +53,11 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
             f"the direction into the surface needs three numbers that are not all 0, got {into!r}"
         )
     arm = gains.arm
+    lead = gains.theta if arm.kind == "servo" else sum_of_lags(arm)  # of a servo what its own lead leaves
     return Sliding(
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
-        acceleration=slide.acceleration, lead=sum_of_lags(arm), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
+        acceleration=slide.acceleration, lead=lead, late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
         encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 
@@ -185,6 +186,12 @@ class SlidingLoop(Readable):
                 f"the desired force must be from {least:g} N to below {most:g} N, got {force:g} N"
             )
         self._desired = float(force)
+
+    def limit_speed(self, speed: float) -> None:
+        """Lets no command be faster than this [m/s], where that is below the arm's own limit."""
+        press = self.law.press
+        slower = press._replace(speed=min(press.speed, speed))
+        self._numbers = flattened(self.law._replace(press=slower))
 
     def update(
         self, force: ArrayLike, position: ArrayLike, direction: ArrayLike, missed: float = 0.0

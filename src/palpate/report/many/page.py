@@ -174,6 +174,7 @@ def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
         "interval": interval(p.ci95, p.unit),
         "next": interval(own.prediction95, p.unit),
         "between": "" if own.between is None else quantity(own.between, p.unit, digits=2),
+        "slopes": {covariate: interval(p.ci95, p.unit) for covariate, p in own.slopes.items()},
         "count": f"{len(own.logs)} of {pooled.count}",
         "reason": printable(p.reason),
     }

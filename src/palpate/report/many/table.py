@@ -99,11 +99,22 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
         return f"The {len(rows)} logs show no stiffness together {where}: {own.reason}."
     limit = cause_of(next(iter(own.budget), None))
     after = point.stiffness.prediction95
+    changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
+    by = f", it changes by {' and '.join(map(formatted, changes))}" if changes else ""
     again = f", the next press is predicted at {interval(after, own.unit)} (95 %)" if after else ""
     return (
-        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {formatted(own)}{again}, {where};"
+        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {formatted(own)}{by}{again}, {where};"
         f" its uncertainty is mostly due to {limit.described}: {limit.remedy}."
     )
+
+
+def slopes(pooled: Pooled) -> dict[str, Parameter]:
+    """How each quantity depends on each covariate, by "K by temperature_C"."""
+    return {
+        f"{name} by {covariate}": p
+        for name, own in quantities(pooled).items()
+        for covariate, p in own.slopes.items()
+    }
 
 
 def place(rows: Sequence[LogRow], point: PooledPoint) -> str:
@@ -116,7 +127,8 @@ def place(rows: Sequence[LogRow], point: PooledPoint) -> str:
         return low if low == high else f"{low} to {high}"
 
     depth, frequency = spread(point.depth_m, position), spread(point.frequency_Hz, "Hz")
-    return f"at {spread(point.force_N, force)}, {depth} deep and {frequency}"
+    known = [f", {name} {plain(value)}" for name, value in point.stiffness.at.items()]
+    return f"at {spread(point.force_N, force)}, {depth} deep and {frequency}{''.join(known)}"
 
 
 def failures(rows: Sequence[LogRow]) -> str:
@@ -144,9 +156,12 @@ def show(rows: Sequence[LogRow], pooled: Pooled, console: Console) -> None:
         console.print(Text(failures(rows), style="yellow"))
     console.print(_logs(rows, pooled, console.width >= _WIDE))
     console.print(_together(pooled))
-    for name, own in quantities(pooled).items():
-        if own.parameter.verdict is not Verdict.IDENTIFIED:
-            note(console, f"{name}:", own.parameter.reason, STYLES[own.parameter.verdict])
+    if slopes(pooled):
+        console.print(_dependences(pooled))
+    own = {name: whole.parameter for name, whole in quantities(pooled).items()}
+    for name, p in (own | slopes(pooled)).items():
+        if p.verdict is not Verdict.IDENTIFIED:
+            note(console, f"{name}:", p.reason, STYLES[p.verdict])
     for row in rows:
         if row.found is None:
             note(console, f"{row.source.title}:", row.error, "red")
@@ -190,6 +205,14 @@ def _together(pooled: Pooled) -> Table:
             f"{len(own.logs)} of {pooled.count}",
             Text(str(p.verdict), style=STYLES[p.verdict]),
         )
+    return table
+
+
+def _dependences(pooled: Pooled) -> Table:
+    table = bare_table("dependence", "± 95 %", "verdict", wrapped=("dependence",))
+    for name, p in slopes(pooled).items():
+        number = interval(p.ci95, p.unit) if p.value is None else formatted(p)
+        table.add_row(name, number or NONE, Text(str(p.verdict), style=STYLES[p.verdict]))
     return table
 
 

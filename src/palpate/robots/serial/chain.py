@@ -26,7 +26,7 @@ from palpate.robots.serial.linear import (
 
 
 @part
-class Chain(NamedTuple):
+class KinematicChain(NamedTuple):
     """The numbers of a serial arm of n joints; each joint's axis is the z of its own frame.
 
     Args:
@@ -88,7 +88,7 @@ class Tip(NamedTuple):
 
 
 def spread_of(inertia: Array) -> tuple[Array, Array]:
-    """`least` and `spread` of a `Chain`, of inertias in any axes [kg m^2], shape (n, 3, 3).
+    """`least` and `spread` of a `KinematicChain`, of inertias in any axes [kg m^2], shape (n, 3, 3).
 
     Raises:
         InputError: a number of them is not finite.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.robots.serial.chain import Chain, spread_of
+from palpate.robots.serial.chain import KinematicChain, spread_of
 from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
 from palpate.robots.serial.serial_arm import Scene, SerialArm
 
@@ -166,7 +166,7 @@ def _chain(
     joints: list[int],
     frames: list[tuple[Array, Array]],
     links: list[tuple[float, Array, Array]],
-) -> Chain:
+) -> KinematicChain:
     at, turn = [], []
     p0, R0 = np.zeros(3), np.eye(3)
     for j, (p, R) in zip(joints, frames, strict=True):
@@ -176,7 +176,7 @@ def _chain(
         turn.append(R0.T @ R @ (np.eye(3) if slides else _about_z(-zero)))
         p0, R0 = p, R
     least, spread = spread_of(np.array([moment for _, _, moment in links]))
-    return Chain(
+    return KinematicChain(
         at=np.array(at),
         turn=np.array(turn),
         slide=np.array([float(_slides(model, j)) for j in joints]),

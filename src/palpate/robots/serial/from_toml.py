@@ -19,7 +19,7 @@ from msgspec import Meta
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files import read_bytes, read_table, read_text
-from palpate.robots.serial.chain import Chain, spread_of
+from palpate.robots.serial.chain import KinematicChain, spread_of
 from palpate.robots.serial.from_mujoco import arm_of
 from palpate.robots.serial.loading import check_inertia, load_mjcf
 from palpate.robots.serial.serial_arm import SerialArm
@@ -135,10 +135,10 @@ def _build(file: ArmFile) -> SerialArm:
     )
 
 
-def _chain(file: ArmFile) -> Chain:
+def _chain(file: ArmFile) -> KinematicChain:
     joints = file.joint
     least, spread = spread_of(np.array([symmetric(j.inertia) for j in joints]))
-    return Chain(
+    return KinematicChain(
         at=np.array([j.at for j in joints], float).reshape(-1, 3),
         turn=np.array([rotation(j.turn) for j in joints]).reshape(-1, 3, 3),
         slide=_column(float(j.kind == "prismatic") for j in joints),

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Readable
-from palpate.robots.serial.chain import Chain, chain_model, room_for
+from palpate.robots.serial.chain import KinematicChain, chain_model, room_for
 from palpate.robots.serial.loading import compile_model, mujoco, refusals
 from palpate.robots.serial.task import ArmState, arm_state_for, compiled_description
 
@@ -72,7 +72,7 @@ class SerialArm(Readable):
 
     title: str
     names: tuple[str, ...]
-    chain: Chain
+    chain: KinematicChain
     lower: Array
     upper: Array
     torque: Array

@@ -3,11 +3,11 @@
 from palpate_studies.analysis.boundaries import stable_intervals, stable_stiffness
 from palpate_studies.analysis.linear_loop import LinearLoop, Mode
 from palpate_studies.analysis.linear_model import linearise
-from palpate_studies.analysis.margins import Margins, growth_with, loop_gain, margins
+from palpate_studies.analysis.margins import LoopMargins, growth_with, loop_gain, margins
 
 __all__ = [
     "LinearLoop",
-    "Margins",
+    "LoopMargins",
     "Mode",
     "growth_with",
     "linearise",

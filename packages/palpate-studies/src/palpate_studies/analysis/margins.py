@@ -21,7 +21,7 @@ LOWEST = 0.05
 
 
 @dataclass(frozen=True)
-class Margins:
+class LoopMargins:
     """Of the force loop, averaged over a period of sensor and tick.
 
     Args:
@@ -41,7 +41,7 @@ class Margins:
     sensitivity: float
 
 
-def margins(loop: LinearLoop) -> Margins:
+def margins(loop: LinearLoop) -> LoopMargins:
     """Of the force loop, from `loop_gain`.
 
     Raises:
@@ -58,7 +58,9 @@ def margins(loop: LinearLoop) -> Margins:
     turned = np.degrees(phases % (2.0 * math.pi))
     phase, phase_frequency = _least(turned, at)
     delay, _ = _least(turned / (360.0 * at), at)
-    return Margins(gain, gain_frequency, phase, phase_frequency, delay, float((1.0 / np.abs(1.0 + L)).max()))
+    return LoopMargins(
+        gain, gain_frequency, phase, phase_frequency, delay, float((1.0 / np.abs(1.0 + L)).max())
+    )
 
 
 def growth_with(loop: LinearLoop, gain: float = 1.0, late: int = 0) -> float:

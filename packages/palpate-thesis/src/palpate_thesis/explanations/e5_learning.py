@@ -1,9 +1,10 @@
-"""Explanation 5: questions left open by the thesis: the best learning rate, layers and neurons, stability."""
+"""Explanation 5: left open by the thesis: the best learning rate, layers and neurons, architectures, stability."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,14 +12,17 @@ from palpate.bench import Experiment, changed
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import RELAXING_FOAM
+from palpate_thesis.force_control.architectures import bench_with, radial_basis, recurrent
 from palpate_thesis.force_control.panels import legend_inside, panels
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, Tracking, tracking
+from palpate_thesis.force_control.tracking import FOAM, FOLLOWS, RUBBER, Tracking, following, tracking
 from palpate_thesis.force_control.weights import watch
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "rate-layers-neurons"
 TITLE, CAPTION = texts(NUMBER)
+RATE = 5e-5
+"""The text's."""
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
 SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
 SURFACES: Mapping[str, Experiment] = {
@@ -29,6 +33,9 @@ PARAMETERS = SURFACES
 JUDGED = (10.0, 15.0)
 LONG = 120.0
 """Seconds of contact over which a network's size is tried for a loss [s]."""
+ARCHITECTURES = {"radial-basis": radial_basis, "recurrent": recurrent}
+LESS = 0.9
+"""Largest share of the thesis' network's error that counts as better."""
 PER_RATE, PER_SIZE, PER_LOSS = 3, 3, 2
 """Runs of each."""
 GONE = 3.8
@@ -43,6 +50,8 @@ class Data:
     pi: dict[str, dict[float, Tracking]]
     sizes: dict[tuple[int, ...], list[Tracking]]  # on foam
     losses: dict[tuple[int, ...], list[float | None]]  # on the foam that relaxes [s]
+    others: dict[str, dict[str, list[Tracking]]]  # by architecture and surface
+    others_losses: dict[str, list[float | None]]
 
 
 def run(runs: Runs) -> Data:
@@ -69,7 +78,26 @@ def run(runs: Runs) -> Data:
         pi,
         {size: errors[i * PER_SIZE : (i + 1) * PER_SIZE] for i, size in enumerate(SIZES)},
         {size: lost[i * PER_LOSS : (i + 1) * PER_LOSS] for i, size in enumerate(SIZES)},
+        {name: {s: _errors_of(runs, name, s) for s in ("foam", "rubber")} for name in ARCHITECTURES},
+        {name: runs.map(partial(_loss, runs, name), runs.seeds[:PER_RATE]) for name in ARCHITECTURES},
     )
+
+
+def _errors_of(runs: Runs, name: str, surface: str) -> list[Tracking]:
+    """The error with an architecture in the place of the network, at the text's rate."""
+    e = SURFACES[surface]
+
+    def measure(seed: int) -> Tracking:
+        bench = bench_with(e, ARCHITECTURES[name], seed)
+        return tracking(*JUDGED)(bench.run(e.run.duration, seed, press=e.run.press))
+
+    return runs.map(measure, runs.seeds)
+
+
+def _loss(runs: Runs, name: str, seed: int) -> float | None:
+    """When an architecture loses the foam that relaxes [s]."""
+    e = SURFACES["foam that relaxes"]
+    return watch(e, seed, LONG, lambda _: None, runs.waiting, bench=bench_with(e, ARCHITECTURES[name], seed))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -93,8 +121,29 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             times=len(times),
             losses=len(losses),
             rising=_rising(data),
-        )
+        ),
+        *(_architecture(data, name) for name in ARCHITECTURES),
     ]
+
+
+def _architecture(data: Data, name: str) -> ThesisClaim:
+    found, losses = data.others[name], data.others_losses[name]
+    kept = sum(lost is None for lost in losses)
+    shares = {s: _rms(runs) / _rms(data.network[s][RATE]) for s, runs in found.items()}
+    return claim(
+        f"architectures.{name}",
+        all(s <= LESS for s in shares.values())
+        and all(map(following, found.values()))
+        and kept == len(losses),
+        foam=[one.rms for one in found["foam"]],
+        rubber=[one.rms for one in found["rubber"]],
+        shares=" and ".join(f"{share:.0%}" for share in shares.values()),
+        following="; ".join(f"{s}: {sum(o.follows for o in f)} of {len(f)} follow" for s, f in found.items()),
+        gone=", ".join("never" if lost is None else f"{lost:.0f} s" for lost in losses),
+        less=LESS,
+        long=LONG,
+        follows=FOLLOWS,
+    )
 
 
 def plot(data: Data) -> Figure:
@@ -112,20 +161,20 @@ def plot(data: Data) -> Figure:
         )
         legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
     labels = ["-".join(map(str, size)) for size in SIZES]
-    for i, found in enumerate(data.sizes.values()):
-        grid[1][0].plot(
-            [i] * len(found), [one.rms for one in found], "o", color=style.SERIES[0], markersize=4
-        )
+    labels += list(ARCHITECTURES)
+    for i, found in enumerate((*data.sizes.values(), *(other["foam"] for other in data.others.values()))):
+        color = style.SERIES[0] if i < len(SIZES) else style.SERIES[1]
+        grid[1][0].plot([i] * len(found), [one.rms for one in found], "o", color=color, markersize=4)
     grid[1][0].set(ylabel="RMS error, foam [N]", ylim=(0.0, 2.5))
-    for i, times in enumerate(data.losses.values()):
+    for i, times in enumerate((*data.losses.values(), *data.others_losses.values())):
         for lost in times:
             marker, color = ("^", style.OK) if lost is None else ("o", style.FAIL)
             grid[1][1].plot(i, LONG if lost is None else lost, marker, color=color, markersize=5)
     grid[1][1].set(ylabel="contact lost after [s]", ylim=(0.0, LONG * 1.08))
     grid[1][1].set_title(f"foam that relaxes; at the upper edge: kept for {LONG:g} s")
     for axis in grid[1]:
-        axis.set_xticks(range(len(SIZES)), labels)
-        axis.set_xlabel("neurons of each hidden layer")
+        axis.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
+        axis.set_xlabel("neurons of each hidden layer; other architectures, 12 neurons")
     return drawing
 
 

@@ -19,10 +19,16 @@ from palpate_studies.metrics.following import LIMIT, SHARE
 from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
-from palpate_thesis.direct_neural import DirectIntegral, DirectNeural, direct_neural
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.look import Axes, Figure
-from palpate_thesis.one_joint import JOINT_FRICTION, Link, one_joint
+from palpate_thesis.one_joint import (
+    JOINT_FRICTION,
+    DirectIntegral,
+    DirectNeural,
+    Link,
+    direct_neural,
+    one_joint,
+)
 from palpate_thesis.runs import Runs
 
 NUMBER = "2.4"

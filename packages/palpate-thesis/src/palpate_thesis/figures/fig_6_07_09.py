@@ -1,4 +1,4 @@
-"""Figures 6.7 and 6.9: the neural identifier in the first four seconds, on foam and on rubber."""
+"""Figures 6.7 to 6.9: the neural identifier in the first four seconds, on foam and on rubber, and its error."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ from palpate_thesis.neural_identifier.network import (
 from palpate_thesis.runs import Runs
 
 SHOWN_STARTS = 5
+SLOW = NetworkChoice(amplitude=25.0, weights=0.01)
+"""An amplitude just above the force and weights as small as those in the listing of the controller."""
 CALM = 60
 """Milliseconds after which curves set the scale of a panel."""
 NAMES = {"foam": "plain foam", "rubber": "rubber"}
@@ -214,6 +216,48 @@ class NetworkFirstSeconds(Numbered):
         return plot(data, self.parts, self.band)
 
 
+@dataclass(frozen=True, eq=False)
+class NetworkError(NetworkFirstSeconds):
+    """The error of the output on foam, as chosen and of a network that learns slowly."""
+
+    def plot(self, data: Data) -> Figure:
+        """The error along a press, and when it is gone."""
+        drawing, axes = panels.grid(2)
+        for axis, error, letter, title in (
+            (axes[0], data.curves[0][:, 3], "a", "Error as chosen: amplitude 40 N, weights to 0.5"),
+            (
+                axes[2],
+                network.learn(data.press, SLOW, 0)[1][:, 3],
+                "b",
+                f"Error with amplitude {SLOW.amplitude:g} N, weights to {SLOW.weights:g}",
+            ),
+        ):
+            axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
+            axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
+            axis.axvline(0.6, color=style.FAIL, linewidth=0.9, linestyle=":")
+            axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
+            panels.set_title(axis, letter, title)
+        for axis, learns, letter in ((axes[1], True, "c"), (axes[3], False, "d")):
+            _times(axis, data.grounds.swept, thresholds=learns)
+            panels.set_title(
+                axis, letter, f"Time until gone; thresholds {'learn' if learns else 'stay at zero'}"
+            )
+        return drawing
+
+
+def _times(axis: Axes, swept: Mapping[NetworkChoice, Sequence[NetworkAnswer]], *, thresholds: bool) -> None:
+    for weights, color in zip(WEIGHTS, style.SERIES[:5], strict=True):
+        found = [[a.error_gone for a in swept[NetworkChoice(a, weights, thresholds)]] for a in AMPLITUDES]
+        middle = np.median(found, axis=1)
+        axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
+    axis.axhspan(*claims.TIME, color=style.FAIL, alpha=0.12, linewidth=0)
+    axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
+    axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES])
+    axis.minorticks_off()
+    axis.legend(title="weights to", ncols=2)
+
+
 FOAM = NetworkFirstSeconds("6.7", network.FOAM, "foam", claims.FOAM, claims.FOAM_BAND)
 RUBBER = NetworkFirstSeconds("6.9", network.RUBBER, "rubber", claims.RUBBER, claims.RUBBER_BAND)
-STUDIES = (FOAM, RUBBER)
+ERROR = NetworkError("6.8", network.FOAM, "foam", (claims.ERROR,), claims.FOAM_BAND)
+STUDIES = (FOAM, ERROR, RUBBER)

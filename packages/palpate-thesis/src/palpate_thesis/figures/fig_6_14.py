@@ -17,7 +17,7 @@ from palpate_studies.metrics.following import LIMIT
 from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, spread, texts
 from palpate_thesis.conditions import RELAXING_FOAM
-from palpate_thesis.figures.fig_6_13 import SLOW
+from palpate_thesis.figures.fig_6_11_17 import CYCLE, SLOW_RATE
 from palpate_thesis.force_control.panels import force_panel, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
@@ -34,10 +34,8 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "6.14"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(FOAM, {**SLOW, "run.press": 190.0, "run.duration": 300.0})
+PARAMETERS = changed(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
 SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
-CYCLE = 5.0
-"""Over which the course of the error is averaged [s]: one interval of each force."""
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "foam that relaxes": RELAXING_FOAM,
     "PI, K_i = 1 per second": {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": 1.0}},

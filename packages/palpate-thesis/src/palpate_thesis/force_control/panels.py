@@ -10,7 +10,7 @@ import numpy as np
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
-from palpate_thesis.force_control.tracking import Tracked, Tracking
+from palpate_thesis.force_control.tracking import Tracking
 from palpate_thesis.look import Axes, Figure
 
 T = TypeVar("T")
@@ -94,14 +94,6 @@ def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None
         label="RMS error [N]",
         title="outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit",
     )
-
-
-def tracked_figure(data: Tracked) -> Figure:
-    """The slot of a force that is to be followed, and the runs."""
-    drawing, ((force,), (dots,)) = panels([3.2, 2.0])
-    force_panel(force, data.shown)
-    following_panel(dots, data.varied)
-    return drawing
 
 
 def legend_inside(axis: Axes, **options: object) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, build
+from palpate.bench import Bench, Experiment, build
 from palpate.bench.force_input import COLUMNS, CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
@@ -34,6 +34,7 @@ def watch(
     look: Callable[[WeightsAtMoment], None],
     waiting: Callable[[], None] | None = None,
     every: int = LOOK,
+    bench: Bench | None = None,
 ) -> float | None:
     """Runs like `Bench.run`, from the same random numbers, but keeps nothing and ends when contact is lost.
 
@@ -45,11 +46,12 @@ def watch(
             kept, and write in them to see what they did.
         waiting: called when the loop has to be compiled first.
         every: so many ticks.
+        bench: to be run in the place of the experiment's own.
 
     Returns:
         When contact was lost, since it was made [s]; None if it was not, NaN if it was never made.
     """
-    march = build(experiment).simulation(seed, waiting=waiting)
+    march = (bench or build(experiment)).simulation(seed, waiting=waiting)
     while march.ticks * march.loop.tick < experiment.run.duration + duration:
         rows = march.advance(every)
         if march.contact is None:

@@ -263,6 +263,8 @@ class Laboratory:
         }
 
 
+EXPERIMENTS = ("4.2", "4.4", "6.")
+"""Beginnings of the numbers of the figures that show the thesis' own experiments."""
 CHOSEN = Laboratory()
 NAMES = tuple(field.name for field in fields(Laboratory))
 

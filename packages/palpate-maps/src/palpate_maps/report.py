@@ -1,0 +1,394 @@
+"""A stiffness map in a sentence, as tables, and as a page with the map, its interval, a cut and the next presses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.report import style
+from palpate.report.answer import Card, PageAnswer, answer_page
+from palpate.report.figure_panels.panels import panels_of
+from palpate.report.look.assets import data, text_of
+from palpate.report.numbers import plain, quantity, quantity_between
+from palpate.report.page import Table, data_address
+from palpate.report.style import svg
+from palpate_maps.presses import AXES
+from palpate_maps.result import Lump, MapResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import Figure
+
+_GOALS = {
+    "interval": "the interval everywhere",
+    "edge": "the edge, and lumps not yet found",
+    "maximum": "the maximum",
+}
+
+
+def sentence(result: MapResult) -> str:
+    """The answer: lumps if a threshold was asked, else the softest and the stiffest place; then what is next."""
+    seen, inside = result.prediction, result.grid.inside
+    threshold = result.request.stiffer_than
+    if threshold is None:
+        low, high = (float(f(seen.stiffness[inside])) for f in (np.min, np.max))
+        top = int(np.argmax(np.where(inside, seen.stiffness, 0.0)))
+        return (
+            f"The stiffness is from {_stiffness(low)} to {_stiffness(high)}, "
+            f"stiffest at {place(result.grid.places[top])}."
+        )
+    sure = [lump for lump in result.lumps if lump.is_sure]
+    than, unsure = quantity(threshold, "N/m"), len(result.lumps) - len(sure)
+    if not sure:
+        maybe = f"; {unsure} {'place' if unsure == 1 else 'places'} may be" if unsure else ""
+        return f"Nothing is surely stiffer than {than}{maybe}."
+    listed = ", ".join(f"{_stiffness(lump.stiffness)} at {place(lump.place)}" for lump in sure[:3])
+    count = "One lump is" if len(sure) == 1 else f"{len(sure)} lumps are"
+    return f"{count} stiffer than {than}: {listed}{', ...' if len(sure) > 3 else ''}."
+
+
+def _stiffness(value: float) -> str:
+    """Three digits: no map is better known."""
+    return quantity(float(f"{value:.3g}"), "N/m")
+
+
+def place(where: Any) -> str:
+    """A place in millimetres."""
+    return f"({', '.join(plain(1e3 * c, 3) for c in where)}) mm"
+
+
+def warnings(result: MapResult) -> list[str]:
+    """Faults of the presses."""
+    lines = []
+    if result.presses.refused:
+        name, why = next(iter(result.presses.refused.items()))
+        lines.append(f"{len(result.presses.refused)} logs give no press; {name}: {why}")
+    if result.disagreeing:
+        named = ", ".join(result.presses.names[i] for i in result.disagreeing[:5])
+        lines.append(f"their neighbours contradict {named}: press there again")
+    lines += [f"no map of {name}: {why}" for name, why in result.unmapped.items()]
+    return lines
+
+
+def further(result: MapResult) -> tuple[str, str] | None:
+    """How many more presses bring the interval under what was asked: their number, and a sentence."""
+    half = result.request.half
+    if half is None:
+        return None
+    more = result.map.presses_until(half)
+    asked = f"± {plain(100 * half, 2)} % on 95 % of the surface"
+    if more is None:
+        return (
+            "none",
+            f"no number of presses brings {asked}: their common error is larger, or it needs more than 1000",
+        )
+    return str(more), f"more presses bring {asked}"
+
+
+def tables(result: MapResult) -> list[Table]:
+    """Lumps, and the next presses."""
+    parts = []
+    if result.lumps:
+        rows = [
+            (
+                place(lump.place),
+                quantity_between(lump.ci95[0], lump.ci95[1], "N/m"),
+                _area(lump),
+                "yes" if lump.is_sure else "perhaps",
+            )
+            for lump in result.lumps
+        ]
+        parts.append(Table("", ("lump", "stiffness, 95 %", "area, 95 %", "surely stiffer"), rows))
+    if result.request.next:
+        parts.append(Table("", ("next press", "now, 95 %", "then, 95 %"), next_rows(result)))
+    return parts
+
+
+def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
+    """Each next press: its place, the interval now and what it becomes."""
+    now = result.map.predict(result.next.places)
+    return [
+        (
+            place(where),
+            quantity_between(float(ends[0]), float(ends[1]), "N/m"),
+            f"± {quantity(float(half), 'N/m')}",
+        )
+        for where, ends, half in zip(result.next.places, now.ci95, result.next.expected_half, strict=True)
+    ][: result.request.next]
+
+
+def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
+    """The page as HTML; a live one loads itself again."""
+    field, interval = draw_map(result), draw_interval(result)
+    answer = PageAnswer(
+        title=title,
+        sentence=sentence(result),
+        about=f"{len(result.map)} presses. Interpolated by a Gaussian process on the logarithm of the stiffness; "
+        "outside the presses nothing is said.",
+        alerts=[
+            {"tone": "warn", "title": "", "text": f"{note[0].upper()}{note[1:]}."}
+            for note in warnings(result)
+        ],
+        cards={"": _cards(result)},
+        pairs=[
+            {"source": data_address(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
+            {
+                "source": data_address(svg(interval), "image/svg+xml"),
+                "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
+                f"{_GOALS[result.request.goal]}.",
+            },
+            *(
+                {
+                    "source": data_address(svg(draw_field(result, name)), "image/svg+xml"),
+                    "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
+                    f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
+                    f"{_display_unit(result, name)[1]}.",
+                }
+                for name, field in result.fields.items()
+            ),
+        ],
+        figures=[
+            {
+                "panels": panels_of(draw_cut(result)),
+                "caption": "The dashed line of the map, from left to right.",
+            }
+        ],
+        folds=[
+            ("Next presses", "place, now, then", [("place", "now, 95 %", "then, 95 %"), *next_rows(result)]),
+            ("All presses", f"{len(result.map)}: place, stiffness, interval", _press_rows(result)),
+        ],
+    )
+    return answer_page(
+        answer,
+        room="map",
+        command=command,
+        package="palpate_maps",
+        codes=(text_of("map.js", "palpate_maps"),),
+        readout=data(_readout(result, field)),
+        live=live,
+    )
+
+
+def _cards(result: MapResult) -> list[Card]:
+    cards = [
+        Card(
+            f"Lump {k + 1}", _short(lump.stiffness, 3), "N/m", _short(0.5 * (lump.ci95[1] - lump.ci95[0])),
+            f"at {place(lump.place)}; {_area(lump)}", "ok" if lump.is_sure else "warn",
+            "stiffer" if lump.is_sure else "perhaps", "K",
+        )
+        for k, lump in enumerate(result.lumps[:3])
+    ]  # fmt: skip
+    halves = result.prediction.relative_half[result.grid.inside]
+    return [
+        *cards,
+        *([Card("To press yet", more[0], why=more[1])] if (more := further(result)) else []),
+        Card("Half-width", _short(100.0 * np.median(halves)), "%", why="of the interval, at the median place"),
+        Card(
+            "Press to press", _short(100.0 * result.repeat), "%",
+            why="at one place, 95 %, beyond their own intervals",
+        ),
+        Card("Presses", str(len(result.map)), why=f"{len(result.presses.refused)} refused"),
+    ]  # fmt: skip
+
+
+def _short(value: Any, digits: int = 2) -> str:
+    """A number rounded to some digits."""
+    return plain(float(f"{value:.{digits}g}"))
+
+
+def _area(lump: Lump) -> str:
+    low, high = (1e4 * area for area in lump.area95)
+    return f"{1e4 * lump.area:.2g} cm² ({low:.2g} to {high:.2g})"
+
+
+def _map_caption(result: MapResult) -> str:
+    threshold = result.request.stiffer_than
+    lines = "" if threshold is None else (
+        f" Line: {quantity(threshold, 'N/m')}; dashed: its 95 % band, place by place."
+    )  # fmt: skip
+    return f"Stiffness [N/m]. Rings: presses.{lines}"
+
+
+def _press_rows(result: MapResult) -> list[tuple[str, str, str]]:
+    told = zip(result.presses.names, result.map.places, result.map.stiffness, result.map.half, strict=True)
+    return [(name, place(where), f"{quantity(k, 'N/m')} ± {plain(half, 2)}") for name, where, k, half in told]
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
+    """Factor and symbol of the unit in which a field is shown."""
+    unit = result.presses.units[name]
+    return {"m": (1e3, "mm"), "1": (100.0, "%")}.get(unit, (1.0, unit))
+
+
+def draw_map(result: MapResult) -> Figure:
+    """The stiffness over the surface, the presses, the contour of the threshold and its band."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+    seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
+    with style.ink(9.0):
+        figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
+        low, high = bar.ax.get_xlim()
+        steps = MaxNLocator(5, steps=(1, 2, 5, 10)) if high < 8.0 * low else LogLocator(subs=(1.0, 2.0, 5.0))
+        bar.ax.xaxis.set_major_locator(steps)
+        bar.ax.xaxis.set_minor_formatter(NullFormatter())
+        if threshold is not None:
+            probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
+            axis.contour(1e3 * grid.across, 1e3 * grid.along, probability, [0.025, 0.5, 0.975], colors="white",
+                         linewidths=[0.9, 1.8, 0.9], linestyles=["--", "-", "--"])  # fmt: skip
+        at = 1e3 * result.map.surface.coordinates(result.map.places)
+        axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
+        begin, end = (1e3 * point for point in _cut_ends(result))
+        axis.plot(*zip(begin, end, strict=True), color="white", linewidth=0.9, linestyle=(0, (5, 4)))
+    return figure
+
+
+def draw_interval(result: MapResult) -> Figure:
+    """The half-width of the interval over the surface, and the next presses by their numbers."""
+    half = 100.0 * result.prediction.relative_half
+    with style.ink(9.0):
+        figure, axis, _ = _picture(result, half, "half-width, 95 % [%]", "Greys_r")
+        coordinates = 1e3 * result.map.surface.coordinates(result.next.places[: result.request.next])
+        for k, (x, y) in enumerate(coordinates):
+            box = {"boxstyle": "circle,pad=0.25", "fc": style.CARD, "ec": style.INK, "lw": 0.9}
+            axis.text(x, y, str(k + 1), ha="center", va="center", fontsize=8, bbox=box, color=style.INK)
+    return figure
+
+
+def draw_field(result: MapResult, name: str) -> Figure:
+    """A further field over the surface, and the presses that show it."""
+    (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
+    with style.ink(9.0):
+        label = f"{_title(name).lower()} [{symbol}]"
+        figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
+        at = 1e3 * result.map.surface.coordinates(result.map.places[known])
+        axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
+    return figure
+
+
+def _picture(
+    result: MapResult, values: Array, label: str, colours: str, **norm: Any
+) -> tuple[Figure, Axes, Colorbar]:
+    """A quantity at the grid over the surface, with its bar of colours."""
+    grid = result.grid
+    figure, (axis,) = style.grid((5.0, 4.4))
+    shown = np.where(grid.inside, values, np.nan).reshape(grid.shape)
+    look = {"origin": "lower", "cmap": colours, "interpolation": "bilinear", **norm}
+    image = axis.imshow(shown, extent=tuple(1e3 * grid.ends), **look)
+    bar = figure.colorbar(image, ax=axis, location="top", shrink=0.7, label=label, format="{x:g}")
+    axis.grid(visible=False)
+    axis.set_aspect("equal")
+    across, along = (f"{name} [mm]" for name in result.map.surface.names)
+    axis.set(xlabel=across, ylabel=along)
+    return figure, axis, bar
+
+
+def _cut_ends(result: MapResult) -> tuple[Any, Any]:
+    """A line through the two stiffest lumps or, where there are none, through the stiffest place and the middle."""
+    surface, grid = result.map.surface, result.grid
+    coordinates = surface.coordinates(grid.places)
+    tops = [surface.coordinates(np.array([lump.place]))[0] for lump in result.lumps[:2]]
+    if not tops:
+        tops = [coordinates[int(np.argmax(np.where(grid.inside, result.prediction.mean, -np.inf)))]]
+    middle = coordinates[grid.inside].mean(axis=0)
+    second = tops[1] if len(tops) > 1 else middle
+    way = second - tops[0]
+    size = float(np.linalg.norm(way))
+    way = way / size if size > 1e-9 else np.array([1.0, 0.0])
+    along = (coordinates[grid.inside] - tops[0]) @ way
+    near = np.abs((coordinates[grid.inside] - tops[0]) @ np.array([-way[1], way[0]])) < np.sqrt(grid.cell)
+    ends = (tops[0] + way * along[near].min(), tops[0] + way * along[near].max())
+    return ends if way[0] >= 0.0 else ends[::-1]
+
+
+def draw_cut(result: MapResult) -> Figure:
+    """Stiffness, its interval and that of a next press along a line, and the presses beside it."""
+    surface = result.map.surface
+    begin, end = _cut_ends(result)
+    length = float(np.linalg.norm(end - begin))
+    steps = np.linspace(0.0, 1.0, 200)
+    seen = result.map.predict(surface.places(begin + np.outer(steps, end - begin)))
+    way = (end - begin) / max(length, 1e-12)
+    offsets = surface.coordinates(result.map.places) - begin
+    along, beside = offsets @ way, np.abs(offsets @ np.array([-way[1], way[0]]))
+    near = (beside < 0.05 * length) & (along >= 0.0) & (along <= length)
+    with style.ink():
+        figure, (axis,) = style.figure(height=2.6)
+        x = 1e3 * length * steps
+        axis.plot(x, seen.stiffness, color=style.K, linewidth=1.6, label="stiffness")
+        for both, line, label in ((seen.ci95, "--", "95 %"), (seen.next95, ":", "next press, 95 %")):
+            for ends, name in zip(both.T, (label, None), strict=True):
+                axis.plot(x, ends, color=style.K, linewidth=0.9, linestyle=line, label=name)
+        if near.any():
+            label, order = f"presses within {plain(50 * length, 2)} mm", np.argsort(along[near])
+            at, values = 1e3 * along[near][order], result.map.stiffness[near][order]
+            axis.plot(at, values, "o", color=style.INK, markersize=4, label=label)
+        if result.request.stiffer_than is not None:
+            axis.axhline(result.request.stiffer_than, **style.KNOWN, label="threshold")
+        axis.set(
+            xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]), yscale="log"
+        )
+        low = axis.get_ylim()[0]
+        power = 10.0 ** np.floor(np.log10(low))
+        axis.set_ylim(bottom=power * np.floor(low / power))  # on a page steps are counted from here
+        style.logarithmic(axis, "y")
+        style.legend(axis)
+    return figure
+
+
+def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:
+    """Numbers of the map under the pointer, and where its axis lies in the picture."""
+    figure.draw_without_rendering()  # the layout is settled when it is drawn
+    axis = figure.axes[0]
+    box = axis.get_position()
+    grid, seen = result.grid, result.prediction
+    columns = (*grid.places.T, seen.stiffness, *seen.ci95.T, *seen.next95.T)
+    values = [
+        [float(f"{column[i]:.5g}") for column in columns] if inside else None
+        for i, inside in enumerate(grid.inside)
+    ]
+    return {
+        "box": [box.x0, 1.0 - box.y1, box.x1, 1.0 - box.y0],
+        "x": list(axis.get_xlim()), "y": list(axis.get_ylim()),
+        "columns": [float(1e3 * x) for x in grid.across], "rows": [float(1e3 * y) for y in grid.along],
+        "values": values, "axes": AXES[: grid.places.shape[1]],
+        "names": ["stiffness", "low", "high", "next_low", "next_high"], "film": _film(result),
+    }  # fmt: skip
+
+
+def _film(result: MapResult) -> dict[str, Any]:
+    """The map as it grew, in levels of a ramp of colours."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    grid, levels = result.coarse, 64
+    means, stds = (np.array([getattr(frame, name) for _, frame in result.film]) for name in ("mean", "std"))
+    scaled = [
+        (levels - 1) * (each - low) / max(float(each[:, grid.inside].max()) - low, 1e-12)
+        for each in (means, stds) for low in (float(each[:, grid.inside].min()),)
+    ]  # fmt: skip
+    shown = [
+        [[int(v) if i else None for v, i in zip(frame, grid.inside, strict=True)] for frame in each]
+        for each in scaled
+    ]
+    at = result.map.surface.coordinates(result.map.places)
+    low, high = grid.ends[::2], grid.ends[1::2]
+    return {
+        "shape": grid.shape,
+        "frames": [
+            {"count": count, "stiffness": k, "half": half}
+            for (count, _), k, half in zip(result.film, *shown, strict=True)
+        ],
+        "ramps": [
+            [to_hex(colormaps[name](i / (levels - 1))) for i in range(levels)]
+            for name in ("Blues_r", "Greys_r")
+        ],
+        "presses": np.round((at - low) / (high - low), 3).tolist(),
+    }

@@ -1,1 +1,0 @@
-"""The commands that palpate lists when this distribution is installed."""

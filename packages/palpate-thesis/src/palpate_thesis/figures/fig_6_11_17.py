@@ -1,0 +1,141 @@
+"""Figures 6.11 to 6.13, 6.16, 6.17: the neural controller follows steps, with a sine on top too, on foam and rubber."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, changed
+from palpate.records import Record
+from palpate.report import style
+from palpate_studies.metrics.following import LIMIT
+from palpate_thesis.claims import Numbered, ThesisClaim, claim, often
+from palpate_thesis.conditions import stops_holding
+from palpate_thesis.force_control import tracking
+from palpate_thesis.force_control.panels import following_panel, force_panel, panels
+from palpate_thesis.force_control.tracking import FOLLOWS, Tracked, Tracking, describe, since_contact, track
+from palpate_thesis.look import Figure
+from palpate_thesis.runs import Runs
+
+JUDGED = (10.0, 15.0)
+SLOW_RATE = {"controller.learning_rate": 1e-5}
+CYCLE = 5.0
+"""The desired force repeats itself [s]."""
+SMOOTHED = 0.25
+"""Over which deviations are averaged [s]."""
+Window = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps(Numbered):
+    """The figure of one surface and one desired force."""
+
+    id: str  # of its claim
+    PARAMETERS: Experiment
+    shown: Window = (9.5, 13.5)  # from when to when after contact [s]
+    judged: Window = JUDGED
+    follows: bool = True  # what the thesis says of it
+
+    def run(self, runs: Runs) -> Tracked:
+        """All seeds, drawn and judged, and the variations."""
+        return track(runs, self.PARAMETERS, self.shown, self.judged)
+
+    def check(self, data: Tracked) -> Sequence[ThesisClaim]:
+        """By the same limits for every desired force, the force follows, or does not."""
+        return [
+            claim(
+                self.id,
+                often(map(self._as_said, data.nominal)),
+                described=describe(data.nominal),
+                limited=100 * float(np.median([one.saturated for one in data.nominal])),
+                follows=FOLLOWS,
+                following=tracking.FOLLOWING,
+                where=stops_holding(data.varied, self._as_said),
+            )
+        ]
+
+    def plot(self, data: Tracked) -> Figure:
+        """The slot, and the runs."""
+        drawing, ((force,), (dots,)) = panels([3.2, 2.0])
+        force_panel(force, data.shown)
+        following_panel(dots, data.varied)
+        return drawing
+
+    def _as_said(self, one: Tracking) -> bool:
+        return one.follows is self.follows
+
+
+@dataclass(frozen=True)
+class Adapting:
+    """Data of figure 6.17."""
+
+    tracked: Tracked
+    t: Array
+    away: Array  # of the first seed: from the settled cycle, smoothed [N]
+    adapted: list[float]  # when the force has come to stay near it, one a seed [s]
+
+
+class FromTheStart(Steps):
+    """Steps judged from the first touch on, and how long adapting takes: the last two of four cycles are settled."""
+
+    def run(self, runs: Runs) -> Adapting:  # type: ignore[override]
+        """Four cycles; the last two are the reference of the first."""
+        away = runs.over_seeds(self.PARAMETERS, away_from_settled)
+        t = np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64)
+        return Adapting(super().run(runs), t, away[0], [adapted_at(one) for one in away])
+
+    def check(self, data: Adapting) -> Sequence[ThesisClaim]:  # type: ignore[override]
+        """The force has to follow from the start; and adapting has to take from 2.5 to 7.5 s."""
+        adapts = 2.5 <= float(np.median(data.adapted)) <= 7.5
+        return [
+            *super().check(data.tracked),
+            claim(f"{self.id}.adapts", adapts, adapted=data.adapted, smoothed=SMOOTHED, limit=LIMIT),
+        ]
+
+    def plot(self, data: Adapting) -> Figure:  # type: ignore[override]
+        """The beginning, the runs, and the way to the settled cycle."""
+        drawing, ((force,), (dots,), (away,)) = panels([3.2, 2.0, 1.5])
+        force_panel(force, data.tracked.shown)
+        following_panel(dots, data.tracked.varied)
+        shown = data.t < self.shown[1]
+        away.plot(data.t[shown], data.away[shown])
+        away.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
+        away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=self.shown, ylim=(0.0, None))
+        away.set_title("from the settled cycles, mean over 0.25 s; dashed: limit of adapted")
+        return drawing
+
+
+def away_from_settled(record: Record) -> Array:
+    """Smoothed distance of the force from the mean of the last two cycles, from contact on [N]."""
+    force = record["force"][since_contact(record) >= 0.0]
+    ticks = round(CYCLE * 1000)
+    cycles = force[: len(force) // ticks * ticks].reshape(-1, ticks)
+    away = (cycles - cycles[-2:].mean(axis=0)).ravel()
+    smoothed: Array = np.abs(np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid"))
+    return smoothed
+
+
+def adapted_at(away: Array) -> float:
+    """When the distance has come below the limit for good [s]."""
+    beyond = np.nonzero(away > LIMIT)[0]
+    return SMOOTHED + (float(beyond[-1]) * 1e-3 if len(beyond) else 0.0)
+
+
+def _pressing(experiment: Experiment, seconds: float, **changes: object) -> Experiment:
+    return changed(experiment, {**changes, "run.press": seconds})
+
+
+FIRST = (0.0, 10.0)
+FOAM = Steps("6.11", "neural-foam-steps", _pressing(tracking.FOAM, 15.0))
+SINE = Steps("6.12", "neural-foam-sine", _pressing(tracking.FOAM, 15.0, **tracking.SINE), (9.75, 15.0))
+SLOW = Steps(
+    "6.13", "neural-slow-rate.first", _pressing(tracking.FOAM, 10.0, **SLOW_RATE), FIRST, FIRST, follows=False
+)
+RUBBER = Steps("6.16", "neural-rubber-steps", _pressing(tracking.RUBBER, 15.0))
+RUBBER_SINE = FromTheStart(
+    "6.17", "neural-rubber-sine", _pressing(tracking.RUBBER, 20.0, **tracking.SINE), FIRST, FIRST
+)
+STUDIES = (FOAM, SINE, SLOW, RUBBER, RUBBER_SINE)

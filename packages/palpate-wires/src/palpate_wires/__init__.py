@@ -1,0 +1,27 @@
+"""Wires to real arms: readings in, commands out, each by the arm's own library."""
+
+from palpate.wires import Command, LostError, Sense, Wire
+from palpate_wires.at_rest import AtRest, look
+from palpate_wires.opening import KINDS, open_wire
+from palpate_wires.order import Order, PressLimits, PressTask, checked
+from palpate_wires.outcome import Outcome, Rows, recover
+from palpate_wires.press import press
+
+__all__ = [
+    "KINDS",
+    "AtRest",
+    "Command",
+    "LostError",
+    "Order",
+    "Outcome",
+    "PressLimits",
+    "PressTask",
+    "Rows",
+    "Sense",
+    "Wire",
+    "checked",
+    "look",
+    "open_wire",
+    "press",
+    "recover",
+]

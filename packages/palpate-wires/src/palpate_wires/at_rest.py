@@ -1,0 +1,195 @@
+"""An arm at rest before a press: rate, bias and noise, and the faults with which no press should begin."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.contact_frame import Payload
+from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
+from palpate.errors import InputError
+from palpate.force import ForceLoop
+from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
+from palpate.wires import Sense, Wire, unreadable
+from palpate_wires.order import Order, checked
+from palpate_wires.orientation import turn_vector
+
+_FEWEST = 20
+"""Readings, at least: they tell the noise's deviation to 1/sqrt(2 n), 16 %, and `_check` wants eight of them."""
+_TRIES = 4
+"""Half seconds more in which a busy computer may get readings that follow on each other: starved, it misses most."""
+_PATIENCE = 10.0
+"""For which that many readings may take: nothing moves yet, and a busy computer may be starved for a while [s]."""
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """Readings of the arm at rest, before contact.
+
+    Args:
+        position: [m], shape (3,).
+        bias: of the force [N], shape (3,).
+        noise: of the force along the direction, about its drift [N].
+        drift: of the force along the direction [N/s].
+        drift_std: its standard deviation [N/s].
+        rate: readings a second [Hz].
+        last: the last reading.
+        offset: of this computer's clock from the arm's, the least that was seen [s].
+    """
+
+    position: Array
+    bias: Array
+    noise: float
+    drift: float
+    drift_std: float
+    rate: float
+    last: Sense
+    offset: float
+
+
+def look(wire: Wire, order: Order) -> AtRest:
+    """Read an arm at rest in free motion, and refuse what no press should begin with.
+
+    Raises:
+        InputError: another rate than the gains', another clock, an arm that moves, a sensor that is saturated, untared,
+            too noisy or that drifts.
+        LostError: no readings.
+    """
+    gains = order.loop.gains
+    sensed = _readings(wire)
+    rate = rate_of(np.array([s.stamp for s in sensed]))
+    for _ in range(_TRIES):
+        if rate * gains.arm.tick > 1.0 - gains.arm.tick / gains.theta:
+            break
+        sensed = _readings(wire)
+        rate = max(rate, rate_of(np.array([s.stamp for s in sensed])))
+    # Over the lag theta a rate that is off by this moves a reading by one tick, which is what is proved.
+    if abs(rate * gains.arm.tick - 1.0) > gains.arm.tick / gains.theta:
+        raise InputError(
+            f"the arm gives {rate:.4g} readings a second, and the gains are for {gains.arm.rate:g}: tune for this rate"
+        )
+    broken = next(filter(None, map(unreadable, sensed)), None)
+    if broken is not None:
+        raise InputError(f"{broken}; is its sensor switched on?")
+    offsets = np.array([s.received - s.stamp for s in sensed])
+    _check_clock(offsets, gains.theta)
+    force, place = np.array([s.force for s in sensed]), np.array([s.position for s in sensed])
+    along = force @ np.array(order.task.direction)
+    noise, drift, drift_std = noise_and_drift(np.array([s.stamp for s in sensed]), along)
+    found = AtRest(
+        place[-1], force.mean(axis=0), noise, drift, drift_std, rate, sensed[-1], float(offsets.min())
+    )
+    _check(found, float(np.ptp(place, axis=0).max()), order)
+    return found
+
+
+def with_noise_of(rest: AtRest, order: Order) -> tuple[Order, str | None]:
+    """The order for the noise that was measured, and a sentence if that is another one than the gains'.
+
+    Raises:
+        InputError: the noise is above that of the gains, and a certificate or the force does not allow another.
+    """
+    gains = fitting(order.loop.gains, rest.noise, _count(rest))
+    if gains is None:
+        return order, None
+    expected = order.loop.gains.arm.sensor.noise
+    said = f"the force's noise is {rest.noise:.2g} N at rest, and the gains are for {expected:g} N"
+    if order.loop.certificate is not None:
+        raise InputError(f"{said}: the certificate is of other gains; tune for this noise, and certify again")
+    retuned = checked(ForceLoop(gains), order.task, order.limits)
+    return retuned, f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
+
+
+def _count(rest: AtRest) -> int:
+    return max(round(TARE * rest.rate), _FEWEST)
+
+
+def _check_clock(offsets: Array, theta: float) -> None:
+    """Refuse two clocks that run apart while the arm rests; readings that are late make no offset smaller [s]."""
+    half = len(offsets) // 2
+    apart = float(offsets[half:].min() - offsets[:half].min())
+    if abs(apart) > theta / 2.0:
+        way = "slow" if apart > 0.0 else "fast"
+        raise InputError(
+            f"the arm's clock runs too {way}: it and this computer's came {1e3 * abs(apart):.3g} ms apart within"
+            f" {TARE / 2.0:g} s; is it a simulation that is not in real time?"
+        )
+
+
+def rate_of(stamps: Array) -> float:
+    """Readings a second that the arm takes [Hz], by its own clock [s], shape (n,), though some never came.
+
+    A step between two stamps is a tick or several. One of the shortest is taken for a tick, by which the others are
+    counted.
+    """
+    steps = np.diff(stamps)
+    tick = max(float(np.quantile(steps, 0.1)), 1e-9)
+    return float(np.maximum(np.round(steps / tick), 1.0).sum() / max(float(steps.sum()), 1e-9))
+
+
+def _readings(wire: Wire) -> list[Sense]:
+    """Those of half a second, and enough of them."""
+    sensed = [wire.read(1.0)]
+    while (span := sensed[-1].received - sensed[0].received) < TARE or len(sensed) < _FEWEST:
+        if span > _PATIENCE:
+            raise InputError(f"only {len(sensed)} readings came in {span:.3g} s; is the arm switched on?")
+        sensed.append(wire.read(1.0))
+    return sensed
+
+
+def _check(found: AtRest, moved: float, order: Order) -> None:
+    task, limits, gains = order.task, order.limits, order.loop.gains
+    check_range(float(np.abs(found.bias).max()), limits.force, gains.arm.sensor.full_scale)
+    if moved > max(gains.approach * TARE, 1e-5):
+        raise InputError(f"the arm moved by {1e3 * moved:.3g} mm in {TARE:g} s; let it rest first")
+    lowest = task.force * (1.0 - task.probe)
+    if SURE * found.noise > lowest:
+        raise InputError(
+            f"the force's noise is {found.noise:.2g} N in free motion: {lowest:g} N is below 8 deviations of it"
+        )
+    check_drift(found.drift, found.drift_std, task.force, limits.seconds, gains.arm.sensor)
+
+
+_SURE = 3.0
+"""Standard deviations of what was weighed, beyond which a difference is none of it."""
+
+
+def notes_on(tool: Payload, rest: AtRest) -> list[str]:
+    """Notes for the user before the arm moves.
+
+    Args:
+        tool: from `palpate payload`.
+        rest: what the arm shows at rest.
+    """
+    shown = unlike(tool, rest) or "the sensor shows the tool as it was weighed"
+    if tool.inertia_followed is None or not wrong_sign(tool.inertia_followed):
+        return [shown]
+    return [shown, f"when it was weighed: {wrong_sign_of(tool.inertia_followed)}"]
+
+
+def unlike(tool: Payload, rest: AtRest) -> str | None:
+    """How the sensor's reading at rest differs from what the tool's weighing makes expect; None if it does not.
+
+    The force of a wire is what the tool exerts, that of a payload is as its log had it: either sign is tried.
+
+    Args:
+        tool: from `palpate payload`.
+        rest: what the arm shows at rest.
+    """
+    expected = np.array(tool.weight) + np.array(turn_vector(rest.last.quaternion, tool.bias))
+    sure = _SURE * math.hypot(tool.weight_std, tool.bias_std, tool.noise)
+    apart = min(float(np.abs(rest.bias - sign * expected).max()) for sign in (1.0, -1.0))
+    if apart <= sure:
+        return None
+    return (
+        f"the sensor shows {_show(rest.bias)} N in free motion, and the tool as weighed makes {_show(expected)} N,"
+        f" {apart:.2g} N apart in one axis: the sensor was zeroed since or drifts, the tool is another, or wrench and"
+        " pose are of other frames. The tare takes it off as long as the tool does not turn"
+    )
+
+
+def _show(force: np.ndarray) -> str:
+    return ", ".join(f"{value:.3g}" for value in force)

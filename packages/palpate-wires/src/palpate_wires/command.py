@@ -1,0 +1,272 @@
+"""`palpate press --wire` and `palpate slide --wire`: a real arm moves."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+from palpate.cli import _streams
+from palpate.cli.options.common import PluginOptions
+from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions
+from palpate.cli.options.values import in_si, vector
+from palpate.cli.toolkit import command, print_answer, print_lines, say
+from palpate.errors import InputError
+from palpate.force import ForceLoop
+from palpate.press.engines import mass_note
+from palpate.wires import Wire
+from palpate_wires.at_rest import AtRest, look, notes_on, with_noise_of
+from palpate_wires.opening import name_of, open_wire
+from palpate_wires.order import Order, PressLimits, PressTask, checked, stiffest, travel_for
+from palpate_wires.order import Path as SlidePath
+from palpate_wires.outcome import Outcome, Rows, recover
+from palpate_wires.press import press
+from palpate_wires.realtime import realtime_priority
+
+if TYPE_CHECKING:
+    from palpate.contact_frame import Payload
+    from palpate.force.gains import Gains
+
+RETREAT = 0.002
+"""Distance of the retreat if none is given [m]."""
+
+
+def press_over(
+    asked: AskOptions,
+    options: WireOptions,
+    limits: LimitOptions,
+    *,
+    json: bool,
+    path: SlidePath | None = None,
+) -> int:
+    """Press with a real arm, or slide with it along a path, or only read it, or recover a record.
+
+    Returns:
+        0 if it pressed for the requested time, 1 if not, 128 and the number of a signal that ended it.
+
+    Raises:
+        InputError: a fault found before the arm moves.
+    """
+    if options.recover is not None:
+        print_lines(f"written: {recover(options.recover)}")
+        return 0
+    task, most = task_of(asked, options, limits)
+    if json and not (options.yes or options.dry_run):
+        raise InputError("--json cannot ask for confirmation; add --yes or --dry-run")
+    if options.record is not None and options.record.exists():
+        raise InputError(f"{options.record} exists; choose another place for --record")
+    assert asked.gains is not None
+    order = checked(ForceLoop.load(asked.gains, options.certificate), replace(task, path=path), most)
+    tool = asked.tool
+    with PluginOptions().consent(given=name_of(str(options.wire))[0] or ""):
+        arm = open_wire(str(options.wire))
+    try:
+        plan = _plan(arm, order, options.record)
+        if not json:
+            print_lines(*plan)
+        if options.dry_run or tool is not None:
+            air = look(arm, order)
+            _, note = with_noise_of(air, order)
+            notes = [*([] if note is None else [note]), *([] if tool is None else notes_on(tool, air))]
+            if options.dry_run:
+                return _look(air, [*plan, *notes], notes, json)
+            if not json:
+                print_lines(*notes)
+        _ask(options.yes, "press" if path is None else "slide")
+        return _press(arm, order, options, _about(arm, order, tool), json)
+    finally:
+        arm.close()
+
+
+def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple[PressTask, PressLimits]:
+    """The task of a real arm; the direction and every limit have to be given.
+
+    Raises:
+        InputError: one is missing or invalid.
+    """
+    from palpate.force.gains import load_gains
+
+    needed = {
+        "--wire": wire.wire, "--gains": asked.gains, "--force": asked.force, "--normal": asked.normal,
+        "--force-limit": limits.force_limit, "--speed-limit": limits.speed_limit,
+        "--time-limit": limits.time_limit,
+    }  # fmt: skip
+    lacking = [name for name, value in needed.items() if value is None]
+    if lacking:
+        raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
+    normal = vector("normal", asked.normal, "number")
+    assert normal is not None
+    force = in_si("--force-limit", str(limits.force_limit), "force")
+    if limits.travel_limit is None:
+        travel = travel_for(load_gains(Path(str(asked.gains))), force)
+    else:
+        travel = in_si("--travel-limit", limits.travel_limit, "length")
+    most = PressLimits(
+        force,
+        in_si("--speed-limit", str(limits.speed_limit), "velocity"),
+        travel,
+        in_si("--time-limit", str(limits.time_limit), "time"),
+    )
+    retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
+    return PressTask(asked.desired, normal, asked.seconds, retreat, asked.probe or 0.0), most
+
+
+def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
+    """The press, as plain values for the record."""
+    task = order.task
+    return {
+        "command": command(),
+        "title": arm.title,
+        "normal": list(task.direction),
+        "desired_N": task.force,
+        "hold_s": task.hold,
+        "probe": task.probe,
+        # The encoders of a servo show how it gives way, so that nothing is in series with the surface.
+        "position_from": "tip" if order.loop.gains.arm.kind == "servo" else "joints",
+        **({} if tool is None else tool.meta),
+    }
+
+
+def _press(arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], json: bool) -> int:
+    """Press, keep the record and print the outcome, whatever signal comes; returns the exit code."""
+    with _streams.notice_signals() as came:
+        outcome, words, where = _write_record(arm, order, options, about, came)
+        try:
+            code = _print(outcome, words, where, json)
+        except OSError:  # nobody reads any more: a terminal that hung up
+            if not came():
+                raise
+            _streams.drop(sys.stdout)
+    return came.code if came() else code
+
+
+def _write_record(
+    arm: Wire, order: Order, options: WireOptions, about: dict[str, Any], came: _streams.Noticed
+) -> tuple[Outcome, str, Path | None]:
+    """The outcome, the priority that was given, and where the record is; its rows are kept whatever happens."""
+    rows = Rows(options.record, order.most, about)
+    try:
+        with realtime_priority(not options.ordinary_priority) as words:
+            outcome = press(arm, order, rows, lambda: came.reason, _live().put)
+    except BaseException as error:
+        if rows.count or rows.folder is not None:
+            rows.finish({"ended": str(error) or type(error).__name__, "ok": False})
+        raise
+    arm.close()
+    return outcome, words, rows.finish(outcome.to_json() | {"priority": words})
+
+
+def _live() -> SimpleQueue[str]:
+    """A queue of sentences for standard error; a thread of its own prints them, as a terminal may block."""
+    said: SimpleQueue[str] = SimpleQueue()
+
+    def run() -> None:
+        with suppress(OSError, ValueError):
+            while True:
+                say(said.get())
+
+    threading.Thread(target=run, daemon=True).start()
+    return said
+
+
+def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
+    task, limits, gains = order.task, order.limits, order.loop.gains
+    x, y, z = task.direction
+    lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
+    last = 1e3 * (gains.theta + gains.arm.tick)
+    path = task.path
+    along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
+    does = (
+        f"rests 0.5 s in free motion and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
+        f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}{along},"
+        f" goes back {1e3 * task.retreat:g} mm, rests"
+    )
+    stops = (
+        f"stops at {limits.force:g} N, {1e3 * limits.speed:g} mm/s, {1e3 * limits.travel:.3g} mm from here, after"
+        f" {limits.seconds:g} s, on Ctrl-C and every other signal that can be caught, and {last:.3g} ms after the last"
+        " reading at the latest"
+    )
+    kept = f"record: {record}" if record is not None else "no record is kept (--record DIR keeps one)"
+    arms = f"arm: {arm.title}; gains for {gains.arm.title}"
+    massless = mass_note(gains)
+    notes = [] if massless is None else [f"note: {massless}"]
+    if gains.arm.sensor.accuracy is not None:
+        notes.append(
+            f"note: a force is as true as its sensor, ± {gains.arm.sensor.accuracy:g} N by its maker"
+        )
+    return [arms, does, stops, f"if this process dies: {arm.watchdog}", _lies(gains, limits), kept, *notes]
+
+
+def _lies(gains: Gains, limits: PressLimits) -> str:
+    """The force that a sensor that lies leads to."""
+    cap, travel, short = stiffest(gains), limits.travel, travel_for(gains, limits.force)
+    less = ""
+    if travel > short:
+        less = f"; --travel-limit {1e3 * short:.2g}:mm, or none, keeps that below the force limit"
+    return (
+        f"if the sensor lies (frozen, or its gain too small): at most K_cap x travel, {cap:.3g} N/m x"
+        f" {1e3 * travel:.3g} mm = {cap * travel:.3g} N, unless the arm's own safety stops it before{less}"
+    )
+
+
+def _ask(yes: bool, word: str) -> None:
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise InputError(
+            "the arm would move, and there is no terminal to ask for confirmation; use --dry-run first, then add --yes"
+        )
+    say(f"the arm will move; type {word} to go on")
+    if sys.stdin.readline().strip() != word:
+        raise InputError("not confirmed; nothing was moved")
+
+
+def _look(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
+    bias = ", ".join(f"{b + 0.0:.3g}" for b in air.bias.round(4))
+    drift = f"drift {air.drift:.2g} ± {air.drift_std:.2g} N/s"
+    found = f"in free motion: bias {bias} N, noise {air.noise:.2g} N, {drift}, {air.rate:.4g} Hz"
+    if json:
+        print_answer(
+            {
+                "plan": plan,
+                "bias_N": air.bias.tolist(),
+                "noise_N": air.noise,
+                "drift_N_per_s": air.drift,
+                "rate_Hz": air.rate,
+            }
+        )
+    else:
+        print_lines(found, *notes, "dry run: nothing was moved")
+    return 0
+
+
+def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
+    if json:
+        print_answer(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
+        return 0 if outcome.ok else 1
+    lines = [f"ended: {outcome.ended}; the arm rests"]
+    lines += [f"trouble in {ticks} ticks: {trouble}" for trouble, ticks in outcome.troubles.items()]
+    if outcome.force is not None:
+        settled = (
+            f"within 5 % after {outcome.settled:.2g} s" if outcome.settled is not None else "never within 5 %"
+        )
+        lines.append(f"force {outcome.force:.4g} N, {settled}")
+    if outcome.stiffness is not None:
+        value, std = outcome.stiffness
+        lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
+    if outcome.surface is not None:
+        n, mu = outcome.surface["normal"], outcome.surface["friction"]
+        low, high = (float("nan"),) * 2 if mu is None else mu["ci95"]
+        lines.append(
+            f"normal {n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f} within {outcome.surface['cone95_deg']:.2g} deg, friction"
+            f" {low:.2f} to {high:.2f}"
+        )
+    lines += [*outcome.lateness.sentences(), words]
+    if where is not None:
+        lines.append(f"written: {where}; palpate identify {where} reads it")
+    print_lines(*lines)
+    return 0 if outcome.ok else 1

@@ -1,0 +1,234 @@
+"""How a press over a wire went, in numbers.
+
+Rows go into a file that is mapped into memory: what is written there outlives the process. When the press ends they
+become `record.parquet`, which `palpate identify` takes as it takes the record of a run.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.errors import InputError
+from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
+from palpate.force import SlidingLoop
+from palpate.logs import write_record
+from palpate.records import Record
+from palpate_wires.at_rest import AtRest
+from palpate_wires.order import Order
+from palpate_wires.realtime import Lateness
+
+_BAND = 0.05
+"""Of the force, within which a press counts as settled."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a press went.
+
+    Args:
+        ended: why, in words.
+        ok: it pressed for as long as was asked.
+        touched: the surface was met.
+        force: mean over the last third of the hold [N]; None if it was not reached.
+        settled: seconds from the touch until the force was within 5 % for good; None if it was not.
+        stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
+        surface: normal and friction at the end of a slide with their intervals; None of a press.
+        lateness: of the loop.
+        rest: what was seen before.
+        troubles: ticks of each trouble of the law, by its sentence.
+    """
+
+    ended: str
+    ok: bool
+    touched: bool
+    force: float | None
+    settled: float | None
+    stiffness: tuple[float, float] | None
+    surface: Mapping[str, Any] | None
+    lateness: Lateness
+    rest: AtRest
+    troubles: Mapping[str, int]
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain JSON values."""
+        return {
+            "ended": self.ended,
+            "ok": self.ok,
+            "touched": self.touched,
+            "force_N": self.force,
+            "settled_s": self.settled,
+            "stiffness_N_per_m": None if self.stiffness is None else list(self.stiffness),
+            **({} if self.surface is None else {"surface": self.surface}),
+            "lateness": self.lateness.to_json(),
+            "bias_N": self.rest.bias.tolist(),
+            "noise_N": self.rest.noise,
+            "drift_N_per_s": self.rest.drift,
+            "troubles": dict(self.troubles),
+            "rate_Hz": self.rest.rate,
+        }
+
+
+def surface_of(loop: SlidingLoop) -> dict[str, Any]:
+    """Normal and friction of a slide with their 95 % intervals, as plain JSON values."""
+    mu = loop.friction
+    return {
+        "normal": loop.normal.tolist(),
+        "cone95_deg": float(np.degrees(loop.normal_cone95)),
+        "friction": None if mu is None else {"value": float(mu), "ci95": list(mu.ci95)},
+    }
+
+
+def force_reached(times: Array, forces: Array) -> float | None:
+    """Mean over the last third of the time since the touch [N], shapes (n,); None of nothing."""
+    late = forces[times > 2.0 / 3.0 * times[-1]] if len(times) else forces
+    return float(late.mean()) if len(late) else None
+
+
+def settling_time(times: Array, forces: Array, order: Order) -> float | None:
+    """From when on the force stays within 5 % of what is asked [s], shapes (n,); None if it does not.
+
+    Of a mean over the loop's whole lag: noise of single readings is not the force. A force that is lowered now and then
+    is judged up to the first time.
+    """
+    if not len(times):
+        return None
+    if order.task.probe:
+        before = times < times[-1] / 3.0
+        times, forces = times[before], forces[before]
+    gains = order.loop.gains
+    width = max(round(gains.theta / gains.arm.tick), 1)
+    smooth = np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
+    outside = np.flatnonzero(np.abs(smooth / order.task.force - 1.0) > _BAND)
+    if not len(outside):
+        return 0.0
+    return float(times[outside[-1] + 1]) if outside[-1] < len(smooth) - 1 else None
+
+
+UNITS = {
+    "t": "s",
+    "received": "s",
+    "x_measured": "m",
+    "force_sampled": "N",
+    "speed": "m/s",
+    "x_command": "m",
+    "bound": "N/m",
+    "phase": "1",
+    "missed": "1",
+    **{f"force_{axis}": "N" for axis in "xyz"},
+    **{f"torque_{axis}": "N m" for axis in "xyz"},
+    **{f"position_{axis}": "m" for axis in "xyz"},
+    **{f"quaternion_{axis}": "1" for axis in "xyzw"},
+}
+"""Columns of a row. The first are along the direction of the press, the force without its bias in free motion."""
+_ROWS, _HEAD = "rows.f64", "press.json"
+
+
+class Rows:
+    """Room for the rows of a press.
+
+    Args:
+        folder: where they are kept, which must not exist; None keeps them in memory alone.
+        most: rows that there may be.
+        about: what is known beforehand, plain JSON values.
+
+    Raises:
+        InputError: palpate may not write there.
+    """
+
+    def __init__(self, folder: Path | None, most: int, about: dict[str, Any]):
+        self.folder, self.about, self.count = folder, about, 0
+        shape = (most, len(UNITS))
+        if folder is None:
+            self._rows: Any = np.zeros(shape)
+            return
+        if folder.exists() or folder.is_symlink():
+            raise InputError(f"{folder} exists; choose another place for --record")
+        check_place(folder, "--record")
+        with fresh_folder(folder, replace=False) as draft:
+            write_json(draft / _HEAD, with_author({"unfinished": True, **about}))
+            _reserve(draft / _ROWS, 8 * most * len(UNITS))
+        self._rows = np.memmap(folder / _ROWS, dtype=np.float64, mode="r+", shape=shape)
+
+    @property
+    def full(self) -> bool:
+        """Whether there is no room for another."""
+        return self.count >= len(self._rows)
+
+    def add(self, *values: float) -> None:
+        """Keep one row, in the order of `UNITS`; the first column is written last, so that a half row is none."""
+        row = self._rows[self.count]
+        row[1:] = values[1:]
+        row[0] = values[0]
+        self.count += 1
+
+    def record(self) -> Record:
+        """Record of all rows until now."""
+        return _record(np.array(self._rows[: self.count]), self.about)
+
+    def finish(self, outcome: dict[str, Any]) -> Path | None:
+        """Make the record, and say how it ended; returns where it is, None where nothing came."""
+        if self.folder is None:
+            return None
+        self._rows.flush()
+        path = _finish(self.folder, self.record(), {**self.about, **outcome})
+        return path if self.count else None
+
+
+def _reserve(path: Path, size: int) -> None:
+    """Room on the disk for all rows: a disk that is full in mid-press would end the process.
+
+    Raises:
+        OSError: there is no room.
+    """
+    with path.open("xb") as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+        else:
+            file.truncate(size)
+
+
+def recover(folder: Path) -> Path:
+    """Make the record of a press whose process was killed; returns where it is.
+
+    Raises:
+        InputError: nothing of the kind is there.
+    """
+    rows, head = folder / _ROWS, folder / _HEAD
+    if not (rows.is_file() and head.is_file()) or rows.is_symlink():
+        raise InputError(f"{folder} holds no press that was broken off; name the folder of --record")
+    try:
+        about = msgspec.json.decode(head.read_bytes(), type=dict[str, Any])
+    except msgspec.DecodeError as error:
+        raise InputError(f"{head} is spoiled ({error}); it cannot be recovered") from None
+    if about.pop("unfinished", None) is None:  # the record was made, and its rows were not removed yet
+        rows.unlink()
+        return folder / RECORD
+    numbers = np.fromfile(rows, dtype=np.float64)
+    numbers = numbers[: len(numbers) // len(UNITS) * len(UNITS)].reshape(-1, len(UNITS))
+    written = numbers[numbers[:, 1] != 0.0]  # a time of receipt is never 0
+    return _finish(folder, _record(written, about), {**about, "ended": "broken off", "ok": False})
+
+
+def _finish(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
+    if len(record):
+        write_record(record, folder / RECORD)
+    outcome = {name: value for name, value in outcome.items() if name != "written_by"}
+    write_json(folder / _HEAD, with_author(outcome))
+    (folder / _ROWS).unlink()
+    return folder / RECORD
+
+
+def _record(rows: Any, about: dict[str, Any]) -> Record:
+    columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(UNITS)}
+    if len(rows):
+        columns["t"] = columns["t"] - columns["t"][0]
+    meta = {name: value for name, value in about.items() if name != "written_by"}
+    return Record(columns, UNITS, {"wire": meta, "position_from": about.get("position_from", "joints")})

@@ -1,0 +1,213 @@
+"""A slide over a wire: in this process, over the protocols of stand-ins, and stopped by a signal."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from palpate.cli import main
+from palpate.errors import InputError
+from palpate.force import ForceLoop, SlidingLoop, load_arm, load_gains
+from palpate.force.simulated_press import surface
+from palpate.force.slide_table import Slide
+from palpate.logs import read_record
+from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
+from palpate_wires import PressLimits, PressTask, Rows, checked, press
+from palpate_wires.order import Path as SlidePath
+from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, servo_cell, wait_for_rows
+from wires.test_press import FakeWire
+
+PATH = SlidePath("back", 0.01, 6.0)
+ALONG = ("--path", "back", "--length", "10:mm", "--seconds", "4")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("slide")
+    gains = load_gains(cell(made))
+    slide = Slide(speed=0.004, mu_max=0.9, slope=0.05)
+    (made / "plain.toml").write_text(gains.to_toml())
+    (made / "gains.toml").write_text(msgspec.structs.replace(gains, slide=slide).to_toml())
+    return made
+
+
+@pytest.fixture(scope="module")
+def servo(tmp_path_factory):
+    made = tmp_path_factory.mktemp("servo-slide")
+    slide = Slide(speed=0.004, mu_max=0.9, slope=0.05)
+    gains = msgspec.structs.replace(load_gains(servo_cell(made)), slide=slide)
+    (made / "gains.toml").write_text(gains.to_toml())
+    return made
+
+
+def order_of(folder, path=PATH, **limits):
+    numbers = {"force": 25.0, "speed": 0.05, "travel": 0.03, "seconds": 30.0, **limits}
+    task = PressTask(10.0, (0.0, 0.0, -1.0), 6.0, 0.001, path=path)
+    return checked(ForceLoop.load(folder / "gains.toml"), task, PressLimits(**numbers))
+
+
+def sliding(folder, lie=lambda sense, first: sense, since=4.0):
+    tip = ToolAxisArm(load_arm(str(folder / "arm.toml")), surface(4000.0, 20.0), 0.002, (1.0, -0.5, 2.0), 0)
+    wire, order = FakeWire(tip, lie, since), order_of(folder)
+    rows = Rows(None, order.most, {})
+    outcome = press(wire, order, rows, lambda: None)
+    assert wire.did[-1] == "stop"
+    return outcome, wire, rows.record()
+
+
+def test_a_servo_that_yields_slides_within_the_same_limits(servo):
+    outcome, wire, record = sliding(servo, since=math.inf)
+    assert outcome.ok, outcome.ended
+    assert outcome.force == pytest.approx(10.0, rel=0.05)
+    low, high = outcome.surface["friction"]["ci95"]
+    assert low < FRICTION < high
+    assert max(np.linalg.norm(c.velocity) for c in wire.sent) <= 0.05 * (1.0 + 1e-9)
+    slid = record["phase"] == 3.0
+    assert np.ptp(record["position_x"][slid]) + np.ptp(record["position_y"][slid]) > 0.009
+    assert np.abs(record["force_sampled"][slid] / 10.0 - 1.0).max() < 0.1
+
+
+def test_a_slide_holds_the_force_and_finds_normal_and_friction(folder):
+    outcome, wire, record = sliding(folder, since=math.inf)
+    assert outcome.ok, outcome.ended
+    assert outcome.ended == "slid for 6 s"
+    assert outcome.force == pytest.approx(10.0, rel=0.03)
+    assert outcome.surface is not None
+    low, high = outcome.surface["friction"]["ci95"]
+    assert low < FRICTION < high < 0.6
+    off = np.arccos(-outcome.surface["normal"][2])
+    assert np.degrees(off) < outcome.surface["cone95_deg"] < 6.0
+    # The path's first direction is the base's x; a line and back ends within its length.
+    x, y = (record[f"position_{axis}"] - 0.4 * (axis == "x") for axis in "xy")
+    assert 0.008 < x.max() < 0.011
+    assert np.abs(y).max() < 1e-3
+    assert record["phase"].max() == 3.0
+    assert max(math.hypot(*c.velocity) for c in wire.sent) <= 0.05
+
+
+@pytest.mark.parametrize(
+    ("lie", "says"),
+    [
+        (lambda s, first: s._replace(force=(math.nan, *s.force[1:])), "no number"),
+        (lambda s, first: s._replace(force=first.force), "has not changed"),
+        (lambda s, first: s._replace(force=(60.0, *s.force[1:])), "above the limit of 25 N"),
+        (lambda s, first: s._replace(position=(0.5, *s.position[1:])), "left the line"),
+        (lambda s, first: s._replace(stamp=first.stamp - 1.0), "went back"),
+    ],
+)
+def test_what_ends_a_press_ends_a_slide(folder, lie, says):
+    outcome, wire, record = sliding(folder, lie)
+    assert not outcome.ok
+    assert says in outcome.ended
+    assert len(record) == len(wire.sent)
+
+
+@pytest.mark.parametrize("velocity", [[math.nan, 0.0, 0.0], [0.0, 9.0, 0.0]])
+def test_a_law_that_fails_sends_nothing(folder, monkeypatch, velocity):
+    update, ticks = SlidingLoop.update, []
+
+    def broken(self, *words):
+        ticks.append(None)
+        return np.array(velocity) if len(ticks) == 50 else update(self, *words)
+
+    monkeypatch.setattr(SlidingLoop, "update", broken)
+    outcome, wire, _ = sliding(folder)
+    assert "was not sent: it is beyond the limit of 50 mm/s" in outcome.ended
+    assert len(wire.sent) == 49
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [({"travel": 0.005}, "beyond the travel limit of 5 mm"), ({"speed": 0.001}, "speed limit")],
+)
+def test_limits_that_the_path_passes_are_refused_before_anything_moves(folder, limits, says):
+    with pytest.raises(InputError, match=says):
+        order_of(folder, **limits)
+
+
+def words_of(folder, address, *more, gains="gains.toml"):
+    return ["slide", "--wire", address, "--gains", str(folder / gains), *WORDS, *ALONG, *more]
+
+
+@pytest.mark.parametrize(
+    ("more", "gains", "says"),
+    [
+        (["--arm", "fr3"], "gains.toml", "--arm is for a simulated slide"),
+        ([], "plain.toml", "no numbers for a slide"),
+        (["--path", "zig"], "gains.toml", "unknown path"),
+        (["--length", "0:mm"], "gains.toml", "--length must be"),
+        (["--seconds", "30"], "gains.toml", "--seconds"),
+    ],
+)
+def test_wrong_words_are_one_line(folder, here, capsys, more, gains, says):
+    words = words_of(folder, "sim:127.0.0.1:9", gains=gains)
+    if more and more[0] in words:
+        at = words.index(more[0])
+        words[at : at + 2] = more
+    else:
+        words += more
+    assert main(words) == 2
+    err = capsys.readouterr().err
+    assert says in err
+    assert err.count("\n") == 1
+
+
+def test_limits_without_a_wire_are_refused(here, capsys):
+    assert main(["slide", "--force-limit", "30:N"]) == 2
+    assert "--wire is missing" in capsys.readouterr().err
+
+
+def test_it_slides_over_the_protocol_of_a_simulated_arm(folder, here, capsys):
+    with arm(folder) as (_, address):
+        assert main(words_of(folder, address, "--dry-run")) == 0
+        assert "while it slides along a back of 10 mm" in capsys.readouterr().out
+    with arm(folder) as (_, address):
+        code = main(words_of(folder, address, "--yes", "--record", "rec", "--json"))
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0, told["ended"]
+    assert told["force_N"] == pytest.approx(10.0, rel=0.05)
+    assert told["surface"]["friction"]["ci95"][0] < FRICTION < told["surface"]["friction"]["ci95"][1]
+    assert np.ptp(read_record(here / "rec" / "record.parquet")["position_x"]) > 0.005
+
+
+def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
+    pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
+    address = next(ADDRESSES)
+    where = ("--address", address, "--arm", folder / "arm.toml", "--seconds", "60", "--stiffness", "4000")
+    with child("-m", "palpate_rehearsal.rtde_arm", *where) as (_, line):
+        code = main(words_of(folder, line, "--yes", "--json"))
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0, told["ended"]
+    assert told["force_N"] == pytest.approx(10.0, rel=0.05)
+    assert told["surface"]["friction"]["value"] == pytest.approx(FRICTION, abs=0.1)
+
+
+def test_a_signal_tells_the_arm_to_rest_and_loses_nothing(folder, tmp_path):
+    with arm(folder, "--gap", "0.001") as (_, address), relayed(address, lambda *_: None) as relay:
+        words = words_of(folder, relay.address, "--yes", "--record", "rec")
+        command = [sys.executable, "-m", "palpate", *words]
+        with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as slide:
+            wait_for_rows(tmp_path / "rec" / "rows.f64")
+            slide.send_signal(signal.SIGTERM)
+            sent = time.monotonic()
+            out, _ = slide.communicate(timeout=PATIENCE)
+        assert slide.returncode == 128 + signal.SIGTERM
+        assert "stopped by the user (SIGTERM); the arm rests" in out
+        assert relay.rests
+        assert relay.rests[0] - sent < 0.5
+    assert len(read_record(tmp_path / "rec" / "record.parquet")) >= 40
+
+
+def test_a_task_without_a_path_is_a_press(folder):
+    order = order_of(folder, path=None)
+    assert replace(order.task, path=PATH).path is PATH
+    assert order.task.path is None
