@@ -224,7 +224,7 @@ def _print(found: Identification, origin: Source, written: list[Path], output: I
 
         print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
         return
-    from palpate.report.identification import answer, table, uncertainty
+    from palpate.report.identification import answer, details
 
     screen = console()
     places = [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in written]
@@ -232,8 +232,8 @@ def _print(found: Identification, origin: Source, written: list[Path], output: I
         more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
         answer.show(found, origin.title, screen, origin.notes, "   ".join([*places, f"all evidence: {more}"]))
     else:
-        table.show(found, origin.title, screen)
+        details.show(found, origin.title, screen)
         for line in (*origin.notes, *places):
             screen.print(line, soft_wrap=True)
     if output.budget:
-        uncertainty.show(found, screen)
+        details.show_budgets(found, screen)

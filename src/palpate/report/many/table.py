@@ -19,9 +19,9 @@ from palpate.identification.causes import cause_of
 from palpate.identification.pooling import Pooled, PooledParameter, PooledPoint
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification.answer import STYLES
-from palpate.report.identification.table import note
+from palpate.report.identification.details import note
 from palpate.report.identification.words import (
+    STYLES,
     Source,
     as_json,
     facts_of,
