@@ -108,11 +108,11 @@ def test_the_expanded_uncertainty_is_the_half_width(logs):
         assert numbers
         for p in numbers:
             own = p.uncertainty
-            assert own.expanded == pytest.approx((p.ci95[1] - p.ci95[0]) / 2)
-            assert own.coverage * own.combined == pytest.approx(own.expanded)
+            assert own.expanded_uncertainty == pytest.approx((p.ci95[1] - p.ci95[0]) / 2)
+            assert own.coverage * own.combined == pytest.approx(own.expanded_uncertainty)
             assert own.coverage >= student(own.freedom) * (1 - 1e-4)
             listed = [own.coverage * part.std for part in own.contributions.values()]
-            assert np.hypot.reduce(listed) == pytest.approx(own.expanded)
+            assert np.hypot.reduce(listed) == pytest.approx(own.expanded_uncertainty)
         for name in found.parameters.keys() & {"K", "B", "M"}:
             p = found.parameters[name]
             if p.value is not None and p is not found.working_point.stiffness:

@@ -38,7 +38,7 @@ def test_a_force_loop_says_its_phase_its_trouble_and_its_gains():
 
 
 def test_a_parameter_says_number_interval_and_verdict(found):
-    assert repr(found.K) == "<Parameter: 5234 ± 47 N/m, identified>"
+    assert repr(found.K) == "<Parameter: 5236 ± 51 N/m, identified>"
     assert repr(found.M) == "<Parameter: -2.3 to 1.9 kg, not identifiable>"
     assert "5236 ± 61 N/m" in repr(found.working_point)
 

@@ -157,7 +157,7 @@ class Uncertainty:
     contributions: Contributions
 
     @property
-    def expanded(self) -> float:
+    def expanded_uncertainty(self) -> float:
         """Half-width of the 95 % interval."""
         return half_width(self.contributions)
 
@@ -176,7 +176,7 @@ class Uncertainty:
     @property
     def coverage(self) -> float:
         """Coverage factor k, the expanded over the combined uncertainty."""
-        return self.expanded / self.combined
+        return self.expanded_uncertainty / self.combined
 
     def to_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
         """Plain values that JSON can hold, largest contribution first; an infinite number is None.
@@ -190,7 +190,7 @@ class Uncertainty:
             "combined_standard_uncertainty": self.combined,
             "effective_degrees_of_freedom": _finite(self.freedom),
             "coverage_factor": self.coverage,
-            "expanded_uncertainty": self.expanded,
+            "expanded_uncertainty": self.expanded_uncertainty,
             "sources": [self._source(name, own, inputs.get(name)) for name, own in rows if own.std > 0],
         }
 
@@ -266,7 +266,7 @@ class Parameter(Readable):
             contributions: to its uncertainty, by cause.
         """
         whole = Uncertainty(contributions)
-        half = whole.expanded
+        half = whole.expanded_uncertainty
         share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
         parts = {cause: share * part.std for cause, part in contributions.items()}
         budget = {

@@ -208,7 +208,7 @@ def _pair(
     follow = [
         pair
         for pair in pairs[:800]
-        if _together(*pair) > _FOLLOWS or (by_name and _filtered(*pair) > _COHERENT)
+        if _together(*pair) > _FOLLOWS or (by_name and _coherence(*pair) > _COHERENT)
     ]
     pairs = [pair for pair in follow if not _one_reading(*pair)]
     if not pairs:
@@ -250,7 +250,7 @@ def _together(first: ColumnStatistics, second: ColumnStatistics) -> float:
     return abs(float(spearmanr(a[rows], b[rows]).statistic))
 
 
-def _filtered(position: ColumnStatistics, force: ColumnStatistics) -> float:
+def _coherence(position: ColumnStatistics, force: ColumnStatistics) -> float:
     """Share of the force's power that some filter of the position accounts for: its coherence (Welch), 0 to 1.
 
     At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.

@@ -29,9 +29,9 @@ from palpate.identification.estimators.octaves import (
 from palpate.identification.models import Motion
 from palpate.identification.problem import Problem
 
-_SIZES = (0.0003, 0.01, 0.3, LARGEST)
-"""Deviations of the prior of a force's size, over that of the whole force: not there as far as any log shows, or of
-some order of magnitude. `make trust` measures the coverage that follows."""
+_SIZES = (0.001, 0.01, 0.3, LARGEST)
+"""Deviations of the prior of a force's size, over that of the whole force: hardly there, or of some order of magnitude.
+`make trust` measures the coverage that follows."""
 _SINGULAR = 1e-12
 """Share of its columns' size below which a direction is not in the log."""
 _WINDOW = 0.02
