@@ -1,11 +1,13 @@
 """The test over a wire: presses of `palpate press --wire ... --record`, judged by their records.
 
 The arm moves under the guards of `palpate press` and nothing else. A press that lowers its force now and then has three
-steps down and up in its middle third; the force before is that of the touch.
+steps down and up in its middle third; the force before is that of the touch. A force has settled when
+its mean over the loop's lag has, as palpate press says it; peaks, losses and rises are those of single readings.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import RECORD
 from palpate.logs import read_record
-from palpate.press.sequence import Plan
+from palpate.press.sequence import Plan, mean_over
 from palpate.records import Record
-from palpate_benchmark.metrics import ForceStep, RunMetrics, step, touch
+from palpate_benchmark.metrics import ForceStep, RunMetrics, settling_time, step, touch
 from palpate_benchmark.plan import ForcePlan
 from palpate_benchmark.simulated import ForceResult, OnSurface
 
@@ -77,21 +79,25 @@ def _run(record: Record, path: Path) -> RunMetrics:
     force, before = force[begin:][held], force[:begin]
     wanted = np.array([plan.desired(s) for s in since[held]])
     first = since[held] < plan.seconds / 3.0
-    found = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))
-    steps = _steps(force, wanted, rate)
+    lag = float(about.get("theta_s", 0.0))
+    met = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))
+    met = replace(met, settling=settling_time(mean_over(force[first], lag, 1.0 / rate), plan.force, rate))
+    steps = _steps(force, wanted, rate, lag)
     none = ForceStep(None, None, np.nan)
     down, up = ([s for s, lower in steps if lower is side] or [none] for side in (True, False))
-    return RunMetrics(found, _slowest(up), _slowest(down), None, np.nan, None)
+    return RunMetrics(met, _slowest(up), _slowest(down), None, np.nan, None)
 
 
-def _steps(force: Array, wanted: Array, rate: float) -> list[tuple[ForceStep, bool]]:
+def _steps(force: Array, wanted: Array, rate: float, lag: float) -> list[tuple[ForceStep, bool]]:
     """Each step of the desired force, and whether it lowers the force."""
-    at = np.flatnonzero(np.diff(wanted)) + 1
-    ends = [*at[1:], len(wanted)]
-    return [
-        (step(force[i:end], wanted[i - 1], wanted[i], rate), bool(wanted[i] < wanted[i - 1]))
-        for i, end in zip(at, ends, strict=True)
-    ]
+    at, steps = np.flatnonzero(np.diff(wanted)) + 1, []
+    for i, end in zip(at, [*at[1:], len(wanted)], strict=True):
+        before, after = wanted[i - 1], wanted[i]
+        settling = settling_time(mean_over(force[i:end], lag, 1.0 / rate), after, rate)
+        steps.append(
+            (replace(step(force[i:end], before, after, rate), settling=settling), bool(after < before))
+        )
+    return steps
 
 
 def _slowest(steps: list[ForceStep]) -> ForceStep:

@@ -51,6 +51,12 @@ class Integral(NamedTuple):
         return self.gain * (desired - force), state
 
 
+@law
+def admitted_speed(speed, error, mass, damping, tick):
+    """Speed of an admittance, M vdot + D v = e, a tick later."""
+    return speed + tick / mass * (error - damping * speed)
+
+
 @part
 class FixedAdmittance(NamedTuple):
     """M vdot + D v = e: admittance of a mass and a damper (Hogan)."""
@@ -63,7 +69,7 @@ class FixedAdmittance(NamedTuple):
         return 0.0
 
     def step(self, state, desired, force, position):
-        speed = state + self.tick / self.mass * (desired - force - self.damping * state)
+        speed = admitted_speed(state, desired - force, self.mass, self.damping, self.tick)
         return speed, speed
 
 
@@ -164,7 +170,7 @@ class LearnedImpedance(NamedTuple):
         owed += self.tick / self.mass * (-speed - damping * owed)  # d speed / d damping
         damping += self.rate * self.tick * error * owed * damping * damping
         damping = min(max(damping, 0.05 * self.damping), 20.0 * self.damping)
-        speed += self.tick / self.mass * (error - damping * speed)
+        speed = admitted_speed(speed, error, self.mass, damping, self.tick)
         return speed, (speed, damping, owed)
 
 

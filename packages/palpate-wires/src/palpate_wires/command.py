@@ -125,6 +125,7 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "desired_N": task.force,
         "hold_s": task.hold,
         "probe": task.probe,
+        "theta_s": order.loop.gains.theta,
         # The encoders of a servo show how it gives way, so that nothing is in series with the surface.
         "position_from": "tip" if order.loop.gains.arm.kind == "servo" else "joints",
         **({} if tool is None else tool.meta),
