@@ -163,6 +163,7 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
         ("6.9", "Neural identifier"),
         ("6.10", "Force control"),
         ("why-negative-mass", "Explanations"),
+        ("model-tunes", "Schemes that the thesis names"),
     ],
 )
 def test_figures_stand_in_their_chapters(number, chapter):

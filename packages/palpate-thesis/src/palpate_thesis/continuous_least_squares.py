@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
-from palpate.identifiers.estimator import LARGEST
+from palpate.identifiers.estimator import LARGEST, NAMES, VAGUE
 
 NODES = (0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0))[:, None]
 """Of Gauss and Legendre in a tick: with two of them the integral of a product of two straight lines is exact."""
@@ -27,8 +27,9 @@ class ContinuousLeastSquares(RecursiveLeastSquares):
     rectangles, fifty times as fast, and the same where regressors do not jump from sample to sample.
 
     Args:
-        theta: initial estimate, shape (n,).
-        covariance: initial P, shape (n, n): of theta, for a force with noise of spectral density 1.
+        theta: initial estimate, shape (n,); M, B, K unless others are named.
+        covariance: initial P, shape (n, n): of theta, for a force with noise of spectral density 1. As little trust as
+            the bench's estimators have, if left out.
         tick: time between two samples [s].
         rate: at which the past is forgotten [1/s]; 0 forgets nothing.
         names: of the parameters, in the order of the regressor.
@@ -39,15 +40,16 @@ class ContinuousLeastSquares(RecursiveLeastSquares):
 
     def __init__(
         self,
-        theta: ArrayLike,
-        covariance: ArrayLike,
+        theta: ArrayLike = (0.0, 0.0, 0.0),
+        covariance: ArrayLike | None = None,
         tick: float = 1e-3,
         rate: float = 0.0,
-        names: tuple[str, ...] | None = None,
+        names: tuple[str, ...] = NAMES,
     ):
         if not (math.isfinite(tick) and tick > 0.0 <= rate):
             raise InputError(f"tick must be above 0 and rate 0 or more, got {tick} and {rate}")
-        super().__init__(theta, covariance, math.exp(-rate * tick / 2.0), names)
+        P = np.diag(np.square(VAGUE)) / tick if covariance is None else covariance
+        super().__init__(theta, P, math.exp(-rate * tick / 2.0), names)
         self.tick, self._last = tick, np.empty((0, self._n + 1))
 
     def update(self, regressor: ArrayLike, force: float) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from palpate.report.figure_panels.panels import panel_scripts
 from palpate.report.look.assets import data, text_of
 from palpate.report.page import render
-from palpate_thesis.claims import Done, count_in_words, count_verdicts
+from palpate_thesis.claims import Done, count_in_words, count_verdicts, tables
 
 TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
 _CHAPTERS = (("2.", "Earlier schemes"), ("3.", "The bench"), ("4.", "The controllers"))
@@ -60,11 +60,11 @@ def _chapters(done: Sequence[Done]) -> list[dict[str, Any]]:
 
 
 def chapter_of(number: str) -> str:
-    """Chapter of a figure, by its number in the thesis; a name of ours is an explanation."""
+    """Chapter of a figure, by its number in the thesis; a name of ours is an explanation if its texts name no other."""
     for start, title in _CHAPTERS:
         if number.startswith(start):
             return title
     head, _, tail = number.partition(".")
     if head != "6" or not tail.isdigit():
-        return _OTHERS
+        return tables()["figures"].get(number, {}).get("chapter", _OTHERS)
     return next((title for last, title in _PARTS if int(tail) <= last), _OTHERS)

@@ -161,7 +161,7 @@ def plot(data: Data) -> Figure:
         )
         legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
     labels = ["-".join(map(str, size)) for size in SIZES]
-    labels += list(ARCHITECTURES)
+    labels += ["radial\nbasis", "recur-\nrent"]
     for i, found in enumerate((*data.sizes.values(), *(other["foam"] for other in data.others.values()))):
         color = style.SERIES[0] if i < len(SIZES) else style.SERIES[1]
         grid[1][0].plot([i] * len(found), [one.rms for one in found], "o", color=color, markersize=4)
@@ -173,7 +173,7 @@ def plot(data: Data) -> Figure:
     grid[1][1].set(ylabel="contact lost after [s]", ylim=(0.0, LONG * 1.08))
     grid[1][1].set_title(f"foam that relaxes; at the upper edge: kept for {LONG:g} s")
     for axis in grid[1]:
-        axis.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
+        axis.set_xticks(range(len(labels)), labels)
         axis.set_xlabel("neurons of each hidden layer; other architectures, 12 neurons")
     return drawing
 

@@ -109,7 +109,7 @@ def check(data: Mapping[str, Sequence[BothIdentifiers]]) -> Sequence[ThesisClaim
         claim(
             f"{NUMBER}.simulation",
             often(np.abs(one.simulated - 1.0).max() <= SAME for one in every),
-            **{key: [100 * one.simulated[i] for one in every] for i, key in enumerate(KEYS)},
+            **{key: [100 * abs(one.simulated[i] - 1.0) for one in every] for i, key in enumerate(KEYS)},
             same=SAME,
         ),
         claim(
@@ -176,7 +176,7 @@ def plot(data: Mapping[str, Sequence[BothIdentifiers]]) -> Figure:
     cells[3].set_title("as a share")
     for axis, shape in zip(cells[4:], SCALES, strict=True):
         axis.axhline(1.0, **style.KNOWN)
-        axis.set(xlabel="p", ylabel="$K_e$ over f/x", ylim=(0.7, 50.0), xlim=(SIZES[0] / 2, SIZES[-1] * 2))
+        axis.set(xlabel="p", ylabel="$K_e$ over f/x", ylim=(0.7, 50.0), xlim=(SIZES[0] / 2, 2e6))
         axis.set_title(f"Euler's steps of 1 ms, P(0) = {shape}; no dot: diverged")
     style.legend(cells[0])
     return drawing

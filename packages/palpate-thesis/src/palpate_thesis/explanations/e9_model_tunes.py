@@ -24,7 +24,7 @@ from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
 from palpate_thesis.conditions import SHORT
 from palpate_thesis.explanations.e8_contact_network import fit
-from palpate_thesis.force_control.panels import panels
+from palpate_thesis.force_control.panels import across, panels
 from palpate_thesis.force_control.tracking import since_contact
 from palpate_thesis.look import Figure
 from palpate_thesis.neural_identifier.network import STIFFENING
@@ -228,41 +228,42 @@ def _alike(name: str, found: Sequence[Tuned]) -> ThesisClaim:
         surface=name,
         network=[100 * one.apart("network") for one in found],
         line=[100 * one.apart("line") for one in found],
-        times="; ".join(f"{model} {_rise(found, model)}" for model in ("network", "line")),
+        furthest=", ".join(f"{model} {_furthest(found, model)}" for model in ("network", "line")),
         half=HALF,
         seen=1e3 * SEEN,
     )
 
 
-def _rise(found: Sequence[Tuned], model: str) -> str:
-    """The middle of the time to half a step at the low and the high level, and of the furthest point."""
-    levels = [[one.responses[model][level] for one in found] for level in LEVELS]
-    times = " and ".join(f"{np.median([np.argmax(y >= HALF) for y in some]):.0f}" for some in levels)
-    most = " and ".join(f"{np.median([y.max() for y in some]):.2f}" for some in levels)
-    return f"{times} ms, furthest {most}"
+def _furthest(found: Sequence[Tuned], model: str) -> str:
+    """The middle of the furthest points of the responses at the low and the high level."""
+    return " and ".join(
+        f"{np.median([one.responses[model][level].max() for one in found]):.2f}" for level in LEVELS
+    )
 
 
 def plot(data: Mapping[str, Sequence[Tuned]]) -> Figure:
     """Stiffness over the force; responses at both levels; how far apart they are."""
-    drawing, grid = panels([2.4, 2.4], 3, 12.0)
+    drawing, grid = panels([2.4, 2.4, 1.5], 2, 11.0)
     colors = dict(zip(("network", "line"), style.SERIES, strict=False))
-    for row, (name, found) in zip(grid, data.items(), strict=True):
+    apart = across(grid[2])
+    for (slopes, answers), (name, found) in zip(grid, data.items(), strict=False):
         one = found[0]
-        row[0].plot(one.forces, 1e-3 * one.slopes["true"], **style.KNOWN, label="true")
+        slopes.plot(one.forces, 1e-3 * one.slopes["true"], **style.KNOWN, label="true")
         for model, color in colors.items():
             for other in found:
-                row[0].plot(one.forces, 1e-3 * other.slopes[model], color=color, linewidth=0.5, alpha=0.5)
-            row[0].plot(one.forces, 1e-3 * one.slopes[model], color=color, linewidth=1.2, label=model)
+                slopes.plot(one.forces, 1e-3 * other.slopes[model], color=color, linewidth=0.5, alpha=0.5)
+            slopes.plot(one.forces, 1e-3 * one.slopes[model], color=color, linewidth=1.2, label=model)
             for (level, y), line in zip(one.responses[model].items(), ("-", ":"), strict=True):
                 label = f"{model}, {level}"
-                row[1].plot(np.arange(len(y)), y, line, color=color, linewidth=1.3, label=label)
-            apart = [100 * o.apart(model) for o in found]
-            row[2].margins(y=0.6)
-            row[2].plot(apart, np.full(len(apart), model), "o", color=color, markersize=4, alpha=0.7)
-        row[0].set(xlabel="force [N]", ylabel=f"{name}: stiffness [kN/m]")
-        row[1].set(xlabel="time since a step [ms]", ylabel="share of the step", xlim=(0.0, 1e3 * SEEN))
-        row[1].axhline(1.0, color=style.INK, linewidth=0.7)
-        row[2].set(xlabel="low against high level [% of a step]", xlim=(0.0, None))
-        row[0].legend()
-        row[1].legend(fontsize=7)
+                answers.plot(np.arange(len(y)), y, line, color=color, linewidth=1.3, label=label)
+            values = [100 * o.apart(model) for o in found]
+            row = [f"{name}, {model}"] * len(values)
+            apart.plot(values, row, "o", color=color, markersize=4, alpha=0.7)
+        slopes.set(xlabel="force [N]", ylabel=f"{name}: stiffness [kN/m]")
+        answers.set(xlabel="time since a step [ms]", ylabel="share of the step", xlim=(0.0, 1e3 * SEEN))
+        answers.axhline(1.0, color=style.INK, linewidth=0.7)
+        slopes.legend()
+        answers.legend(fontsize=7)
+    apart.set(xlabel="response at the low against that at the high level [% of a step]", xlim=(0.0, None))
+    apart.margins(y=0.2)
     return drawing

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -164,65 +164,44 @@ def run(runs: Runs) -> Data:
     return Data(traces, nominal, printed, varied)
 
 
+MEASURES: Mapping[str, Callable[[CoupledAndDecoupled], float]] = {
+    "angle": lambda p: 100 * p.angle,
+    "side": lambda p: 100 * p.side,
+    "coupled_phi": lambda p: p.coupled.phi,
+    "coupled_y": lambda p: p.coupled.y,
+    "coupled_force": lambda p: 100 * p.coupled.force,
+    "decoupled_force": lambda p: 100 * p.decoupled.force,
+    "stiffness": lambda p: p.stiffness / 1e3,
+}
+"""Numbers of the claims, as chosen and, by their names with "_free", with hardly any friction."""
+
+
 def check(data: Data) -> Sequence[ThesisClaim]:
     """As printed all has to hold at once; corrected, each direction by itself."""
-    same = {
-        "source": "eq. 4.19-4.21, sec. 4.4",
-        "thesis": "the position and force control loops are decoupled",
-    }
-    return [_as_printed(data, same), _angle(data, same), _side(data, same), _force(data, same)]
-
-
-def _as_printed(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
-    return claim(
+    pairs = {"": data.nominal, "_free": data.varied["hardly any\nfriction"]}
+    numbers = {n + kind: [m(p) for p in some] for kind, some in pairs.items() for n, m in MEASURES.items()}
+    limits = {"jump": 1e3 * JUMP, "share": SHARE}
+    printed = claim(
         "decoupled-control",
         often(map(_all, data.printed)),
         decoupled_lost=[p.decoupled.lost for p in data.printed],
         decoupled_phi=[p.decoupled.phi for p in data.printed],
-        jump=1e3 * JUMP,
-        share=SHARE,
+        **limits,
     )
-
-
-def _angle(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
-    free = data.varied["hardly any\nfriction"]
-    return claim(
-        "decoupled-control.angle",
-        often(map(angle_kept, data.nominal)),
-        angle=[100 * p.angle for p in data.nominal],
-        coupled_phi=[p.coupled.phi for p in data.nominal],
-        stiffness=[p.stiffness / 1e3 for p in data.nominal],
-        angle_free=[100 * p.angle for p in free],
-        where=stops_holding(data.varied, angle_kept),
-    )
-
-
-def _side(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
-    free = data.varied["hardly any\nfriction"]
-    return claim(
-        "decoupled-control.y",
-        often(map(_side_kept, data.nominal)),
-        side=[100 * p.side for p in data.nominal],
-        coupled_y=[p.coupled.y for p in data.nominal],
-        side_free=[100 * p.side for p in free],
-        coupled_y_free=[p.coupled.y for p in free],
-        where=stops_holding(data.varied, _side_kept),
-    )
-
-
-def _force(data: Data, same: Mapping[str, Any]) -> ThesisClaim:
-    free = data.varied["hardly any\nfriction"]
-    return claim(
-        "decoupled-control.force",
-        often(map(force_kept, data.nominal)),
-        decoupled_force=[100 * p.decoupled.force for p in data.nominal],
-        coupled_force=[100 * p.coupled.force for p in data.nominal],
-        decoupled_force_free=[100 * p.decoupled.force for p in free],
-        coupled_force_free=[100 * p.coupled.force for p in free],
-        jump=1e3 * JUMP,
-        share=SHARE,
-        where=stops_holding(data.varied, force_kept),
-    )
+    parts = {"angle": angle_kept, "y": _side_kept, "force": force_kept}
+    return [
+        printed,
+        *(
+            claim(
+                f"decoupled-control.{part}",
+                often(map(kept, data.nominal)),
+                where=stops_holding(data.varied, kept),
+                **numbers,
+                **limits,
+            )
+            for part, kept in parts.items()
+        ),
+    ]
 
 
 def plot(data: Data) -> Figure:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -89,35 +88,19 @@ def _count(data: Data, *what: str) -> str:
 
 def _raw_signs(data: Data) -> list[ThesisClaim]:
     """Signs of M and B, and K, from raw signals."""
-    shown = partial(_count, data)
+    raw = {
+        "M": ("kg", "raw: M < 0", lambda f: f.M_raw),
+        "B": ("N s/m", "raw: B < 0", lambda f: f.B_raw),
+        "K": ("%", "raw: K = f/x", lambda f: 100.0 * f.apart_raw),
+    }
     both = ("raw: B < 0", "raw: M < 0")
+    numbers = {"both": _count(data, *both), "all": _count(data, *both, "B > 0")}
+    numbers |= {key: _count(data, shown) for key, (_, shown, _) in raw.items()}
     return [
         later.found_claim(
-            data.later,
-            "least-squares-raw-signals.M",
-            lambda f: f.M_raw,
-            lambda f: f.M_raw < 0.0,
-            "kg",
-            M=shown("raw: M < 0"),
-        ),
-        later.found_claim(
-            data.later,
-            "least-squares-raw-signals.B",
-            lambda f: f.B_raw,
-            lambda f: f.B_raw < 0.0,
-            "N s/m",
-            B=shown("raw: B < 0"),
-            both=shown(*both),
-            all=shown(*both, "B > 0"),
-        ),
-        later.found_claim(
-            data.later,
-            "least-squares-raw-signals.K",
-            lambda f: 100.0 * f.apart_raw,
-            lambda f: abs(f.apart_raw) < NEAR,
-            "%",
-            K=shown("raw: K = f/x"),
-        ),
+            data.later, f"least-squares-raw-signals.{key}", measure, SHOWS[shown], unit, **numbers
+        )
+        for key, (unit, shown, measure) in raw.items()
     ]
 
 
