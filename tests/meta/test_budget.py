@@ -33,13 +33,13 @@ LARGEST = {
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2524, tokens=19257),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1315, tokens=9043),
-    "packages/palpate-slide/src/palpate_slide": Weight(files=10, lines=1780, tokens=14694),
+    "packages/palpate-slide/src/palpate_slide": Weight(files=10, lines=1765, tokens=14466),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3210, tokens=18830),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6349, tokens=42605),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 81, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 63, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 TWICE = frozenset({"Curve", "Data", "Fit", "Limits", "Payload", "Prediction", "Sense", "Surface", "Table"})
 """Class names that stand for two things. None is added; whoever renames one takes it off."""

@@ -78,7 +78,7 @@ def tune(
     theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
     told = tuned(
         one,
-        press.desired,
+        press.desired_force,
         _surface_of(found, surface, columns),
         cap=surface.cap,
         peak=press.highest,
@@ -100,7 +100,7 @@ def _surface_of(found: Path | None, surface: SurfaceOptions, columns: ColumnOpti
     if found is not None and surface.stiffness is not None:
         raise InputError("give a file or --stiffness, not both")
     if surface.stiffness is not None:
-        return Known.stated(surface.range, highest)
+        return Known.of_range(surface.range, highest)
     if found is None:
         raise InputError(
             "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"

@@ -49,7 +49,7 @@ class Plan:
         if not 0.0 <= self.probe <= 0.9:
             raise InputError(f"the probe is a share of the force from 0 to 0.9, got {self.probe:g}")
 
-    def desired(self, since: float) -> float:
+    def force_at(self, since: float) -> float:
         """Desired force at a time since the touch [N]: steady, in the middle third in steps down and up, steady."""
         third = self.seconds / 3.0
         if not third <= since < 2.0 * third:

@@ -77,7 +77,7 @@ def _run(record: Record, path: Path) -> RunMetrics:
     since = t[begin:] - t[begin]
     held = since < plan.seconds
     force, before = force[begin:][held], force[:begin]
-    wanted = np.array([plan.desired(s) for s in since[held]])
+    wanted = np.array([plan.force_at(s) for s in since[held]])
     first = since[held] < plan.seconds / 3.0
     lag = float(about.get("theta_s", 0.0))
     met = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))

@@ -87,7 +87,7 @@ class PressOptions:
     "Highest force allowed at the touch, N."
 
     @property
-    def desired(self) -> float:
+    def desired_force(self) -> float:
         """Desired force F_d [N]."""
         return in_si("--force", self.force, "force")
 
