@@ -79,7 +79,7 @@ trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put t
 
 laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
 	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
-	cp runs/laboratory/inferred.toml $(THESIS)/src/palpate_thesis/laboratory/shipped/inferred.toml
+	cp runs/laboratory/inferred.toml $(LABORATORY)/src/palpate_laboratory/shipped/inferred.toml
 	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --replace
 	$(BIN)/python $(LABORATORY)/benchmarks/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
 

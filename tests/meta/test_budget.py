@@ -22,9 +22,9 @@ ROOM = 1.01
 LARGEST = {
     "src/palpate": Weight(files=292, lines=52652, tokens=354866),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
-    "packages/palpate-thesis/src/palpate_thesis": Weight(files=61, lines=10300, tokens=80800),
-    "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=12, lines=2100, tokens=14081),
-    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2715, tokens=21005),
+    "packages/palpate-thesis/src/palpate_thesis": Weight(files=58, lines=10114, tokens=80800),
+    "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2459, tokens=16242),
+    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2430, tokens=18568),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=768, tokens=6210),
     "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1417, tokens=12037),
     "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=768, tokens=5579),

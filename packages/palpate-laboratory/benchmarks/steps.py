@@ -12,11 +12,11 @@ import warnings
 import numpy as np
 
 from palpate_laboratory.judge import FINE
+from palpate_laboratory.laboratory import laboratory_at
 from palpate_laboratory.sampler import Settings, prior
 from palpate_laboratory.sentences import sentences_of_search, verdicts
 from palpate_laboratory.trial import STEPS, Trial
-from palpate_thesis.laboratory.laboratory import laboratory_at
-from palpate_thesis.laboratory.unknowns import UNKNOWNS
+from palpate_laboratory.unknowns import UNKNOWNS
 
 
 def main() -> None:

@@ -16,10 +16,27 @@ from palpate.bench import Experiment, build, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate_laboratory import archive, contradictions, findings, infer, judge, result, sampler, search
+from palpate_laboratory import (
+    archive,
+    contradictions,
+    findings,
+    infer,
+    judge,
+    laboratory,
+    result,
+    sampler,
+    search,
+)
 from palpate_laboratory.archive import Tried
 from palpate_laboratory.contradictions import Bred, breed
 from palpate_laboratory.judge import drawn_shares, judged_shares
+from palpate_laboratory.laboratory import (
+    CHOSEN,
+    Laboratory,
+    laboratory_at,
+    laboratory_from,
+    stiffening,
+)
 from palpate_laboratory.result import (
     EXCLUDED,
     IMPOSSIBLE,
@@ -33,22 +50,7 @@ from palpate_laboratory.sampler import Settings, sample
 from palpate_laboratory.search import MISS, Job, PosteriorSearch, Threads, Workers
 from palpate_laboratory.sentences import HOLDS, TELLING_FIRST, sentences, sentences_of_search
 from palpate_laboratory.trial import Trial
-from palpate_studies.cluster import Cluster
-from palpate_thesis.claims import ThesisClaim, count_in_words, count_verdicts, with_wholes
-from palpate_thesis.conditions import rougher
-from palpate_thesis.figure import studies, study
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
-from palpate_thesis.laboratory import laboratory
-from palpate_thesis.laboratory.laboratory import (
-    CHOSEN,
-    Laboratory,
-    laboratory_at,
-    laboratory_from,
-    own_damping,
-    stiffening,
-    values,
-)
-from palpate_thesis.laboratory.unknowns import (
+from palpate_laboratory.unknowns import (
     BY_NAME,
     LINEAR,
     LISTING,
@@ -57,6 +59,11 @@ from palpate_thesis.laboratory.unknowns import (
     UNKNOWNS,
     Unknown,
 )
+from palpate_studies.cluster import Cluster
+from palpate_thesis.claims import ThesisClaim, count_in_words, count_verdicts, with_wholes
+from palpate_thesis.conditions import rougher
+from palpate_thesis.figure import studies, study
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.measure import MeasurementFormat, measure
 from palpate_thesis.neural_identifier.network import NetworkPress
@@ -74,7 +81,7 @@ def test_every_unknown_is_a_field_with_a_range_that_holds_its_own_ends():
 
 
 def test_the_hand_chosen_bench_lies_in_the_ranges():
-    for name, value in values(CHOSEN).items():
+    for name, value in CHOSEN.numbers().items():
         assert BY_NAME[name].holds(value), name
 
 
@@ -170,7 +177,7 @@ def test_foams_of_all_laws_sink_in_alike_from_5_to_20_N():
         depth = [(f / s["stiffness"]) ** (1.0 / n) for f in (5.0, 20.0)]
         assert 15.0 / (depth[1] - depth[0]) == pytest.approx(5200.0)
         assert s["damping"] * depth[1] ** n == pytest.approx(200.0)
-        assert own_damping(s) == pytest.approx(200.0)
+        assert press_runs.own_damping(s) == pytest.approx(200.0)
     assert Laboratory(foam_law=STIFFENING).of(FOAM).surface.exponent == 1.5
     assert Laboratory(foam_law=RELAXING, foam_branch=2.0).of(FOAM).surface.branch_stiffness == pytest.approx(
         10400.0
@@ -204,7 +211,6 @@ def test_a_laboratory_comes_back_from_its_file(tmp_path):
     path = tmp_path / "lab.toml"
     path.write_text(laboratory.text(lab, 'about "it"', "palpate laboratory --seed 1", 1))
     assert laboratory.load_laboratory(str(path)) == lab
-    assert laboratory.load_laboratory("bench") is CHOSEN
     assert laboratory_from({}, "nothing") == CHOSEN
 
 

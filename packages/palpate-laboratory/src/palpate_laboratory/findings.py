@@ -26,7 +26,7 @@ from palpate_laboratory.result import (
 from palpate_laboratory.sampler import Sample
 from palpate_laboratory.search import MISS, WRONG
 from palpate_laboratory.sentences import Sentence, sentences
-from palpate_thesis.laboratory.unknowns import UNKNOWNS, Unknown
+from palpate_laboratory.unknowns import UNKNOWNS, Unknown
 from palpate_thesis.look import Figure
 
 

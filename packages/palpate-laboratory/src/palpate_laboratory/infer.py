@@ -15,11 +15,11 @@ from palpate_laboratory import archive, contradictions, judge, search
 from palpate_laboratory.contradictions import VerdictTable
 from palpate_laboratory.findings import present
 from palpate_laboratory.judge import Judged, drawn_shares, judged_shares
+from palpate_laboratory.laboratory import CHOSEN, Laboratory, laboratory_at, text
 from palpate_laboratory.result import Contradiction, InferenceResult
 from palpate_laboratory.sampler import Sample, Settings
 from palpate_laboratory.search import PosteriorSearch, Runner
 from palpate_laboratory.sentences import sentences, sentences_of_search
-from palpate_thesis.laboratory.laboratory import CHOSEN, Laboratory, laboratory_at, text
 
 Progress = Callable[[str, int, int], None]
 """Called with the name of the work, and how many laboratories of how many are done in it."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate_laboratory.contradictions import VerdictTable
+from palpate_laboratory.laboratory import Laboratory
 from palpate_laboratory.sentences import Sentence, sentences, verdicts
 from palpate_laboratory.trial import Trial
 from palpate_studies.run_one import map_unordered
-from palpate_thesis.laboratory.laboratory import Laboratory
 
 
 @dataclass(frozen=True)

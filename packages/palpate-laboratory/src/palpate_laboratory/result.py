@@ -18,8 +18,7 @@ from palpate_laboratory.contradictions import CHANCE, Alone, Bred, Together, Ver
 from palpate_laboratory.judge import Judged, Predictive
 from palpate_laboratory.sampler import Sample
 from palpate_laboratory.sentences import Sentence, sentences
-from palpate_thesis.laboratory.laboratory import values
-from palpate_thesis.laboratory.unknowns import LAWS, LISTING, UNKNOWNS, Unknown
+from palpate_laboratory.unknowns import LAWS, LISTING, UNKNOWNS, Unknown
 
 TOLD, HARDLY = 0.5, 0.8
 """The middle nine tenths of the posterior take at most this share of the prior's: told; hardly; beyond, not told."""
@@ -238,7 +237,7 @@ def as_json(result: InferenceResult, command: str) -> dict[str, Any]:
             for name, one in laboratories(result).items()
         },
         "predictive": [asdict(one) for one in result.predictive],
-        "laboratories": {name: values(one.laboratory) for name, one in laboratories(result).items()},
+        "laboratories": {name: one.laboratory.numbers() for name, one in laboratories(result).items()},
         "largest": [s.id for s in sentences() if result.largest.true(s)],
         "posterior": [_numbers_of(m) for m in marginals(result.posterior.visited)],
         "never": [{**asdict(a), "reason": reasons().get(a.id, "")} for a in result.never],

@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING, Protocol
 import msgspec
 import numpy as np
 
+import palpate_thesis
 from palpate._jit import sources_stamp
 from palpate.arrays import Array
 from palpate_laboratory import archive, sampler
 from palpate_laboratory.archive import Archive, SearchIdentity, Tried
+from palpate_laboratory.laboratory import laboratory_at
 from palpate_laboratory.sampler import Sample, Settings
 from palpate_laboratory.sentences import HOLDS, Sentence
 from palpate_laboratory.trial import STEPS, Trial
+from palpate_laboratory.unknowns import UNKNOWNS
 from palpate_studies.run_one import map_unordered
-from palpate_thesis.laboratory.laboratory import laboratory_at
-from palpate_thesis.laboratory.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
     from palpate_studies.cluster import Cluster
@@ -196,9 +197,12 @@ def borrow(
 def stamp() -> str:
     """Hash of the sources that a trial consists of."""
     here = Path(__file__).parent
-    of_figures = ("figures", "force_control", "least_squares", "neural_identifier", "laboratory")
-    files = [path for folder in of_figures for path in sorted((here.parent / folder).rglob("*.py"))]
-    return sources_stamp(*files, here / "trial.py", here / "sentences.py")
+    of_figures = ("figures", "force_control", "least_squares", "neural_identifier")
+    there = Path(palpate_thesis.__file__).parent
+    files = [path for folder in of_figures for path in sorted((there / folder).rglob("*.py"))]
+    return sources_stamp(
+        *files, *(here / f"{name}.py" for name in ("trial", "sentences", "laboratory", "unknowns"))
+    )
 
 
 def attempt(job: Job, ids: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> Tried:

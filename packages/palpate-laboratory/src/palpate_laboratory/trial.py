@@ -9,6 +9,7 @@ from functools import cached_property
 from palpate.bench import Experiment, build, with_values
 from palpate.bench.force_input import DONE, INTERRUPTED
 from palpate.records import Record
+from palpate_laboratory.laboratory import Laboratory
 from palpate_thesis.figures import (
     fig_4_02,
     fig_4_04,
@@ -29,7 +30,6 @@ from palpate_thesis.figures.fig_6_11_17 import (
     away_from_settled,
 )
 from palpate_thesis.force_control.tracking import Tracking, since_contact, tracking
-from palpate_thesis.laboratory.laboratory import Laboratory
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates
 from palpate_thesis.neural_identifier import network

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate_native.expressions import number
-from palpate_native.structs import by_pointer, is_struct, leaves, members, plain, result_places, value_type
+from palpate_native.structs import by_pointer, initial, is_struct, leaves, members, number, plain
 from palpate_native.translation import Translation
 
 LINES = 8
@@ -131,18 +130,12 @@ class _Writer:
         import numba
 
         self.module, self.whole = module, Translation(module.name)
-        self.kind = plain(numba.typeof(module.gains))
-        for _, inner in members(self.kind):
-            self._publish(inner)
-        self.gains = f"{module.name}_gains"
-        self.whole.structs.publish(self.kind, self.gains)
+        self.kind, self.gains = plain(numba.typeof(module.gains)), f"{module.name}_gains"
+        self.whole.structs.name(self.kind, publish=True, public=self.gains)
         self.state = f"{module.name}_state"
         self.functions: list[str] = []
         self.declared: list[str] = []
         self.state_kind, self.numbers = self._publish_state()
-
-    def _publish(self, kind: Any) -> None:
-        self.whole.structs.publish(kind)
 
     def _publish_state(self) -> tuple[Any, int]:
         from numba import types
@@ -158,7 +151,7 @@ class _Writer:
             )
             return kind, count
         kind = plain(self.whole.rules.result(start, (self.kind,)))
-        structs.publish(kind, self.state)
+        structs.name(kind, publish=True, public=self.state)
         return kind, leaves(kind)
 
     def sources(self) -> Sources:
@@ -169,7 +162,9 @@ class _Writer:
         for name, (way, texts) in self.module.words.items():
             self._words(name, way, texts)
         default = f"{self.module.name}_default_gains"
-        table = self._tables(default)
+        fields = zip(self.module.gains, members(self.kind), strict=True)
+        values = ",\n    ".join(initial(value, kind) for value, (_, kind) in fields)
+        table = f"const {self.gains} {default} = {{\n    {values},\n}};"
         return Sources(self._header(default), self._source(table), self.numbers)
 
     def _declare(self, text: str, meaning: str, arguments: tuple[Argument, ...] = ()) -> None:
@@ -207,8 +202,7 @@ class _Writer:
         inner = members(result) if is_struct(result) else []
         fields = [] if self.module.flat else members(self.state_kind)
         changes = bool(fields) and [kind for _, kind in inner[1:]] == [kind for _, kind in fields]
-        changes = changes and len(result_places(result)) == len(fields)
-        public = structs.publish(inner[0][1] if changes else result)
+        public = structs.name(inner[0][1] if changes else result, publish=True)
         known = self.whole.function(entry.law, tuple(kinds))
         values = ["gains" if by_pointer(self.kind) else "*gains"]
         values.append(self._numbers() if self.module.flat else "state")
@@ -218,21 +212,20 @@ class _Writer:
             else a.name
             for a, kind in zip(entry.arguments, kinds[2:], strict=True)
         ]
-        places = result_places(known.result)
-        zero = (f"&({structs.name(kind)}){{0}}" for _, kind in places)
-        call = f"{known.name}({', '.join([*values, *([f'&{to}' for to, _ in places] if changes else zero)])})"
+        own = structs.name(result)
+        new = "&after" if changes else f"&({own}){{0}}"
+        call = f"{known.name}({', '.join([*values, *([new] if by_pointer(result) else [])])})"
         constant = "" if changes or (known.writes and self.module.flat) else "const "
         arguments = [f"const {self.gains} *gains", f"{constant}{self.state} *state"]
         arguments += [argument.text for argument in entry.arguments]
         head = f"{public} {self.module.name}_{entry.name}({', '.join(arguments)})"
         self._declare(head, entry.meaning, entry.arguments)
         if changes:
-            lines = [f"{structs.name(kind)} {to};" for to, kind in places]
-            lines += [f"const {structs.name(value_type(known.result))} value = {call};"]
-            lines += [f"state->{field} = {to};" for (field, _), (to, _) in zip(fields, places, strict=True)]
-            body = "\n".join(f"    {line}" for line in [*lines, "return value;"])
+            moves = [f"state->{to[0]} = after.{of[0]};" for to, of in zip(fields, inner[1:], strict=True)]
+            lines = [f"{own} after;", f"{call};", *moves, f"return after.{inner[0][0]};"]
+            body = "\n".join(f"    {line}" for line in lines)
         else:
-            body = f"    {'' if public == 'void' else 'return '}{'*' if places else ''}{call};"
+            body = f"    {'' if public == 'void' else 'return '}{'*' if by_pointer(result) else ''}{call};"
         self.functions.append(f"{head} {{\n{body}\n}}")
 
     def _words(self, name: str, way: tuple[str, ...], texts: Mapping[float, str]) -> None:
@@ -244,21 +237,6 @@ class _Writer:
             if text
         )
         self.functions.append(f'{head} {{\n{choices}    return "";\n}}')
-
-    def _tables(self, default: str) -> str:
-        """The gains as a constant, and the tables in them."""
-        tables, texts = [], []
-        for value, (name, kind) in zip(self.module.gains, members(self.kind), strict=True):
-            if not isinstance(value, np.ndarray):
-                texts.append(self.whole.constants.initial(value, kind))
-                continue
-            rows = ",\n    ".join(
-                ", ".join(number(float(x)) for x in row) for row in value.reshape(-1, value.shape[-1])
-            )
-            tables.append(f"static const double {name}[{value.size}] = {{\n    {rows},\n}};\n")
-            texts.append(f"{{(double *){name}, {{{', '.join(map(str, value.shape))}}}}}")
-        inner = ",\n    ".join(texts)
-        return "\n".join([*tables, f"const {self.gains} {default} = {{\n    {inner},\n}};"])
 
     def _header(self, default: str) -> str:
         guard = f"{self.module.name.upper()}_H"
@@ -280,7 +258,7 @@ class _Writer:
             "\n".join(f"#include <{one}.h>" for one in ("float", "math", "stddef", "string")),
             _IEEE,
             *self.whole.structs.definitions,
-            *self.whole.constants.definitions,
+            *self.whole.constants,
             *_one_copy(self.whole.definitions),
             table,
             *self.functions,

@@ -1,16 +1,19 @@
-/* Operators whose meaning in Python is not that of one in C, as Numba compiles them. */
+/* Operators whose meaning in Python is not that of one in C, as Numba compiles them; TYPE stands for any type. */
+
+/* A TYPE from the beginning of an array. */
+static const TYPE *read_TYPE(array1 a, TYPE *to) {
+    memcpy(to, a.at, sizeof(TYPE));
+    return to;
+}
+
+/* A TYPE to the beginning of an array. */
+static void write_TYPE(array1 a, const TYPE *v) { memcpy(a.at, v, sizeof(TYPE)); }
 
 /* The larger of two, as Python's max: the first where they are equal or not comparable. */
-static double larger(double a, double b) { return b > a ? b : a; }
+static TYPE larger(TYPE a, TYPE b) { return b > a ? b : a; }
 
 /* The smaller of two, as Python's min. */
-static double smaller(double a, double b) { return b < a ? b : a; }
-
-/* The larger of two, as Python's max: the first where they are equal or not comparable. */
-static int64_t larger(int64_t a, int64_t b) { return b > a ? b : a; }
-
-/* The smaller of two, as Python's min. */
-static int64_t smaller(int64_t a, int64_t b) { return b < a ? b : a; }
+static TYPE smaller(TYPE a, TYPE b) { return b < a ? b : a; }
 
 /* x ** 2. */
 static double square(double x) { return x * x; }

@@ -10,6 +10,7 @@ import re
 import sys
 import tokenize
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,7 +18,7 @@ import palpate
 from palpate.errors import InputError
 
 _DIRECTIVE = re.compile(r"#\s*(fmt|noqa|type|ruff|mypy)\b")
-_ARGUMENT = re.compile(r"^ {4}(\w+(?:, \w+)*): (.*)")
+_ARGUMENT = re.compile(r"^ {4}(\w+(?:, \w+)*): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 class OutsideSubset(InputError):
@@ -30,16 +31,13 @@ def refuse(function: Callable[..., Any], node: ast.AST, fault: str, remedy: str)
     Raises:
         OutsideSubset: always.
     """
-    code = function.__code__
-    line = getattr(node, "lineno", code.co_firstlineno)
-    raise OutsideSubset(
-        f"{_short(code.co_filename)}:{line}: {function.__name__}: {fault} has no C here; {remedy}"
-    )
+    place = place_of(function, getattr(node, "lineno", 0))
+    raise OutsideSubset(f"{place}: {function.__name__}: {fault} has no C here; {remedy}")
 
 
-def place_of(function: Callable[..., Any]) -> str:
-    """File and line of a function, from the package's folder on."""
-    return f"{_short(function.__code__.co_filename)}:{function.__code__.co_firstlineno}"
+def place_of(function: Callable[..., Any], line: int = 0) -> str:
+    """File and line of a function, from the package's folder on; or another line of it."""
+    return f"{_short(function.__code__.co_filename)}:{line or function.__code__.co_firstlineno}"
 
 
 def _short(file: str) -> str:
@@ -57,50 +55,46 @@ def syntax_of(function: Callable[..., Any]) -> ast.FunctionDef | ast.Lambda:
     code = function.__code__
     names = list(code.co_varnames[: code.co_argcount])
     for node in ast.walk(_tree(code.co_filename)):
-        if (
-            isinstance(node, ast.FunctionDef | ast.Lambda)
-            and min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", ()))])
-            == code.co_firstlineno
-            and [argument.arg for argument in node.args.args] == names
-        ):
-            return node
+        if isinstance(node, ast.FunctionDef | ast.Lambda) and names == [one.arg for one in node.args.args]:
+            lines = [node.lineno, *(one.lineno for one in getattr(node, "decorator_list", ()))]
+            if min(lines) == code.co_firstlineno:
+                return node
     raise OutsideSubset(f"{code.co_filename}: no source of {function.__name__}; keep the law in a file")
 
 
 @functools.cache
 def _tree(file: str) -> ast.Module:
-    try:
-        return ast.parse(Path(file).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise OutsideSubset(f"{file} cannot be read; keep the law in a file") from error
+    return ast.parse(Path(file).read_text(encoding="utf-8"))
 
 
 @functools.cache
 def comments_of(file: str) -> dict[int, str]:
     """Comments of a file by their line, without those that are meant for tools."""
-    text = Path(file).read_text(encoding="utf-8")
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    return {
-        token.start[0]: token.string.lstrip("# ")
-        for token in tokens
-        if token.type == tokenize.COMMENT and not _DIRECTIVE.match(token.string)
-    }
+    tokens = tokenize.generate_tokens(io.StringIO(Path(file).read_text(encoding="utf-8")).readline)
+    comments = ((one.start[0], one.string) for one in tokens if one.type == tokenize.COMMENT)
+    return {line: text.lstrip("# ") for line, text in comments if not _DIRECTIVE.match(text)}
 
 
 @functools.cache
 def constant_notes(file: str) -> dict[str, str]:
     """First sentence below each constant of a module, by the constant's name; one below several counts for none."""
-    notes = {}
-    for before, node in zip(_tree(file).body, _tree(file).body[1:], strict=False):
-        if (
-            isinstance(before, ast.Assign)
-            and isinstance(node, ast.Expr)
-            and isinstance(node.value, ast.Constant)
-        ):
-            target = before.targets[0]
-            if isinstance(target, ast.Name):
-                notes[target.id] = first_sentence(str(node.value.value))
-    return notes
+    return {
+        before.targets[0].id: first_sentence(str(node.value.value))
+        for before, node in pairwise(_tree(file).body)
+        if isinstance(before, ast.Assign)
+        and isinstance(before.targets[0], ast.Name)
+        and isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+    }
+
+
+def home_of(name: str, value: Any, function: Callable[..., Any]) -> tuple[str, str]:
+    """The module of ours that says what a constant is, and the sentence; or the function's."""
+    for module in [one for one in list(sys.modules.values()) if one.__name__.startswith("palpate")]:
+        note = constant_notes(str(module.__file__)).get(name) if vars(module).get(name) is value else None
+        if note:
+            return module.__name__, note
+    return function.__module__, ""
 
 
 def first_sentence(text: str) -> str:
@@ -110,25 +104,14 @@ def first_sentence(text: str) -> str:
 
 def field_notes(cls: type) -> dict[str, str]:
     """Meaning and unit of each field, as a part's class has them: in `Args:` or in the comment beside it."""
-    notes: dict[str, str] = {}
-    names: list[str] = []
-    for line in (inspect.getdoc(cls) or "").split("\n"):
-        begins = _ARGUMENT.match(line)
-        if begins:
-            names = begins[1].split(", ")
-            notes.update(dict.fromkeys(names, begins[2]))
-        elif line.startswith(" " * 8):
-            notes.update({name: f"{notes[name]} {line.strip()}" for name in names})
-        else:
-            names = []
-    try:
-        file = inspect.getsourcefile(cls)
-        lines, start = inspect.getsourcelines(cls)
-    except (OSError, TypeError):
-        return notes
+    notes = {
+        name: first_sentence(note)
+        for names, note in _ARGUMENT.findall(inspect.getdoc(cls) or "")
+        for name in names.split(", ")
+    }
+    comments = comments_of(str(inspect.getsourcefile(cls)))
+    lines, start = inspect.getsourcelines(cls)
     for number, line in enumerate(lines, start):
-        field = re.match(r"    (\w+): ", line)
-        comment = comments_of(str(file)).get(number)
-        if field and comment:
-            notes[field[1]] = comment
-    return {name: first_sentence(note) for name, note in notes.items()}
+        if number in comments and (field := re.match(r"    (\w+): ", line)):
+            notes[field[1]] = first_sentence(comments[number])
+    return notes

@@ -6,36 +6,21 @@ import inspect
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from palpate._jit.typing_rules import TypingRules
-from palpate_native.constants import Constants
-from palpate_native.source import place_of, refuse, syntax_of
+from palpate_native.source import home_of, place_of, refuse
 from palpate_native.statements import FunctionBody
-from palpate_native.structs import Structs, by_pointer, c_name, is_struct, members, plain
+from palpate_native.structs import Structs, c_name, initial, plain
 
-_OPERATOR = re.compile(r"/\* (?P<says>.*) \*/\nstatic (?P<of>\w+) (?P<name>\w+)(?P<body>(?:.+\n)+)")
+_OPERATOR = re.compile(r"/\* .* \*/\nstatic (?:const )?(\w+) \*?(\w+)\((?:.+\n)+")
 OPERATORS = {
-    (found["name"], found["of"]): found
+    (found[2], found[1]): found[0].rstrip()
     for found in _OPERATOR.finditer(Path(__file__).with_name("operators.c").read_text(encoding="utf-8"))
 }
-"""Operators whose meaning in Python is not that of one in C: a function in C for each and each type of its value."""
-
-
-class Translated(NamedTuple):
-    """A function in C.
-
-    Args:
-        name: of it.
-        result: Numba's type of its value.
-        writes: whether it writes to an array that it is given.
-    """
-
-    name: str
-    result: Any
-    writes: bool
+"""Functions in C for operators of Python that C has not, by name and type of the value; TYPE stands for any."""
 
 
 class Translation:
@@ -53,14 +38,15 @@ class Translation:
         self.real, self.integer = types.float64, types.int64
         self.boolean, self.none = types.boolean, types.none
         self.kinds = {bool: self.boolean, int: self.integer, float: self.real, np.float64: self.real}
-        self.structs = Structs(prefix)
-        self._claimed: set[str] = set()
-        self.constants = Constants(self.structs, self._claim)
-        self._functions: dict[Any, Translated | None] = {}
+        self._taken: set[str] = set()
+        self.structs = Structs(prefix, self._claim)
+        self._constants: dict[str, str] = {}
+        self._functions: dict[Any, FunctionBody] = {}
         self._helpers: dict[tuple[str, str], str] = {}
+        self.constants: list[str] = []
         self.definitions: list[str] = []
 
-    def function(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> Translated:
+    def function(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> FunctionBody:
         """The C function of a law or a method given arguments of such types.
 
         Raises:
@@ -68,75 +54,49 @@ class Translation:
         """
         key = (function, tuple(plain(kind) for kind in kinds))
         if key not in self._functions:
-            self._functions[key] = None
-            self._functions[key] = self._translate(*key)
-        known = self._functions[key]
-        if known is None:
-            refuse(function, syntax_of(function), "a function that calls itself", "write a loop")
-        return known
-
-    def _translate(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> Translated:
-        result = plain(self.rules.result(function, kinds))
-        body = FunctionBody(self, function, kinds, result)
-        try:
-            names = [self.structs.name(kind) for kind in (*kinds, result)]
-            part = function.__qualname__.rpartition(".")[0].rpartition(".")[2]
-            method = part and "<locals>" not in function.__qualname__
-            own = c_name(f"{part}_{function.__name__.strip('_')}" if method else function.__name__)
-            beside = next(
-                (name for name, kind in zip(names, kinds, strict=False) if is_struct(kind)), "again"
-            )
-            own = self._claim(own, beside)
-            text = body.text(own)
-        except KeyError as error:
-            remedy = "use numbers, truths, parts, float arrays"
-            refuse(function, body.tree, f"a value of type {error.args[0]}", remedy)
-        says = [*_docstring(function), place_of(function)]
-        comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
-        self.definitions.append(f"/* {comment} */\n{text}")
-        return Translated(own, result, body.writes)
+            body = self._functions[key] = FunctionBody(self, *key, plain(self.rules.result(*key)))
+            try:
+                names = [self.structs.name(kind) for kind in (*key[1], body.result)]
+                name = re.sub(r"\._*(\w*?)_*$", r"_\1", function.__qualname__.rpartition("<locals>.")[2])
+                body.name = self._claim(c_name(name), names[0])
+                text = body.text()
+            except KeyError as error:
+                fault, remedy = f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays"
+                refuse(function, body.tree, fault, remedy)
+            says = [*_docstring(function), place_of(function)]
+            comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
+            self.definitions.append(f"/* {comment} */\n{text}")
+        return self._functions[key]
 
     def helper(self, name: str, kind: Any) -> str:
-        """The name of a function that stands for one of Python's operators."""
-        key = (name, self.structs.name(kind))
-        if key not in self._helpers:
-            own, found = self._claim(name, f"of_{key[1].removesuffix('_t')}"), OPERATORS[key]
-            self._helpers[key] = own
-            self.definitions.append(f"/* {found['says']} */\nstatic {key[1]} {own}{found['body'].rstrip()}")
-        return self._helpers[key]
-
-    def storage(self, kind: Any, reads: bool) -> str:
-        """The name of a function that reads a part from the beginning of an array, or writes it there."""
+        """The name of a function of `operators.c` for values of a type."""
         of = self.structs.name(kind)
-        key = (of, "read" if reads else "write")
-        if key not in self._helpers:
-            own = self._helpers[key] = self._claim(f"{'read' if reads else 'write'}_{of}", "again")
-            says = f"A {of} {'from' if reads else 'to'} the beginning of an array."
-            given, to, source = (f"{of} *to", "to", "a.at") if reads else (f"const {of} *v", "a.at", "v")
-            body = f"    memcpy({to}, {source}, sizeof({of}));\n" + ("    return to;\n" if reads else "")
-            kind_in_c = f"const {of} *" if reads else "void "
-            self.definitions.append(f"/* {says} */\nstatic {kind_in_c}{own}(array1 a, {given}) {{\n{body}}}")
-        return self._helpers[key]
+        if (name, of) not in self._helpers:
+            text = next(OPERATORS[name, one] for one in (of, "TYPE", "void") if (name, one) in OPERATORS)
+            own = self._claim(name.replace("TYPE", of), f"of_{of.removesuffix('_t')}")
+            self.definitions.append(text.replace(f"{name}(", f"{own}(", 1).replace("TYPE", of))
+            self._helpers[name, of] = own
+        return self._helpers[name, of]
 
-    def selector(self, kind: Any) -> str:
-        """The name of a function that gives a field of a struct by its place."""
-        of, inner = self.structs.name(kind), self.structs.name(members(kind)[0][1])
-        if ("at", of) not in self._helpers:
-            own = self._helpers["at", of] = self._claim(f"{of}_at", "again")
-            dot, given = ("->", f"const {of} *v") if by_pointer(kind) else (".", f"{of} v")
-            *first, last = (f"v{dot}{field}" for field, _ in members(kind))
-            choices = "".join(f"i == {k} ? {field} : " for k, field in enumerate(first))
-            self.definitions.append(
-                f"static {inner} {own}({given}, int64_t i) {{\n    return {choices}{last};\n}}"
-            )
-        return self._helpers["at", of]
+    def constant(self, name: str, value: Any, function: Callable[..., Any]) -> tuple[str, Any]:
+        """The C name and the type of a number, a part, or a table of numbers that laws' modules name."""
+        import numba
 
-    def _claim(self, name: str, beside: str) -> str:
+        table = not hasattr(value, "_fields") and np.ndim(value) > 0
+        kind = plain(numba.typeof(np.array(value, float) if table else value))
+        text = f"{self.structs.name(kind)} {name} = {initial(value, kind)};"
+        if text not in self._constants:
+            module, note = home_of(name, value, function)
+            own = self._constants[text] = self._claim(c_name(name), module.rpartition(".")[2])
+            says = f"/* {note} */\n" if note else ""
+            self.constants.append(f"{says}static const {text.replace(f' {name}', f' {own}', 1)}")
+        return self._constants[text], kind
+
+    def _claim(self, name: str, beside: str = "again") -> str:
         """A name that nothing else of the file has: the name, that with another beside it, or with a number."""
         choices = (name, f"{name}_{beside}", *(f"{name}_{beside}{k}" for k in range(2, 999)))
-        taken = {*self._claimed, *self.structs.names_in_use}
-        own = next(choice for choice in choices if choice not in taken)
-        self._claimed.add(own)
+        own = next(choice for choice in choices if choice not in self._taken)
+        self._taken.add(own)
         return own
 
 

@@ -346,7 +346,10 @@ def test_the_operators_of_python_are_those_of_c(tmp_path):
     compiled = {"modulo": remainder, "floored": quotient, "larger": larger, "smaller": smaller}
     cases = [(name, a, b) for name in compiled for a in values for b in values]
     calls = "".join(f'    printf("%a\\n", {name}({spelled(a)}, {spelled(b)}));\n' for name, a, b in cases)
-    functions = "".join(OPERATORS[name, "double"].group() for name in compiled)
+    functions = "".join(
+        (OPERATORS.get((name, "double")) or OPERATORS[name, "TYPE"]).replace("TYPE", "double") + "\n"
+        for name in compiled
+    )
     headers = "#include <math.h>\n#include <stdint.h>\n#include <stdio.h>\n"
     text = f"{headers}{functions}int main(void) {{\n{calls}    return 0;\n}}\n"
     (tmp_path / "operators.c").write_text(text)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli.options.common import WRITTEN, FigureOptions
-from palpate.cli.toolkit import COMPILING, bar, console, place, print_lines, say, show_table
+from palpate.cli.toolkit import COMPILING, bar, console, option_of, place, print_lines, say, show_table
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
+EXPERIMENTS = ("4.2", "4.4", "6.")
+"""Beginnings of the numbers of the figures that show the thesis' own experiments."""
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
 
@@ -66,9 +68,8 @@ def thesis(
         Replace an existing measurement.
     """
     from palpate_thesis.figure import studies
-    from palpate_thesis.laboratory.laboratory import load_laboratory
     from palpate_thesis.measure import MeasurementFormat
-    from palpate_thesis.runs import Runs
+    from palpate_thesis.runs import HandChosen, Runs
 
     if list_:
         everything = studies()
@@ -78,7 +79,7 @@ def thesis(
         return 0
     drawn = drawn or FigureOptions()
     drawn.check()
-    lab = load_laboratory(laboratory)
+    lab = HandChosen() if laboratory == "bench" else option_of("laboratory", "laboratory")(laboratory)
     chosen = _studies_to_measure(figure, laboratory, in_all=lab.chosen)
     parts = ["thesis", figure, None if lab.chosen else Path(laboratory).stem]
     folder = out if out is not None else Path("runs") / "-".join(part for part in parts if part)
@@ -96,7 +97,6 @@ def thesis(
 def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[FigureModule]:
     """The figures to measure: all, or one; in another laboratory those that it was inferred from."""
     from palpate_thesis.figure import studies, study
-    from palpate_thesis.laboratory.laboratory import EXPERIMENTS
 
     if in_all:
         return studies() if figure is None else [study(figure)]

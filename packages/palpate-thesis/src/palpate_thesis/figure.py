@@ -64,7 +64,8 @@ def study(number: str) -> FigureModule:
 
 def _of(package: ModuleType) -> list[FigureModule]:
     """Each module of a package is a study, or has several as `STUDIES`."""
-    names = sorted(m.name for m in pkgutil.iter_modules(package.__path__))
+    found = (m.name for m in pkgutil.iter_modules(package.__path__))
+    names = sorted(found, key=lambda name: (len(name.partition("_")[0]), name))  # e9_... before e10_...
     modules = [import_module(f"{package.__name__}.{name}") for name in names]
     return [
         cast("FigureModule", study) for module in modules for study in getattr(module, "STUDIES", (module,))

@@ -18,7 +18,6 @@ from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis import look
 from palpate_thesis.claims import Done, ThesisClaim, rows_of
 from palpate_thesis.figure import FigureModule
-from palpate_thesis.laboratory.laboratory import values
 from palpate_thesis.page import index_page
 from palpate_thesis.runs import Runs
 
@@ -100,7 +99,7 @@ def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
     """A claim with a note that is true of the laboratory: those of the figures speak of the hand-chosen bench."""
     if runs.laboratory.chosen:
         return claim
-    told = ", ".join(f"{name} {value:.3g}" for name, value in values(runs.laboratory).items())
+    told = ", ".join(f"{name} {value:.3g}" for name, value in runs.laboratory.numbers().items())
     note = f"In this laboratory: {told}. The reason on the hand-chosen bench is in that measurement."
     return replace(claim, note=note)
 
@@ -110,7 +109,7 @@ def _state(studies: Sequence[FigureModule], runs: Runs, folder: Path, command: s
     sources = sources_stamp(*sorted(Path(__file__).parent.rglob("*.py")))
     stamp = f"{sources} seeds {list(runs.seeds)}"
     if not runs.laboratory.chosen:
-        stamp += f" laboratory {values(runs.laboratory)}"
+        stamp += f" laboratory {runs.laboratory.numbers()}"
     if not (folder / STATE).exists():
         return FolderState(stamp, wanted, command)
     old = _read_state(folder)

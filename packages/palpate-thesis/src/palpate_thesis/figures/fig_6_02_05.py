@@ -14,7 +14,6 @@ from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
-from palpate_thesis.laboratory.laboratory import own_damping
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.look import Axes, Figure
@@ -57,7 +56,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
             for name, e in list(surfaces.items())[:vary]
         },
         ratios={key: np.array([one[key] for one in each]) for key in "KBM"},
-        truth={"M": surface["mass"], "B": own_damping(surface), "K": surface["stiffness"]},
+        truth={"M": surface["mass"], "B": press_runs.own_damping(surface), "K": surface["stiffness"]},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall
-from palpate_thesis.laboratory.laboratory import own_damping
 from palpate_thesis.runs import Runs
 
 PRESS = 8.0
@@ -21,6 +21,12 @@ FIRST = 4.0
 """Length of the figures' first slot [s]."""
 SLOT = (6.0, 8.0)
 """Chosen: "some time after" the first slot [s]."""
+
+
+def own_damping(surface: Mapping[str, Any]) -> float:
+    """A surface's own B [N s/m]: at 20 N where it grows with the depth; of one that relaxes, its dashpot's."""
+    damping = float(surface["damping"])
+    return damping * 20.0 / float(surface["stiffness"]) if surface["kind"] == "hunt-crossley" else damping
 
 
 def nearer(experiment: Experiment) -> Experiment:

@@ -13,22 +13,18 @@ from palpate.controllers.neural import NeuralController
 from palpate.environments import KelvinVoigtSurface
 from palpate.errors import InputError, unknown
 from palpate.files import read_toml
-from palpate_thesis.laboratory.unknowns import BY_NAME, LINEAR, LISTING, RELAXING, STIFFENING, UNKNOWNS
+from palpate_laboratory.unknowns import BY_NAME, LINEAR, LISTING, RELAXING, STIFFENING, UNKNOWNS
 
-BENCH = "bench"
-"""The name of the hand-chosen laboratory."""
-FILES = TomlFiles("laboratory", "a", "palpate_thesis.laboratory", ("shipped",))
+FILES = TomlFiles("laboratory", "a", "palpate_laboratory", ("shipped",))
 KEYS = {"about", "command", "seed", "unknowns"}
 
 
 def load_laboratory(name: str) -> Laboratory:
-    """A laboratory by its name, "bench" or "inferred", or from a TOML file.
+    """A laboratory by its name, "inferred", or from a TOML file.
 
     Raises:
         InputError: no such laboratory or file, TOML that does not parse, an unknown key, a value out of range.
     """
-    if name == BENCH:
-        return CHOSEN
     tables = read_toml(FILES.source(name), name)
     strange = sorted(set(tables) - KEYS)
     if strange:
@@ -50,7 +46,7 @@ def text(laboratory: Laboratory, about: str, command: str, seed: int) -> str:
         "",
         "[unknowns]",
     ]
-    lines += [f"{name} = {value!r}" for name, value in values(laboratory).items()]
+    lines += [f"{name} = {value!r}" for name, value in laboratory.numbers().items()]
     return "\n".join(lines) + "\n"
 
 
@@ -111,12 +107,6 @@ def stiffening(secant: float, damping: float, mass: float, exponent: float) -> d
     }
 
 
-def own_damping(surface: Mapping[str, Any]) -> float:
-    """A surface's own B [N s/m]: at 20 N where it grows with the depth; of one that relaxes, its dashpot's."""
-    damping = float(surface["damping"])
-    return damping * DESIRED / float(surface["stiffness"]) if surface["kind"] == "hunt-crossley" else damping
-
-
 BENCH_NOISE, BENCH_WALL, BENCH_STICKING, BENCH_MOTOR2 = 0.6, 0.465, 0.7, 2.5
 BENCH_STICTION, BENCH_COVARIANCE = 1.2, 1e10
 BENCH_RUBBER = (34500.0, 480.0, 0.05)
@@ -166,6 +156,10 @@ class Laboratory:
     def chosen(self) -> bool:
         """Whether it is the hand-chosen bench."""
         return self == CHOSEN
+
+    def numbers(self) -> dict[str, float]:
+        """Its values by name, without those that are not set."""
+        return {k: v for k, v in asdict(self).items() if v is not None and math.isfinite(v)}
 
     def of(self, experiment: Experiment) -> Experiment:
         """The experiment as this laboratory would have run it."""
@@ -263,8 +257,6 @@ class Laboratory:
         }
 
 
-EXPERIMENTS = ("4.2", "4.4", "6.")
-"""Beginnings of the numbers of the figures that show the thesis' own experiments."""
 CHOSEN = Laboratory()
 NAMES = tuple(field.name for field in fields(Laboratory))
 
@@ -290,8 +282,3 @@ def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
             told = f"one of {list(of.choices)}" if of.choices else f"between {of.low:g} and {of.high:g}"
             raise InputError(f"{where}: {name} must be {told} {of.unit}".rstrip() + f", got {value:g}")
     return Laboratory(**{name: float(value) for name, value in values.items()})
-
-
-def values(laboratory: Laboratory) -> dict[str, float]:
-    """Its values by name, without those that are not set."""
-    return {k: v for k, v in asdict(laboratory).items() if v is not None and math.isfinite(v)}

@@ -67,6 +67,6 @@ def _unknown(name: str, row: Mapping[str, Any]) -> Unknown:
     return Unknown(name, row.get("unit", ""), row["prior"], low, high, row["reason"], choices)
 
 
-_ROWS = tomllib.loads((resources.files("palpate_thesis.laboratory") / "unknowns.toml").read_text("utf-8"))
+_ROWS = tomllib.loads((resources.files("palpate_laboratory") / "unknowns.toml").read_text("utf-8"))
 UNKNOWNS = tuple(_unknown(name, row) for name, row in _ROWS.items())
 BY_NAME = {unknown.name: unknown for unknown in UNKNOWNS}

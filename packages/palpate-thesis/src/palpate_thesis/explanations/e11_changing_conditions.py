@@ -1,0 +1,160 @@
+"""Explanation 11: conditions that change: friction with the configuration, a surface with its temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench import Experiment, build, changed
+from palpate.identification.pooling import Mean, random_effects
+from palpate.identification.uncertainty import student
+from palpate.report import style
+from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.conditions import by_condition, move_wall
+from palpate_thesis.configuration import FrictionByConfiguration, tilting
+from palpate_thesis.explanations.e6_friction_compensation import PARAMETERS as COMPENSATED
+from palpate_thesis.explanations.e6_friction_compensation import PLAIN, held_in
+from palpate_thesis.force_control.panels import panels
+from palpate_thesis.least_squares.press_runs import PLAIN as IDENTIFIED
+from palpate_thesis.look import Figure
+from palpate_thesis.runs import Runs
+
+NUMBER = "changing-conditions"
+TITLE, CAPTION = texts(NUMBER)
+PARAMETERS = changed(COMPENSATED, {"force.first": 15.0})
+WALLS = (0.40, 0.43, 0.465, 0.49)
+"""x of the surface [m]; friction is as chosen for the third."""
+MORE = 1.25
+"""Least ratio of two errors that counts as a difference."""
+SOFTENING, MIDDLE = -0.005, 22.5
+"""Chosen: change of the foam's stiffness [1/K] about a temperature [C]."""
+TEMPERATURES = np.linspace(10.0, 35.0, 10)
+"""One for each press [C]."""
+
+
+def errors(experiment: Experiment, seed: int) -> tuple[float, float]:
+    """Force error in the last second [N] with constant friction, and with one that depends on the configuration."""
+    bench = build(experiment)
+    arm, plant = bench.loop.conditioning.arm, bench.loop.plant
+    reference = tilting(arm, build(PARAMETERS).q)
+    friction: Any = FrictionByConfiguration(plant.friction, arm, reference, bench.q)
+    other = replace(bench, loop=bench.loop._replace(plant=plant._replace(friction=friction)))
+    constant, dependent = (
+        held_in(one.run(experiment.run.duration, seed, press=experiment.run.press)).error
+        for one in (bench, other)
+    )
+    return constant, dependent
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured values for `check` and `plot`."""
+
+    levels: Array  # friction of the joints over that of the start, shape (walls, 3)
+    plain: dict[str, list[tuple[float, float]]]  # by wall, without compensation
+    compensated: dict[str, list[tuple[float, float]]]
+    stiffness: Array  # shape (temperatures,) [N/m]
+    deviation: Array  # of each [N/m]
+
+
+def run(runs: Runs) -> Data:
+    """Presses at each wall with both frictions, and a press at each temperature."""
+    walls = [changed(PARAMETERS, move_wall(PARAMETERS, x)) for x in WALLS]
+    arm = build(PARAMETERS).loop.conditioning.arm
+    moments = np.array([list(tilting(arm, build(wall).q)) for wall in walls])
+    plain, compensated = (
+        by_condition(
+            runs,
+            {f"{x:g}": changed(wall, change) for x, wall in zip(WALLS, walls, strict=True)},
+            errors,
+            [f"{x:g}" for x in WALLS],
+        )
+        for change in ({"compensation.level": PLAIN.compensation.level}, {})
+    )
+    presses = [
+        changed(IDENTIFIED, {"surface.stiffness": stiffness_at(t), "run.press": 4.0}) for t in TEMPERATURES
+    ]
+    cases = [(press, runs.seeds[i % len(runs.seeds)]) for i, press in enumerate(presses)]
+    ends = np.array(runs.over(cases, lambda r: (r["K_matched"][-1], r["K_matched_std"][-1])))
+    return Data(moments / moments[2], plain, compensated, ends[:, 0], ends[:, 1])
+
+
+def stiffness_at(temperature: float) -> float:
+    """Of the foam, as chosen [N/m]."""
+    return IDENTIFIED.surface.stiffness * (1.0 + SOFTENING * (float(temperature) - MIDDLE))
+
+
+def pool_presses(data: Data, covariate: bool) -> Mean:
+    """Stiffness of all presses, with the temperature as a covariate or without."""
+    return random_effects(data.stiffness, data.deviation**2, TEMPERATURES[:, None] if covariate else None)
+
+
+def check(data: Data) -> Sequence[ThesisClaim]:
+    """Friction at the joints, friction at the tip, a compensation of it, and the temperature."""
+    at = {name: np.array(found) for name, found in data.plain.items()}
+    known = {name: np.array(found) for name, found in data.compensated.items()}
+    last, start = f"{WALLS[-1]:g}", f"{WALLS[2]:g}"
+    worse = {name: found[:, 1] / found[:, 0] for name, found in known.items()}
+    own, alone = pool_presses(data, True), pool_presses(data, False)
+    slope, std = own.slopes[0]
+    return [
+        claim(
+            "changing-conditions.compensation",
+            any(often(worse[name] >= MORE) for name in worse),
+            levels="; ".join(
+                f"{x:g} m: {100 * v[0]:.0f}, {100 * v[1]:.0f} %"
+                for x, v in zip(WALLS, data.levels, strict=True)
+            ),
+            errors="; ".join(f"{name} m: {np.median(v[:, 1]):.2f} N" for name, v in known.items()),
+            ratios="; ".join(f"{name} m: {np.median(v):.2f}" for name, v in worse.items()),
+            more=MORE,
+        ),
+        claim(
+            "changing-conditions.tip",
+            often(at[last][:, 1] / at[start][:, 1] >= MORE),
+            near=list(at[f"{WALLS[0]:g}"][:, 1]),
+            middle=list(at[start][:, 1]),
+            far=list(at[last][:, 1]),
+            more=MORE,
+        ),
+        claim(
+            "changing-conditions.temperature",
+            "not checkable",
+            slope=f"{slope:.1f} ± {student(own.freedom) * std:.1f}",
+            true=f"{SOFTENING * IDENTIFIED.surface.stiffness:.1f}",
+            alone=f"{alone.between:.0f}",
+            left=f"{own.between:.0f}",
+            share=100 * SOFTENING,
+            presses=len(TEMPERATURES),
+        ),
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """Errors over the configuration, and stiffness over the temperature."""
+    drawing, ((force, stiffness),) = panels([3.0], 2, 11.0)
+    for (label, found), color in zip(
+        {"no compensation": data.plain, "compensated": data.compensated}.items(),
+        style.SERIES[:2],
+        strict=True,
+    ):
+        middle = np.array([np.median(one, axis=0) for one in found.values()])
+        force.plot(WALLS, middle[:, 1], "o-", color=color, linewidth=1.2, markersize=4, label=label)
+        force.plot(WALLS, middle[:, 0], "--", color=color, linewidth=1.0)
+    force.set(xlabel="wall at [m]", ylabel="force error [N]", ylim=(0.0, None))
+    force.set_title("friction by configuration; dashed: constant")
+    force.legend()
+    own = pool_presses(data, True)
+    offsets = TEMPERATURES - TEMPERATURES.mean()
+    stiffness.errorbar(
+        TEMPERATURES, data.stiffness, 1.96 * data.deviation, fmt="o", color=style.K, markersize=4
+    )
+    stiffness.plot(TEMPERATURES, own.value + own.slopes[0][0] * offsets, color=style.K, linewidth=1.2)
+    stiffness.plot(TEMPERATURES, [stiffness_at(t) for t in TEMPERATURES], **style.KNOWN)
+    stiffness.set(xlabel="temperature [C]", ylabel="K [N/m]")
+    stiffness.set_title("pooled presses; dashed: as chosen")
+    return drawing
