@@ -319,6 +319,21 @@ def test_a_damaged_archive_is_one_line_and_a_strangers_is_not_touched(tmp_path):
     assert other.read_bytes() == before
 
 
+def test_a_search_knows_the_sources_of_the_figures_that_it_asks():
+    """Else one would be resumed after a figure had changed."""
+    files = search.sources()
+    assert all(path.is_file() for path in files)
+    names = {path.name for path in files}
+    assert {
+        "fig_6_11_17.py",
+        "tracking.py",
+        "press_runs.py",
+        "network.py",
+        "laboratory.py",
+        "trial.py",
+    } <= names
+
+
 def test_a_value_is_computed_once(tmp_path):
     values = iter([{"a": 1}, {"a": 2}])
     path = tmp_path / "judged.sqlite"

@@ -196,13 +196,15 @@ def borrow(
 @cache
 def stamp() -> str:
     """Hash of the sources that a trial consists of."""
-    here = Path(__file__).parent
+    return sources_stamp(*sources())
+
+
+def sources() -> list[Path]:
+    """The files that a trial consists of: parts of the figures, and what asks them."""
+    here, thesis = Path(__file__).parent, Path(palpate_thesis.__file__).parent
     of_figures = ("figures", "force_control", "least_squares", "neural_identifier")
-    there = Path(palpate_thesis.__file__).parent
-    files = [path for folder in of_figures for path in sorted((there / folder).rglob("*.py"))]
-    return sources_stamp(
-        *files, *(here / f"{name}.py" for name in ("trial", "sentences", "laboratory", "unknowns"))
-    )
+    files = [path for folder in of_figures for path in sorted((thesis / folder).rglob("*.py"))]
+    return [*files, *(here / f"{name}.py" for name in ("trial", "sentences", "laboratory", "unknowns"))]
 
 
 def attempt(job: Job, ids: Sequence[str], stopped: Callable[[], bool] = lambda: False) -> Tried:
