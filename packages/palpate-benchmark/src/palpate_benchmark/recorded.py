@@ -7,7 +7,6 @@ its mean over the loop's lag has, as palpate press says it; peaks, losses and ri
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,9 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import RECORD
 from palpate.logs import read_record
-from palpate.press.sequence import Plan, mean_over
+from palpate.press.sequence import Plan
 from palpate.records import Record
-from palpate_benchmark.metrics import ForceStep, RunMetrics, settling_time, step, touch
+from palpate_benchmark.metrics import ForceStep, RunMetrics, step, touch
 from palpate_benchmark.plan import ForcePlan
 from palpate_benchmark.simulated import ForceResult, OnSurface
 
@@ -80,8 +79,7 @@ def _run(record: Record, path: Path) -> RunMetrics:
     wanted = np.array([plan.force_at(s) for s in since[held]])
     first = since[held] < plan.seconds / 3.0
     lag = float(about.get("theta_s", 0.0))
-    met = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))
-    met = replace(met, settling=settling_time(mean_over(force[first], lag, 1.0 / rate), plan.force, rate))
+    met = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before), lag)
     steps = _steps(force, wanted, rate, lag)
     none = ForceStep(None, None, np.nan)
     down, up = ([s for s, lower in steps if lower is side] or [none] for side in (True, False))
@@ -90,14 +88,12 @@ def _run(record: Record, path: Path) -> RunMetrics:
 
 def _steps(force: Array, wanted: Array, rate: float, lag: float) -> list[tuple[ForceStep, bool]]:
     """Each step of the desired force, and whether it lowers the force."""
-    at, steps = np.flatnonzero(np.diff(wanted)) + 1, []
-    for i, end in zip(at, [*at[1:], len(wanted)], strict=True):
-        before, after = wanted[i - 1], wanted[i]
-        settling = settling_time(mean_over(force[i:end], lag, 1.0 / rate), after, rate)
-        steps.append(
-            (replace(step(force[i:end], before, after, rate), settling=settling), bool(after < before))
-        )
-    return steps
+    at = np.flatnonzero(np.diff(wanted)) + 1
+    ends = [*at[1:], len(wanted)]
+    return [
+        (step(force[i:end], wanted[i - 1], wanted[i], rate, lag), bool(wanted[i] < wanted[i - 1]))
+        for i, end in zip(at, ends, strict=True)
+    ]
 
 
 def _slowest(steps: list[ForceStep]) -> ForceStep:
