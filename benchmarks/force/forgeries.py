@@ -64,7 +64,7 @@ def random_claim(rng: np.random.Generator, gains: Gains) -> Claim:
     kinds = {
         "position": ("held", "one-sided", "adapting"),
         "torque": ("held", "adapting"),
-        "servo": ("held",),
+        "servo": ("held", "adapting"),
     }
     kind = rng.choice(kinds[gains.arm.kind])
     if kind == "one-sided":
@@ -146,11 +146,15 @@ def is_true(made: File, rng: np.random.Generator) -> bool:
         bound = claim.low * (claim.high / claim.low) ** rng.uniform() if claim.low else claim.high
         K = bound / (1.0 + time / gains.theta)
         gain = share * gains.gain
-        if claim.kind == "adapting":
+        used = gains.seen_cap
+        if claim.kind == "adapting" and gains.arm.kind == "servo":
+            used = bound / share
+            gain = gains.gain_at(used)
+        elif claim.kind == "adapting":
             gain = share * gains.alpha / gains.theta * (gains.compliance + 1.0 / bound)
         age = int(rng.integers(claim.ages[0], claim.ages[1] + 1))
         loop = SampledLoop(gains.arm, claim.jitter(gains))
-        law = law_for(gains.arm, gain, gains.seen_cap)
+        law = law_for(gains.arm, gain, used)
         if radius(loop.phi(K, time * K, law, loop.lines[0] - age)) >= 1.0:
             return False
     return True

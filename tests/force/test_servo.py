@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
+
+import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
+from force.gained import servo_gains
 from palpate.errors import InputError
-from palpate.force.arm import Arm, Sensor, ServoLoop, load_arm, parse_arm
-from palpate.force.arm import Limits as ArmLimits
+from palpate.force.arm import load_arm, parse_arm
 from palpate.force.boundary import radius
-from palpate.force.certifying import certify
+from palpate.force.certificate import FORM, Certificate
+from palpate.force.certifying import certify, proved_claim
+from palpate.force.claims import adapting_claims
 from palpate.force.gains import gains_for
 from palpate.force.guard import Guarded
 from palpate.force.inner_loop import identify_inner_loop
@@ -28,12 +33,7 @@ from palpate_slide.world import figures_of, simulate
 
 @pytest.fixture(scope="module")
 def gains():
-    arm = Arm(
-        title="a servo", rate=500.0, inner=ServoLoop(mass=6.6, stiffness=4800.0, damping=480.0, delay=0.008),
-        sensor=Sensor(low_pass="butterworth3:120", sampling=480.0, noise=0.1, full_scale=100.0),
-        limits=ArmLimits(speed=0.25, stiffness=2e5),
-    )  # fmt: skip
-    return gains_for(arm, 15.0)
+    return servo_gains()
 
 
 def test_a_tick_is_what_the_differential_equation_makes_of_it(gains):
@@ -64,7 +64,7 @@ def test_the_matrix_and_the_law_have_the_same_lead(gains):
 
 
 def test_it_is_proved_up_to_the_cap_by_both_checks_and_a_forgery_is_refused(gains, tmp_path):
-    proof = certify(gains)
+    proof = certify(gains, adapting=False)
     claim = proof.claims[0]
     assert (claim.kind, claim.high) == ("held", gains.cap)
     assert proof.check().holds
@@ -84,6 +84,55 @@ def test_no_surface_inside_grows(gains):
         total, time = np.exp(rng.uniform(np.log(200.0), np.log(2e5))), rng.uniform(0.0, gains.theta)
         K = total / (1.0 + time / gains.theta)
         assert radius(loop.phi(K, time * K, law)) < 1.0
+
+
+def adapting(gains, low, high):
+    """A certificate of the adapting law on some surfaces."""
+    asked = msgspec.structs.replace(adapting_claims(gains, low, 0.0)[0][0], high=high)
+    return Certificate(form=FORM, gains=gains, claims=(proved_claim(gains, asked),))
+
+
+def test_gain_and_lead_are_proved_to_adapt_by_both_checks_and_forgeries_are_refused(gains):
+    proof = adapting(gains, 1e5, 2e5)
+    assert proof.check().holds
+    file = json.loads(msgspec.json.encode(proof, enc_hook=float))
+    (claim,) = file["claims"]
+    assert claim["shares"] == [0.5, 1.5]
+    assert check(json.dumps(file)) == len(claim["cells"])
+    for key, value in (("shares", [0.5, 9.0]), ("ages", [0, 1]), ("low", 5e4)):
+        with pytest.raises(RefusedError):
+            check(json.dumps(file | {"claims": [claim | {key: value}]}))
+
+
+@pytest.mark.parametrize("K", [300.0, 3e3, 3e4, 2e5])
+def test_nothing_grows_while_gain_lead_and_age_go_anywhere_inside(gains, K):
+    """Words of a few letters, each repeated: what switching does at worst is the radius of their product."""
+    claim, rng = adapting_claims(gains, K, 0.0)[0][0], np.random.default_rng(4)
+    loop = SampledLoop(gains.arm)
+    bounds = np.geomspace(K / claim.shares[1], K / claim.shares[0], 7)
+    laws = [law_for(gains.arm, gains.gain_at(bound), bound) for bound in bounds]
+    letters = [loop.phi(K, 0.0, law, loss) for law in laws for loss in range(claim.ages[1] + 1)]
+    for _ in range(300):
+        word = np.eye(loop.size)
+        for i in rng.integers(len(letters), size=rng.integers(1, 5)):
+            word = np.linalg.matrix_power(letters[i], int(rng.integers(1, 80))) @ word
+        assert radius(word) < 1.0
+
+
+def test_between_the_cap_and_the_stiffness_of_a_soft_surface_a_switching_estimator_makes_the_loop_grow():
+    """Why the proof ends at twice K: the lead of a stiff surface and that of a soft one in turn, by a UR5e's servos."""
+    gains = servo_gains(mass=3.6681, stiffness=4951.5, damping=990.3)
+    arm, loop = gains.arm, SampledLoop(gains.arm)
+    soft, stiff = (loop.phi(300.0, 0.0, law_for(arm, gains.gain_at(k), k)) for k in (200.0, 2e5))
+    word = np.linalg.matrix_power(soft, 26) @ np.linalg.matrix_power(stiff, 140)
+    assert max(radius(soft), radius(stiff)) < 1.0 < radius(word)
+
+
+@pytest.mark.long
+def test_the_adapting_law_is_proved_on_all_surfaces(gains):
+    proof = certify(gains)
+    assert [claim.kind for claim in proof.claims] == ["held", "adapting"]
+    assert proof.check().holds
 
 
 @pytest.mark.parametrize("K", [1e3, 5e3, 4e4, 2e5])

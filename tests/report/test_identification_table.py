@@ -5,7 +5,7 @@ from dataclasses import replace
 from rich.console import Console
 
 from palpate.identification.causes import Code, Warn
-from palpate.report.identification.table import show
+from palpate.report.identification.details import show
 from palpate.report.identification.words import formatted, number, sentence
 from palpate.report.numbers import between
 from report.outcomes import OUTCOMES

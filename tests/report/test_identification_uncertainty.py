@@ -3,8 +3,8 @@
 import pytest
 from rich.console import Console
 
+from palpate.report.identification.details import budgets, correlation, show_budgets
 from palpate.report.identification.page import page
-from palpate.report.identification.uncertainty import correlation, show, tables
 from palpate.report.identification.words import Source
 from report.outcomes import OUTCOMES
 
@@ -12,13 +12,13 @@ from report.outcomes import OUTCOMES
 def printed(found, width=100):
     console = Console(width=width, force_terminal=False)
     with console.capture() as capture:
-        show(found, console)
+        show_budgets(found, console)
     return capture.get()
 
 
 def test_each_number_has_a_table_whose_totals_are_its_interval():
     found = OUTCOMES["identified"]()
-    own = list(tables(found))
+    own = list(budgets(found))
     numbers = [name for name, p in found.parameters.items() if p.value is not None]
     assert len(own) == 1 + len(numbers)
     text = printed(found)
@@ -35,11 +35,11 @@ def test_the_page_has_the_same_tables():
     found = OUTCOMES["identified"]()
     text = page(found, Source("press.csv"))
     assert "<h2>Uncertainty budget</h2>" in text
-    assert all(own.total in text for own in tables(found))
+    assert all(own.total in text for own in budgets(found))
 
 
 @pytest.mark.parametrize("outcome", ["no_contact", "volts"])
 def test_other_outcomes_print(outcome):
     text = printed(OUTCOMES[outcome]())
-    assert text.count("ν_eff = ") == len(list(tables(OUTCOMES[outcome]())))
+    assert text.count("ν_eff = ") == len(list(budgets(OUTCOMES[outcome]())))
     assert ("u_c" in text) == (outcome == "volts")

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from force.gained import gains_of
+from force.gained import gains_of, servo_gains
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import proved_claim
 from palpate.force.claims import adapting_claims, held_claim, one_sided_claim
@@ -74,10 +74,10 @@ def test_what_is_barely_positive_is_and_what_is_barely_not_is_not():
     assert not is_positive(unsure)
 
 
-@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize("name", ["ur5e", "fr3", "servo"])
 def test_both_have_the_same_matrices(name):
     """Each with its own: of a tick, and of the distance from the corners' hull."""
-    gains = gains_of(name)
+    gains = servo_gains() if name == "servo" else gains_of(name)
     claim = held_claim(gains, 1e4, 2e4, 0.01)
     adapting = adapting_claims(gains, 1e4, 0.01)[0][0]
     for wanted in (claim, adapting):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
@@ -13,14 +13,17 @@ from importlib import import_module
 from importlib.util import find_spec
 from inspect import getdoc
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import App, Group, Parameter
 
 from palpate.cli._help import PhraseFormatter
-from palpate.cli._terminal import print_json
+from palpate.cli._terminal import place, print_json, show_answer
 from palpate.cli.options.values import value_of
 from palpate.errors import InputError
+
+if TYPE_CHECKING:
+    from palpate.report.page import CommandAnswer
 
 TYPED: ContextVar[tuple[str, ...]] = ContextVar("TYPED", default=())
 """The words after the program's name, as they were typed."""
@@ -161,11 +164,11 @@ def program(asked: str = "") -> App:
         package = COMPANIONS[asked]
         raise InputError(f"{asked} is a command of {package}, which is not installed: pip install {package}")
     order = [name for names in GROUPS.values() for name in names]
-    for name, place in (own | added).items():
+    for name, function in (own | added).items():
         group = next((group for group, names in GROUPS.items() if name in names), _PROGRAM)
-        text = _describe(place) if name == asked else COMMANDS.get(name) or _first_line(place)
+        text = _describe(function) if name == asked else COMMANDS.get(name) or _first_line(function)
         key = order.index(name) if name in order else len(order)
-        app.command(place, name=name, help=text, sort_key=key, group=group)
+        app.command(function, name=name, help=text, sort_key=key, group=group)
     return app
 
 
@@ -184,6 +187,22 @@ def print_answer(found: Mapping[str, Any]) -> None:
     options = given_options()
     head = {"command": command(), "version": __version__, "options": _plain(options)}
     print_json({**head, **({} if "files" in found else {"files": _files(options)}), **found})
+
+
+def print_result(answer: CommandAnswer, *, json: bool, files: Iterable[tuple[str, object]] = ()) -> None:
+    """Print an answer as one JSON object, or as text with the written files.
+
+    Args:
+        answer: of the command.
+        json: whether a program asks.
+        files: the word before each path, and the path.
+    """
+    if json:
+        print_answer(answer.json)
+        return
+    screen = show_answer(answer)
+    for what, path in files:
+        place(screen, what, path)
 
 
 def given_options() -> dict[str, Any]:
@@ -220,4 +239,4 @@ def _plain(value: Any) -> Any:
         return {name: _plain(one) for name, one in value.items()}
     if isinstance(value, tuple | list):
         return [_plain(one) for one in value]
-    return str(value) if isinstance(value, Path) else value
+    return str(value) if isinstance(value, Path | str) else value

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from palpate.report.page import Table
+    from palpate.report.page import CommandAnswer, Table
 
 STYLE = "yellow"
 """Style of warnings."""
@@ -107,13 +107,13 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
     console.print()
 
 
-def show_answer(title: str, rest: str, tables: Iterable[Table], notes: Iterable[str]) -> Console:
-    """Print a title with its details, tables and warnings; returns the console for further output."""
+def show_answer(answer: CommandAnswer) -> Console:
+    """Print an answer: its title, sentence, tables and warnings; returns the console for further output."""
     screen = console()
-    head(screen, title, rest)
-    for table in tables:
+    head(screen, answer.title, answer.sentence)
+    for table in answer.tables:
         show_table(screen, table)
-    for note in notes:
+    for note in answer.notes:
         screen.print(note, style=STYLE, soft_wrap=True)
     return screen
 

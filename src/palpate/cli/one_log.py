@@ -102,7 +102,7 @@ class OneLog:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
+    if isinstance(value, Path | str):
         return str(value)
     return list(value) if isinstance(value, tuple) else value
 

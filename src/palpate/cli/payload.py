@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from cyclopts import Parameter
 
-from palpate.cli._program import print_answer
-from palpate.cli._terminal import place, show_answer
+from palpate.cli._program import print_result
 from palpate.cli.options.arm import FrameOptions
 from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import SIGNED, vector
+from palpate.cli.options.values import Point, si
 from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Weighed
-    from palpate.contact_frame.load_files import NumberOfLoad
+    pass
 
 
 _ENDINGS = (".toml", ".script", ".json", ".yaml")
@@ -36,13 +34,13 @@ class PayloadOutput(ReportOption, FileOptions):
     (Franka), .yaml (ROS 2)."""
     check: Path | None = None
     "A controller's load file, to be compared with the log. With --gravity-compensated the controller had it."
-    flange: Annotated[str | None, SIGNED] = None
+    flange: Point | None = None
     """The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z in
     m, or with :mm. In a .yaml the sensor."""
 
     def origin(self, torque_at: tuple[float, float, float]) -> tuple[float, float, float]:
         """The flange from the point that the torque is about, which is given from the pose's origin [m]."""
-        x, y, z = vector("flange", self.flange, "length") or (0.0, 0.0, 0.0)
+        x, y, z = si(self.flange) or (0.0, 0.0, 0.0)
         a, b, c = torque_at
         return x - a, y - b, z - c
 
@@ -86,6 +84,7 @@ def payload(
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
     from palpate.contact_frame import ContactFrame, compare, load_text, read_load, weigh
+    from palpate.report.payload import answer_of, page
 
     load = None if output.check is None else read_load(output.check)
     cell.save((source or LogOptions(), frame or FrameOptions()))
@@ -102,35 +101,11 @@ def payload(
         write_text(output.out, load_text(found, ending, start))
         written.append(output.out)
     if report is not None:
-        from palpate.report.payload import page
-
         write_text(report, page(found, log.name))
         written.append(report)
     rows = []
     if load is not None and found.payload is not None:
         rows = compare(found, load, start, compensated=contact.gravity_compensated)
-    _print(found, log, rows, written, output)
+    answer = answer_of(found, log.name, output.check, rows)
+    print_result(answer, json=output.json, files=[("written:", path) for path in written])
     return 0 if found.payload is not None and all(row.agrees for row in rows) else 1
-
-
-def _print(
-    found: Weighed, log: Path, rows: list[NumberOfLoad], written: list[Path], output: PayloadOutput
-) -> None:
-    check = output.check
-    if output.json:
-        answer = found.to_json() | {"check": None}
-        if check is not None:
-            numbers = [row._asdict() | {"agrees": row.agrees} for row in rows]
-            agrees = bool(rows) and all(row.agrees for row in rows)
-            answer["check"] = {"file": str(check), "agrees": agrees, "numbers": numbers}
-        print_answer(answer)
-        return
-    from palpate.report.payload import check_sentence, check_table, sentence, table
-
-    notes = [f"{note['code']}: {note['text']}" for note in found.notes]
-    said, tables = sentence(found), [table(found)]
-    if check is not None and rows:
-        said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
-    screen = show_answer(log.name, f": {said}", tables, notes)
-    for path in written:
-        place(screen, "written:", path)

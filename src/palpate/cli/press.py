@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _terminal
-from palpate.cli._program import command, option_of, print_answer
+from palpate.cli._program import command, option_of, print_result
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import console, place, show_answer
+from palpate.cli._terminal import console
 from palpate.cli.options.kept import CellOptions
 from palpate.cli.options.press import (
     AskOptions,
@@ -86,6 +86,7 @@ def press(
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.force_input import DONE, INTERRUPTED
     from palpate.press.prepare import prepare_press
+    from palpate.report.press import answer_of
 
     question, folder = simulated.question(asked), simulated.folder
     with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
@@ -94,7 +95,8 @@ def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int
         with _terminal.simulation_progress(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _write(record, pressing, fresh)
-    _show(pressing, summary, folder, json)
+    answer = answer_of(pressing.asked.arm.title, summary)
+    print_result(answer, json=json, files=[("report:", folder / "report.html")])
     if interrupted() or summary["end"] == INTERRUPTED:
         return interrupted.code
     return 0 if summary["end"] == DONE else 1
@@ -114,15 +116,3 @@ def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     if len(record):
         write_report(record, pressing.asked, summary, folder)
     return summary
-
-
-def _show(pressing: Pressing, summary: dict[str, Any], folder: Path, as_json: bool) -> None:
-    from palpate.report.press import notes, sentence, tables
-
-    if as_json:
-        print_answer(summary)
-        return
-    found = (summary["identified"] or {}).get("parameters", {})
-    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n{sentence(summary, found)}"
-    screen = show_answer(pressing.asked.arm.title, rest, tables(summary), notes(summary))
-    place(screen, "report:", folder / "report.html")

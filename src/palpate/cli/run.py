@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from palpate.cli._program import print_answer
+from palpate.cli._program import print_result
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import COMPILING, console, place, show_answer, simulation_progress
+from palpate.cli._terminal import COMPILING, console, simulation_progress
 from palpate.cli.options.common import (
     DRAWN,
     QUIET,
@@ -206,22 +206,11 @@ def _record(screen: Console, asked: _RunRequest, interrupted: Callable[[], bool]
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run.table import notes, sentence, tables
+    from palpate.report.run.figures import one_direction_tables
+    from palpate.report.run.table import answer_of, tables
 
-    summary = ran.summary
-    if as_json:
-        print_answer(summary)
-        return
-    if "loop" in ran.record.meta:
-        from palpate.report.run.figures import one_direction_tables
-
-        shown_tables = one_direction_tables(ran.record, summary)
-    else:
-        shown_tables = tables(summary, ran.found)
-    rest = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n{sentence(summary)}"
-    screen = show_answer(ran.title, rest, shown_tables, notes(summary))
+    summary, record = ran.summary, ran.record
+    shown = one_direction_tables(record, summary) if "loop" in record.meta else tables(summary, ran.found)
     report = folder / "report.html"
-    if report.exists():
-        place(screen, "report:", report)
-    else:
-        place(screen, "nothing to draw; the record is in", folder)
+    written = ("report:", report) if report.exists() else ("nothing to draw; the record is in", folder)
+    print_result(answer_of(ran.title, summary, shown), json=as_json, files=[written])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from palpate.cli._program import command, option_of, print_answer
+from palpate.cli._program import command, option_of, print_answer, print_result
 from palpate.cli._terminal import (
     COMPILING,
     STYLE,
@@ -14,7 +14,6 @@ from palpate.cli._terminal import (
     print_lines,
     progress_of_pieces,
     say,
-    show_answer,
     show_table,
 )
 
@@ -30,8 +29,8 @@ __all__ = [
     "place",
     "print_answer",
     "print_lines",
+    "print_result",
     "progress_of_pieces",
     "say",
-    "show_answer",
     "show_table",
 ]

@@ -18,6 +18,7 @@ from palpate.cli.options.force import (
     SurfaceOptions,
     TuningOutputOptions,
 )
+from palpate.cli.options.values import si
 from palpate.errors import InputError
 from palpate.files import write_text
 
@@ -78,10 +79,10 @@ def tune(
     theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
     told = tuned(
         one,
-        press.desired_force,
+        press.force.si,
         _surface_of(found, surface, columns),
-        cap=surface.cap,
-        peak=press.highest,
+        cap=si(surface.stiffness_cap),
+        peak=si(press.peak),
         surface_speed=surface.surface_speed,
         theta=None if theta is None else theta.high,
     )
@@ -96,11 +97,11 @@ def _surface_of(found: Path | None, surface: SurfaceOptions, columns: ColumnOpti
     from palpate.force import Known, known_from
     from palpate.from_log import log_identifier
 
-    highest = surface.highest_damping
+    highest = si(surface.damping_max)
     if found is not None and surface.stiffness is not None:
         raise InputError("give a file or --stiffness, not both")
     if surface.stiffness is not None:
-        return Known.of_range(surface.range, highest)
+        return Known.of_range(surface.stiffness.si, highest)
     if found is None:
         raise InputError(
             "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"

@@ -9,6 +9,7 @@ is bounded by its second derivatives.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Literal
@@ -75,6 +76,7 @@ class Prover:
         gains: g of a tick may be anything between these two [m/(s N)]; if `relative`, g theta K_eff(K + B/theta) may.
         younger: ticks by which a reading may be younger than the oldest, from tick to tick.
         bound: K_u where the gain is constant, on which a servo's lead depends [N/m].
+        at: the law of a servo at a K_u [N/m] within what `gains` then are: least and most (K + B/theta)/K_u of a tick.
         relative: see `gains`.
         fading: what may come near to nothing within a cell, "gain" or "surface"; empty if neither does.
         parts: into how many parts w^2 and 2 z w of an inner loop known to intervals are cut, each.
@@ -86,6 +88,7 @@ class Prover:
     gains: tuple[float, float]
     younger: int = 0
     bound: float = 0.0
+    at: Callable[[float], Law] | None = None
     relative: bool = False
     fading: Literal["", "gain", "surface"] = ""
     parts: int = 1
@@ -115,11 +118,14 @@ class Prover:
     def laws(self, box: Box) -> list[tuple[Law, int]]:
         """The extreme laws and readings within a box."""
         low, high = self.gains
+        losses = range(self.younger + 1) if self.relative else (box.loss,)
+        if self.at is not None:  # gain and lead fall with K_u, and the matrix is affine in each
+            ends = [self.at(bound) for bound in (box.low / high, box.high / low)]
+            return [(replace(a, gain=b.gain), loss) for a, b, loss in product(ends, ends, losses)]
         if self.relative:
             low, high = low * self._gain(box.high), high * self._gain(box.low)
         if self.fading == "gain":
             low, high = low / (1.0 + box.most / self.theta), high / (1.0 + box.least / self.theta)
-        losses = range(self.younger + 1) if self.relative else (box.loss,)
         lead = law_for(self.loop.arm, 0.0, self.bound)
         return [(replace(lead, gain=g), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
 

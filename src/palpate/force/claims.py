@@ -13,17 +13,18 @@ from palpate.force.arm import Table
 from palpate.force.cells import Box, Prover
 from palpate.force.cover import Cell
 from palpate.force.gains import Gains
-from palpate.force.sampled_loop import SampledLoop
+from palpate.force.sampled_loop import SampledLoop, law_for
 
 SHARES = {
     "position": ((0.05, (2.0, 1.5, 1.2), 0), (1e-4, (1.5, 1.2), 1)),
     "torque": ((0.05, (2.0, 1.5, 1.2), 0),),
-    "servo": (),
+    "servo": ((0.5, (1.5, 1.2), 0),),
 }
-"""g theta K_eff/alpha from and to which the adapting law is proved, the first upper end that can be; ticks by which its
-readings may be later than the jitter that is asked for.
+"""g theta K_eff/alpha, or of a servo (K + B/theta)/K_u, from and to which the adapting law is proved, the first upper
+end that can be; ticks by which its readings may be later than the jitter that is asked for.
 Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
-for the UR5e without jitter: hence two claims."""
+for the UR5e without jitter: hence two claims. Down to the cap, a servo's lead that goes to and fro between those of a
+stiff and of a soft surface makes the loop grow (tests/force/test_servo.py)."""
 FADED = 0.01
 """Share below which the gain of a claim counts as one that may fade."""
 GONE = 1e-4
@@ -58,7 +59,8 @@ class Claim(Table):
     `held`: with g held, every surface whose K + B/theta is within low ... high [N/m] and whose B/K is within
     least ... most [s] is pressed on stably. K and B may change within a cell from tick to tick. `adapting`: the same
     for every constant surface while g theta K_eff/alpha goes anywhere within the shares, from tick to tick; for a
-    position arm that holds for every stiffness, since only the product counts; the reading in use is of any age within
+    position arm that holds for every stiffness, since only the product counts; for a servo K_u goes anywhere within
+    K + B/theta over the shares, and gain and lead with it; the reading in use is of any age within
     `ages`, from tick to tick. The others are of readings of one age, the oldest. `one-sided`: as held, while K and B
     together go anywhere within low ... high, from tick to tick, as where contact is lost and found again.
     """
@@ -105,15 +107,16 @@ class Claim(Table):
         """Prover of the claim: the loops that have to contract."""
         own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
         loop = SampledLoop(gains.arm, self.jitter(gains), own)
-        unit = gains.alpha if self.kind == "adapting" else gains.gain
+        relative, servo = self.kind == "adapting", gains.arm.kind == "servo"
+        unit = (1.0 if servo else gains.alpha) if relative else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
         younger = self.ages[1] - self.ages[0] + gains.arm.unsure_ticks
         fading: Literal["", "gain", "surface"] = "surface" if self.kind == "one-sided" else ""
         if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
             fading = "gain"
-        relative = self.kind == "adapting"
         return Prover(
             loop, gains.theta, ends, younger, bound=gains.seen_cap,
+            at=(lambda bound: law_for(gains.arm, gains.gain_at(bound), bound)) if relative and servo else None,
             relative=relative, fading=fading, parts=self.parts,
         )  # fmt: skip
 

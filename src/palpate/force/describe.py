@@ -17,7 +17,7 @@ UNCOVERED = (
     "limits of speed and torque",
     "loss of contact while the gain changes or within a tick, and of a torque arm",
     "readings between ticks (their age counts in whole ticks)",
-    "the adapting law of a servo, and other numbers of it than the file's",
+    "other numbers of a servo than the file's",
     "the arm's compliance between encoders and tip together with damping of the surface; the tip's mass on it",
     "a surface's own mass; a surface that curves, except by the range of its tangent stiffness",
     "the peak on a surface that stiffens under the tip: the gain is the old one for a lag",

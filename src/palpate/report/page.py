@@ -29,6 +29,25 @@ class Table:
         return any(len(row[column]) > _SENTENCE for row in self.rows)
 
 
+@dataclass(frozen=True)
+class CommandAnswer:
+    """The answer of a command, as a terminal and a program show it.
+
+    Args:
+        title: what it is of.
+        sentence: the answer, with what stands between it and the title.
+        tables: below it.
+        notes: warnings.
+        json: the same for a program.
+    """
+
+    title: str
+    sentence: str
+    tables: Sequence[Table]
+    notes: Sequence[str]
+    json: Mapping[str, Any]
+
+
 _SENTENCE = 32
 """Letters of a cell from which on it is a sentence; a value with its interval and unit is shorter."""
 

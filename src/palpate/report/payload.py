@@ -10,11 +10,13 @@ from palpate.contact_frame import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Table, data_address, render
+from palpate.report.page import CommandAnswer, Table, data_address, render
 from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
     from palpate.contact_frame.load_files import NumberOfLoad
@@ -46,6 +48,26 @@ def sentence(found: Weighed) -> str:
         return "The poses do not determine the tool's mass: " + "; ".join(found.lacking) + "."
     mass = found.parameters["mass"]
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
+
+
+def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfLoad]) -> CommandAnswer:
+    """The answer of `palpate payload`.
+
+    Args:
+        found: the tool.
+        log: name of its log.
+        check: a load file that is compared with it.
+        rows: numbers of that file.
+    """
+    notes = [f"{note['code']}: {note['text']}" for note in found.notes]
+    said, tables, checked = sentence(found), [table(found)], None
+    if check is not None:
+        agrees = bool(rows) and all(row.agrees for row in rows)
+        numbers = [row._asdict() | {"agrees": row.agrees} for row in rows]
+        checked = {"file": str(check), "agrees": agrees, "numbers": numbers}
+    if check is not None and rows:
+        said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
+    return CommandAnswer(log, f": {said}", tables, notes, found.to_json() | {"check": checked})
 
 
 def check_table(rows: list[NumberOfLoad]) -> Table:

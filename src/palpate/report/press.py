@@ -22,7 +22,7 @@ from palpate.report.film import FRAMES, animation, coordinates, film_of, text, t
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity
-from palpate.report.page import Table, data_address
+from palpate.report.page import CommandAnswer, Table, data_address
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
@@ -225,6 +225,14 @@ def tables(summary: dict[str, Any]) -> list[Table]:
     found = (summary["identified"] or {}).get("parameters", {})
     surface = surface_table("The surface, by palpate identify", found, summary["truth"])
     return [_force_table(summary), *([surface] if found else [])]
+
+
+def answer_of(title: str, summary: dict[str, Any]) -> CommandAnswer:
+    """The answer of a press by the arm of this title."""
+    found = (summary["identified"] or {}).get("parameters", {})
+    head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    said = f"{head}\n{sentence(summary, found)}"
+    return CommandAnswer(title, said, tables(summary), notes(summary), summary)
 
 
 def _force_table(summary: dict[str, Any]) -> Table:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli.options.common import PluginOptions
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si
+from palpate.cli.options.values import FLAG, WHOLE, Force, StiffnessRange, quantity_default, spread_default
 from palpate.cli.toolkit import (
     COMPILING,
     command,
@@ -54,8 +54,8 @@ class ForceOptions:
     """
 
     arm: str = "ur5e"
-    force: Annotated[str, SIGNED] = "20"
-    stiffness: Annotated[str, SIGNED] = "1e3:1e5"
+    force: Force = quantity_default("20", "force")
+    stiffness: StiffnessRange = spread_default("1e3:1e5", "stiffness")
     surfaces: Annotated[int, WHOLE] = 5
     repeats: Annotated[int, WHOLE] = 5
     seed: Annotated[int, WHOLE] = 0
@@ -64,10 +64,9 @@ class ForceOptions:
 
     def of_simulation(self) -> Surfaces:
         """Surfaces of the test."""
-        from palpate.cli.options.values import spread
         from palpate_benchmark.simulated import Surfaces
 
-        low, high = spread("--stiffness", self.stiffness, "stiffness")
+        low, high = self.stiffness.si
         return Surfaces(low, high, self.surfaces, self.repeats, self.seed)
 
 
@@ -176,7 +175,7 @@ def _from_records(asked: ForceOptions) -> list[ForceResult]:
 def _in_simulation(files: tuple[Path, ...], asked: ForceOptions) -> list[ForceResult]:
     from palpate_benchmark.simulated import press_surfaces
 
-    surfaces, force = asked.of_simulation(), in_si("--force", asked.force, "force")
+    surfaces, force = asked.of_simulation(), asked.force.si
     entries = _entries(files, asked)
     screen = console(stderr=True)
     told: list[bool] = []

@@ -10,7 +10,7 @@ from cyclopts import Group, Parameter
 
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, si
 from palpate.cli.toolkit import command, console, print_answer, print_lines
 from palpate.errors import InputError
 from palpate.files import MADE, write_text
@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 class ProofOptions:
     """Surfaces, gains and delays of the proof."""
 
-    stiffness: Annotated[str | None, SIGNED] = None
+    stiffness: StiffnessRange | None = None
     """Range of surfaces, K + B/theta, LOW:HIGH in N/m; from a thousandth of the cap to 99 % of the stability
     limit if not given."""
-    damping_time: Annotated[str | None, SIGNED] = None
+    damping_time: TimeRange | None = None
     "Range of B/K, 0:T in s; up to theta if not given (for the adapting law of a torque arm, 0)."
     jitter: Annotated[int, SIGNED] = 1
     "Ticks by which a reading may be older than the sensor's period while the law adapts."
@@ -50,27 +50,23 @@ class ProofOptions:
     @property
     def surfaces(self) -> tuple[float, float] | None:
         """K + B/theta [N/m]."""
-        from palpate.cli.options.values import spread
-
         if self.stiffness is None:
             return None
-        low, high = spread("--stiffness", self.stiffness, "stiffness")
+        low, high = self.stiffness.si
         if not 0.0 < low < high:
             raise InputError(
-                f"--stiffness must be an interval above 0 N/m with its lower end first, got {self.stiffness!r}"
+                f"--stiffness must be an interval above 0 N/m with its lower end first, got {str(self.stiffness)!r}"
             )
         return low, high
 
     @property
     def longest(self) -> float | None:
         """Longest damping time B/K [s]."""
-        from palpate.cli.options.values import spread
-
         if self.damping_time is None:
             return None
-        low, high = spread("--damping-time", self.damping_time, "time")
+        low, high = self.damping_time.si
         if not 0.0 == low <= high:
-            raise InputError(f"--damping-time must be 0:T in seconds, got {self.damping_time!r}")
+            raise InputError(f"--damping-time must be 0:T in seconds, got {str(self.damping_time)!r}")
         return high
 
 
@@ -93,27 +89,18 @@ class OthersOptions(ReportOption):
     """
 
     controller: str | None = None
-    delay: str | None = None
-    mass: str | None = None
+    delay: Time | None = None
+    mass: Mass | None = None
     report: Path | None = None
 
     @property
     def seconds(self) -> float:
         """Everything late between contact and motion [s]."""
-        from palpate.cli.options.values import quantity
-
         if self.delay is None:
             raise InputError(
                 "--controller needs --delay, everything late between contact and motion, such as 24:ms"
             )
-        return quantity("--delay", self.delay, "time")
-
-    @property
-    def kilograms(self) -> float | None:
-        """Mass of the tip along the normal [kg]."""
-        from palpate.cli.options.values import quantity
-
-        return None if self.mass is None else quantity("--mass", self.mass, "mass")
+        return self.delay.si
 
 
 def certify(
@@ -195,8 +182,7 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
             "held": "the constant gain",
             "one-sided": "contact lost and found",
         }
-        why = "; no proof covers that of a servo" if gains.arm.kind == "servo" else ""
-        print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}{why}.")
+        print_lines(f"Not proved: {', '.join(names[kind] for kind in sorted(missing))}.")
     return 1 if missing else 0
 
 
@@ -206,7 +192,7 @@ def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: Tuni
     from palpate_certify.report import lines, page
 
     output.check_new(output.out, ending=".yaml")
-    report, delay, mass = others.page(), others.seconds, others.kilograms
+    report, delay, mass = others.page(), others.seconds, si(others.mass)
     stiffest = STIFFEST if asked.surfaces is None else asked.surfaces[1]
     verdict = certify_controller(path, str(others.controller), delay, mass, stiffest, asked.longest or 0.0)
     answer, text, written = verdict.answer, verdict.text, []

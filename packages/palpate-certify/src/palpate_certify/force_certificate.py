@@ -123,9 +123,8 @@ class ExactClaim:
         self.yields = self.torque or self.servo
         self.compliance = 1 / self.series if self.yields else Fraction(0)
         cap = cap if self.yields else cap / (1 + cap / self.series)
-        felt = self.compliance * cap
-        lag = self.theta * (1 - relief * (felt + Fraction(1, 2)) / (felt + 1))
-        self.gain = self.alpha / lag * (self.compliance + 1 / cap)
+        self.relief = relief
+        self.gain = self._gain(cap)
         low, high = own.get("delay_interval") or (own["delay"],) * 2
         most = ceil(Fraction(high) * rate - SMALL)
         self.unsure = most - floor(Fraction(low) * rate + SMALL) if own.get("delay_interval") else 0
@@ -140,7 +139,8 @@ class ExactClaim:
             z = [2 * Fraction(v) for v in own.get("damping_interval") or (own["damping"],) * 2]
             self.ends = [(w[0] ** 2, w[1] ** 2), (z[0] * w[0], z[1] * w[1])]
         if self.servo:
-            self._lead(1 + felt)
+            self.smooth = self.tick / (self.damping / self.series / 10 + self.tick)
+            self.ahead = self._lead(cap)
         self.filter = polynomial(arm["sensor"].get("low_pass", "none"))
         names = ("low", "high", "least", "most")
         self.low, self.high, self.least, self.most = (Fraction(claim[name]) for name in names)
@@ -155,23 +155,24 @@ class ExactClaim:
         self.state += [f"{sent}{i}" for i in range(1, late)]
         self._sound()
 
-    def _lead(self, total: Fraction) -> None:
-        """Sets the share of a speed that the smoothed one takes up in a tick, and the ticks of lead on it."""
-        lag, rest = self.damping / self.series, 1 - 4 * self.mass * self.series / self.damping**2 * total
+    def _gain(self, bound: Fraction) -> Fraction:
+        """The gain for K_u."""
+        felt = self.compliance * bound
+        lag = self.theta * (1 - self.relief * (felt + Fraction(1, 2)) / (felt + 1))
+        return self.alpha / lag * (self.compliance + 1 / bound)
+
+    def _lead(self, bound: Fraction) -> Fraction:
+        """Ticks of lead on a servo's smoothed speed for K_u."""
+        lag, total = self.damping / self.series, 1 + bound / self.series
+        rest = 1 - 4 * self.mass * self.series / self.damping**2 * total
         root = Fraction(isqrt(round(rest * (1 << 400))), 1 << 200) if rest > 0 else Fraction(0)
-        late = lag / 10
-        self.smooth, self.ahead = (
-            self.tick / (late + self.tick),
-            (lag / 2 / total * (1 + root) + late) / self.tick,
-        )
+        return (lag / 2 / total * (1 + root) + lag / 10) / self.tick
 
     def _sound(self) -> None:
         (young, old), (lowest, highest) = self.ages, self.shares
         adapting = self.kind == "adapting"
         fine = {
-            "kind": self.kind == "held"
-            or (self.kind == "adapting" and not self.servo)
-            or (self.kind == "one-sided" and not self.yields),
+            "kind": self.kind in {"held", "adapting"} or (self.kind == "one-sided" and not self.yields),
             "shares": 0 < lowest <= highest if adapting else lowest == 1 <= highest,
             "ages": 0 <= young <= old >= self.period and (adapting or young == old) and (young or self.order),
             "intervals": 0 <= self.low <= self.high > 0 <= self.least <= self.most and 1 <= self.parts <= 100,
@@ -203,7 +204,7 @@ class ExactClaim:
             A[p - 1, :2] = self.filter[0] / self.wf ** (n - 1) / self.k0 * np.array([K, B * self.w0])
         return A
 
-    def rest(self, K: Fraction, B: Fraction, gain: Fraction, age: int) -> Exact:
+    def rest(self, K: Fraction, B: Fraction, gain: Fraction, ahead: Fraction, age: int) -> Exact:
         """All rows but the first p, and with them the row of the input that is held in this tick, which is the last."""
         one = Fraction(1)
         rows = {"r1": {"f1": one} if self.order else {"x": K / self.k0, "v": B * self.w0 / self.k0}}
@@ -211,8 +212,8 @@ class ExactClaim:
         used = {f"r{age}": one} if age else rows["r1"]
         taken = {k: -self.smooth * gain * self.k0 * v for k, v in used.items()}
         rows["u"] = taken | ({"u": 1 - self.smooth} if self.servo else {})
-        held = {"c0": one} | {k: self.tick * (1 + self.ahead) * v for k, v in rows["u"].items()}
-        held["u"] = held.get("u", 0) - self.tick * self.ahead
+        held = {"c0": one} | {k: self.tick * (1 + ahead) * v for k, v in rows["u"].items()}
+        held["u"] = held.get("u", 0) - self.tick * ahead
         rows["c0"] = held
         name, first = ("t", 2) if self.torque else ("c", 1)
         rows |= {f"{name}{i}": {f"{name}{i - 1}": one} for i in range(first, len(self.state))}
@@ -226,12 +227,15 @@ class ExactClaim:
         wanted = [*(rows[name] for name in self.state[self.p :]), held]
         return [[Fraction(row.get(name, 0)) for name in self.state] for row in wanted]
 
-    def phi(self, K: Fraction, B: Fraction, inner: Any, gain: Fraction, age: int) -> tuple[Ball, Any]:
+    # More than seven arguments: those of a corner.
+    def phi(
+        self, K: Fraction, B: Fraction, inner: Any, gain: Fraction, ahead: Fraction, age: int
+    ) -> tuple[Ball, Any]:
         """The matrix of the tick, and the map from the state to x, v, f... and the held input, shape (p + 1, n)."""
         if (K, B, inner) not in self._moved:
             whole = exponential(Ball.of(self.rates(K, B, inner) * self.tick))
             self._moved[K, B, inner] = Ball(whole.middle[: self.p], whole.error)
-        rows = Ball.of(self.rest(K, B, gain, age))
+        rows = Ball.of(self.rest(K, B, gain, ahead, age))
         fed = Ball(
             np.vstack([ONE * np.eye(self.p, len(self.state), dtype=object), rows.middle[-1:]]), rows.error
         )
@@ -258,12 +262,13 @@ class ExactClaim:
                     raise RefusedError(f"the cells of its {self.kind!r} claim leave a gap")
 
     def corners(self, box: tuple[Any, ...]) -> list[tuple[Any, ...]]:
-        """K, B, inner loop, gain and age of all extremes of a cell."""
+        """K, B, inner loop, gain, lead and age of all extremes of a cell."""
         low, high, least, most, part, loss = box
         old, theta = self.ages[1] + self.unsure, self.theta
         fades = self.kind == "adapting" and not self.yields and self.shares[0] < Fraction(1, 100)
         bounds, times = dict.fromkeys((low, high)), dict.fromkeys((least, most))
         surfaces = [(b / (1 + t / theta), t * b / (1 + t / theta)) for b, t in product(bounds, times)]
+        leads = [self.ahead]
         if self.kind == "adapting":
             ends = [
                 s * self.alpha * (self.compliance + 1 / b) / theta
@@ -272,9 +277,12 @@ class ExactClaim:
             if fades:  # g K alone counts
                 surfaces = [(high, t * high) for t in times]
                 ends = [ends[0] / (1 + most / theta), ends[1] / (1 + least / theta)]
-            laws = list(product(dict.fromkeys(ends), range(self.ages[0], old + 1)))
+            if self.servo:  # the shares are of K + B/theta over K_u, with which gain and lead fall
+                reach = [b / s for s, b in zip(self.shares, (high, low), strict=True)]
+                ends, leads = [self._gain(k) for k in reach], [self._lead(k) for k in reach]
+            laws = list(product(dict.fromkeys(ends), leads, range(self.ages[0], old + 1)))
         else:
-            laws = [(s * self.gain, old - loss) for s in dict.fromkeys(self.shares)]
+            laws = [(s * self.gain, self.ahead, old - loss) for s in dict.fromkeys(self.shares)]
         inners: list[Any] = [None]
         if not self.yields:
             parts = zip(divmod(part, self.parts), self.ends, strict=True)

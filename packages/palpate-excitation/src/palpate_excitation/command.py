@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
-from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given
+from palpate.cli.options.values import FLAG, SIGNED, si
 from palpate.cli.toolkit import command, console, place, print_answer
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -29,22 +30,21 @@ _FASTEST = 200_000
 class SurfaceRangeOptions:
     """Range of the surfaces."""
 
-    stiffness: Annotated[str, SIGNED]
+    stiffness: values.StiffnessRange
     "Of the surfaces, N/m; one value if it is known."
-    damping: Annotated[str, SIGNED]
+    damping: values.DampingRange
     "Of the surfaces, N s/m."
-    mass: Annotated[str | None, SIGNED] = None
+    mass: values.MassRange | None = None
     "Of the surfaces, kg; without it they have none."
 
     def range(self) -> SurfaceRange:
         """Range of stiffness, damping and mass."""
-        from palpate.cli.options.values import spread
         from palpate_excitation import SurfaceRange
 
         return SurfaceRange(
-            spread("--stiffness", self.stiffness, "stiffness"),
-            spread("--damping", self.damping, "damping"),
-            None if self.mass is None else spread("--mass", self.mass, "mass"),
+            self.stiffness.si,
+            self.damping.si,
+            si(self.mass),
         )
 
 
@@ -53,19 +53,19 @@ class SurfaceRangeOptions:
 class BudgetOptions:
     """Limits of force and frequency."""
 
-    force: Annotated[str, SIGNED]
+    force: values.Force
     "Mean force, N."
-    peak: Annotated[str, SIGNED]
+    peak: values.Force
     "Highest force, N."
-    least: Annotated[str, SIGNED] = "2"
+    least: values.Force = values.quantity_default("2", "force")
     "Lowest force, N, so that contact is kept."
-    bandwidth: Annotated[str, SIGNED] = "40"
+    bandwidth: values.Frequency = values.quantity_default("40", "frequency")
     "Highest frequency, Hz."
-    lowest: Annotated[str, SIGNED] = "0.5"
+    lowest: values.Frequency = values.quantity_default("0.5", "frequency")
     "Lowest frequency, Hz."
-    force_rate: Annotated[str | None, SIGNED] = None
+    force_rate: values.ForceRate | None = None
     "Fastest change of the desired force, N/s."
-    drive: Annotated[str | None, SIGNED] = None
+    drive: values.Force | None = None
     """Largest departure of the desired force from its mean, N, if it may exceed that of the force on the
     surface."""
 
@@ -74,13 +74,13 @@ class BudgetOptions:
         from palpate_excitation import Budget
 
         return Budget(
-            in_si("--force", self.force, "force"),
-            in_si("--peak", self.peak, "force"),
-            in_si("--least", self.least, "force"),
-            in_si("--lowest", self.lowest, "frequency"),
-            in_si("--bandwidth", self.bandwidth, "frequency"),
-            inf if self.force_rate is None else in_si("--force-rate", self.force_rate, "force rate"),
-            in_si_if_given("--drive", self.drive, "force"),
+            self.force.si,
+            self.peak.si,
+            self.least.si,
+            self.lowest.si,
+            self.bandwidth.si,
+            inf if self.force_rate is None else self.force_rate.si,
+            si(self.drive),
         )
 
 
@@ -91,11 +91,11 @@ class GoalOptions:
 
     precision: Annotated[str, SIGNED] = "10%"
     "Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%."
-    duration: Annotated[str | None, SIGNED] = None
+    duration: values.Time | None = None
     "Of the excitation, s; the shortest sufficient one if not given."
-    longest: Annotated[str, SIGNED] = "60"
+    longest: values.Time = values.quantity_default("60", "time")
     "Longest duration, s."
-    settle: Annotated[str, SIGNED] = "1"
+    settle: values.Time = values.quantity_default("1", "time")
     "Initial time that does not count, s."
     kind: str = "multisine"
     "multisine or chirp."
@@ -108,7 +108,7 @@ class GoalOptions:
 class SensorOptions:
     """Sensors of force and position."""
 
-    noise: Annotated[str, SIGNED] = "0.6"
+    noise: values.Force = values.quantity_default("0.6", "force")
     "Standard deviation of one reading of the force sensor, N."
     sampling: Annotated[int, SIGNED] = 480
     "Independent readings of the force sensor per second."
@@ -116,9 +116,9 @@ class SensorOptions:
     "Low-pass before the sampling, as butterworth3:120, or none."
     rate: Annotated[int, SIGNED] = 1000
     "Rows per second of the log, and of --out."
-    position_step: Annotated[str, SIGNED] = "1.6:um"
+    position_step: values.Length = values.quantity_default("1.6:um", "length")
     "Quantisation of the position, m."
-    lag_std: Annotated[str, SIGNED] = "0"
+    lag_std: values.Time = values.quantity_default("0", "time")
     "Standard deviation of the calibrated lag between force and position, s."
 
     def sensors(self) -> Sensors:
@@ -135,11 +135,11 @@ class SensorOptions:
         chain = ForceChain(
             LowPass.parse(self.force_filter),
             float(min(self.sampling, self.rate)),
-            in_si("--noise", self.noise, "force"),
+            self.noise.si,
             open_phase,
         )
-        step = in_si("--position-step", self.position_step, "length")
-        return Sensors(chain, step, float(self.rate), in_si("--lag-std", self.lag_std, "time"))
+        step = self.position_step.si
+        return Sensors(chain, step, float(self.rate), self.lag_std.si)
 
 
 @Parameter(name="*", group=Group("The robot", sort_key=5))
@@ -147,11 +147,11 @@ class SensorOptions:
 class LoopOptions:
     """Force control of the arm."""
 
-    loop_bandwidth: Annotated[str | None, SIGNED] = None
+    loop_bandwidth: values.Frequency | None = None
     "Of the robot's force control, Hz, if nothing else is known of it."
-    tip_mass: Annotated[str | None, SIGNED] = None
+    tip_mass: values.Mass | None = None
     "Effective mass of the robot at its tip, kg; this and the following default to the bench's arm."
-    tip_friction: Annotated[str | None, SIGNED] = None
+    tip_friction: values.Force | None = None
     "Dry friction as felt at the tip, N."
     gain: Annotated[float | None, SIGNED] = None
     "Of the force error."
@@ -163,8 +163,8 @@ class LoopOptions:
         from palpate_excitation import HybridLoop, KnownBandwidth
 
         given = {
-            "tip_mass": in_si_if_given("--tip-mass", self.tip_mass, "mass"),
-            "friction": in_si_if_given("--tip-friction", self.tip_friction, "force"),
+            "tip_mass": si(self.tip_mass),
+            "friction": si(self.tip_friction),
             "gain": self.gain,
             "integral": self.integral,
         }
@@ -176,7 +176,7 @@ class LoopOptions:
                 "--loop-bandwidth models the whole robot; leave out --tip-mass, --tip-friction, --gain, "
                 "--integral"
             )
-        return KnownBandwidth(in_si("--loop-bandwidth", self.loop_bandwidth, "frequency"))
+        return KnownBandwidth(self.loop_bandwidth.si)
 
 
 @Parameter(name="*", group=WRITTEN)
@@ -237,9 +237,9 @@ def excite(
         robot.loop(),
         goal.kind,
         goal.criterion,
-        in_si_if_given("--duration", goal.duration, "time"),
-        in_si("--longest", goal.longest, "time"),
-        in_si("--settle", goal.settle, "time"),
+        si(goal.duration),
+        goal.longest.si,
+        goal.settle.si,
     )
     return _answer(problem, sensor.rate, output, picture)
 

@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._program import command, print_answer
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import bar, console, show_answer
-from palpate.cli._terminal import place as show_place
 from palpate.cli.identify import ModelOptions
 from palpate.cli.one_log import OneLog
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import LogOptions
-from palpate.cli.options.values import FLAG, quantity
+from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
+from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
 from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
 from palpate.units import split_spec
@@ -64,7 +62,7 @@ class MapOptions:
     goal: Annotated[Literal["interval", "edge", "maximum"] | None, QUIET] = None
     """Purpose: the interval everywhere, the edge of what is stiffer, or the maximum; edge if
     --stiffer-than is given, else interval."""
-    stiffer_than: str | None = None
+    stiffer_than: Stiffness | None = None
     "A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place."
     until: float | None = None
     "A half-width of the interval in per cent: how many more presses bring it under that."
@@ -72,7 +70,7 @@ class MapOptions:
     "Standard deviation of an error that all presses share, such as the sensor's scale, in per cent."
     start: str | None = None
     "Where the robot stands, as 10,20:mm; with --way a next press costs the way to it."
-    way: str | None = None
+    way: Length | None = None
     "That the robot travels in the time of one press, as 50:mm."
     live: Annotated[bool, FLAG] = False
     """Wait for more presses, and map them as they come, until Ctrl-C; a page that is written loads itself
@@ -88,9 +86,10 @@ class MapOptions:
             raise InputError(f"--common must be from 0 to 100 %, got {self.common:g}")
         if not 0 <= self.next <= 1000:
             raise InputError(f"--next must be from 0 to 1000, got {self.next}")
-        asked = self.stiffer_than
-        threshold = None if asked is None else _positive("--stiffer-than", asked, "stiffness")
-        way = float("inf") if self.way is None else _positive("--way", self.way, "length")
+        for option, typed in (("--stiffer-than", self.stiffer_than), ("--way", self.way)):
+            if typed is not None and typed.si <= 0.0:
+                raise InputError(f"{option} must be above 0, got {str(typed)!r}")
+        threshold, way = si(self.stiffer_than), float("inf") if self.way is None else self.way.si
         start = None
         if self.start is not None:
             numbers, symbol = split_spec(self.start)
@@ -182,10 +181,7 @@ def map(  # noqa: A001 - the command's name
 
 def _answer(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
     _write(result, output, name, live)
-    if output.json:
-        print_answer(result.to_json())
-    else:
-        _show(result, output)
+    _show(result, output)
 
 
 Known = dict[Path, tuple[tuple[int, int], "Presses | str", bool]]
@@ -281,30 +277,17 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
 
 
 def _show(result: MapResult, output: OutputOptions) -> None:
-    from palpate_maps import report as page
+    from palpate_maps.report import answer_of
 
-    more = page.further(result)
-    answer = page.sentence(result) + (f" {' '.join(more)}." if more else "")
-    screen = show_answer(
-        f"{len(result.map)} presses", f": {answer}", page.tables(result), page.warnings(result)
+    written = (
+        ("report:", output.report),
+        ("figure:", output.figure),
+        ("table:", output.csv),
+        ("points:", output.ply),
+        ("film:", output.mcap),
     )
-    for kind, path in (
-        ("report", output.report),
-        ("figure", output.figure),
-        ("table", output.csv),
-        ("points", output.ply),
-        ("film", output.mcap),
-    ):
-        if path is not None:
-            show_place(screen, f"{kind}:", path)
-
-
-def _positive(option: str, text: str, kind: str) -> float:
-    """A number with or without its unit, in SI units, above 0."""
-    value = quantity(option, text, kind)
-    if value <= 0.0:
-        raise InputError(f"{option} must be above 0, got {text!r}")
-    return value
+    files = [(kind, path) for kind, path in written if path is not None]
+    print_result(answer_of(result), json=output.json, files=files)
 
 
 def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOptions, *, json: bool) -> int:
@@ -347,8 +330,5 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
         write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
         for path in filter(None, (fresh / "report.html", phantom.page)):
             write_text(path, page.page(result, title, command()))
-    if json:
-        print_answer(result.to_json())
-    else:
-        _show(result, OutputOptions(report=folder / "report.html"))
+    _show(result, OutputOptions(report=folder / "report.html", json=json))
     return interrupted.code if interrupted() else 0

@@ -12,7 +12,7 @@ from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.figure_panels.panels import panels_of
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import Table, data_address
+from palpate.report.page import CommandAnswer, Table, data_address
 from palpate.report.style import svg
 from palpate_maps.presses import AXES
 from palpate_maps.result import Lump, MapResult
@@ -105,6 +105,14 @@ def tables(result: MapResult) -> list[Table]:
     if result.request.next:
         parts.append(Table("", ("next press", "now, 95 %", "then, 95 %"), next_rows(result)))
     return parts
+
+
+def answer_of(result: MapResult) -> CommandAnswer:
+    """The answer of `palpate map`."""
+    more = further(result)
+    said = sentence(result) + (f" {' '.join(more)}." if more else "")
+    title = f"{len(result.map)} presses"
+    return CommandAnswer(title, f": {said}", tables(result), warnings(result), result.to_json())
 
 
 def next_rows(result: MapResult) -> list[tuple[str, str, str]]:

@@ -35,7 +35,7 @@ def export_law(gains: Path | None, options: LawOptions, output: ExportOutput) ->
     """
     if output.out is None and not output.check:
         raise InputError("nothing to do: give --out FOLDER, or --check, or both")
-    into = vector("into", options.into, "number")
+    into = vector("--into", options.into, "number")
     request = LawRequest(gains=gains, **{**asdict(options), "into": into})
     using = compiler()[0] if output.check else None
     with console(stderr=True).status("exporting") as status:

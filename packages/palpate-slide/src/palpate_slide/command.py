@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, LoopArm, Physics
 from palpate.cli.options.force import SlideLimits
 from palpate.cli.options.kept import options_given
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions, only
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
 from palpate.cli.toolkit import command, console, option_of, place, print_answer
 from palpate.errors import InputError, unknown
 from palpate.files import fresh_folder, with_author, write_json, write_text
@@ -49,7 +50,7 @@ class SlideOptions(SlideLimits):
 
     arm: Annotated[LoopArm, QUIET] = "ur5e"
     "ur5e, fr3, panda, iiwa14, or a TOML file."
-    force: Annotated[str | None, SIGNED] = None
+    force: values.Force | None = None
     "Desired force, as 20:N; that of the gains if left out, or 15 N."
     shape: Annotated[str, _SIMULATED] = "sphere:200:mm"
     """plane, or sphere, bowl, cylinder, saddle, waves or eggs with its radius, as sphere:200:mm; step:1:mm; or
@@ -59,11 +60,11 @@ class SlideOptions(SlideLimits):
     relative change of K along x per metre."""
     path: str = "circle"
     "line, back, raster or circle."
-    length: Annotated[str, SIGNED] = "40:mm"
+    length: values.Length = values.quantity_default("40:mm", "length")
     "Of a line or a pass, radius of a circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
     "Duration of the slide."
-    normal: Annotated[str | None, SIGNED] = None
+    normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
@@ -100,7 +101,9 @@ class SlideOptions(SlideLimits):
                     f"--shape mesh needs a file and its unit, as mesh:part.stl:mm; got {self.shape!r}"
                 )
             way = speed / rate * ways.cumsum(axis=0)
-            heights = heights_of(Path(file), in_si("--shape", f"1:{unit}", "length"), float(abs(way).max()))
+            heights = heights_of(
+                Path(file), values.quantity("--shape", f"1:{unit}", "length"), float(abs(way).max())
+            )
         height = {"height": self.radius, "period": 0.02} if name == "step" else {}
         radius = 0.2 if name == "step" else self.radius
         return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
@@ -108,7 +111,7 @@ class SlideOptions(SlideLimits):
     @property
     def extent(self) -> float:
         """Of the path [m]."""
-        length = in_si("--length", self.length, "length")
+        length = self.length.si
         if not 1.0 <= self.seconds <= 600.0:
             raise InputError(f"--seconds must be from 1 to 600, got {self.seconds:g}")
         if not length >= SHORTEST:
@@ -121,7 +124,7 @@ class SlideOptions(SlideLimits):
         name, _, size = self.shape.partition(":")
         if name in {"plane", "mesh"} or not size:
             return 0.1 if name == "mesh" else 0.2
-        radius = in_si("--shape", size, "length")
+        radius = values.quantity("--shape", size, "length")
         if not 1e-3 <= abs(radius) <= 1e4 and name != "step":
             raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
         return radius
@@ -139,7 +142,7 @@ class SlideOptions(SlideLimits):
     @property
     def into(self) -> tuple[float, ...]:
         """Direction into the surface that is given to the law."""
-        return tuple(vector("normal", self.normal, "number") or (0.0, 0.0, -1.0))
+        return si(self.normal) or (0.0, 0.0, -1.0)
 
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
@@ -160,7 +163,7 @@ class SlideOptions(SlideLimits):
         from palpate.force import load_arm, load_gains
         from palpate.force.gains import gains_for
 
-        wanted = in_si("--force", self.force or "15:N", "force")
+        wanted = 15.0 if self.force is None else self.force.si
         if self.gains is not None:
             gains = load_gains(self.gains)
             return gains if self.force is None else msgspec_replace(gains, force=wanted)

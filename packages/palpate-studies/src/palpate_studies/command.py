@@ -28,11 +28,9 @@ from palpate.cli.toolkit import (
     COMPILING,
     confirmed,
     console,
-    place,
-    print_answer,
+    print_result,
     progress_of_pieces,
     say,
-    show_answer,
 )
 from palpate.errors import InputError
 from palpate.text import printable
@@ -201,14 +199,10 @@ def _runner(where: ClusterOptions, screen: Console) -> Iterator[StudyRunner]:
 
 
 def _show(found: Findings, folder: Path, as_json: bool) -> None:
-    if as_json:
-        print_answer(found.summary)
-        return
-    rest = f", {found.summary['runs']} runs\n{chr(10).join(found.summary['answer'])}"
-    few = (
-        [found.tables[0], *found.tables[1:2], found.tables[-1]]
-        if len(found.tables) > _SHOWN
-        else found.tables
-    )
-    screen = show_answer(found.summary["study"], rest, few, found.notes)
-    place(screen, "report:", folder / "report.html")
+    from palpate.report.page import CommandAnswer
+
+    tables, summary = found.tables, found.summary
+    few = [tables[0], *tables[1:2], tables[-1]] if len(tables) > _SHOWN else tables
+    said = f", {summary['runs']} runs\n{chr(10).join(summary['answer'])}"
+    answer = CommandAnswer(summary["study"], said, few, found.notes, summary)
+    print_result(answer, json=as_json, files=[("report:", folder / "report.html")])

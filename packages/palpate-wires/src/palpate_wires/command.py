@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from palpate.cli import _streams
 from palpate.cli.options.common import PluginOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions
-from palpate.cli.options.values import in_si, vector
 from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop
@@ -96,23 +95,17 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
         "--time-limit": limits.time_limit,
     }  # fmt: skip
     lacking = [name for name, value in needed.items() if value is None]
-    if lacking:
+    normal = asked.normal
+    if not (normal and limits.force_limit and limits.speed_limit and limits.time_limit and not lacking):
         raise InputError(f"a press with a real arm needs {', '.join(lacking)}; none of them has a default")
-    normal = vector("normal", asked.normal, "number")
-    assert normal is not None
-    force = in_si("--force-limit", str(limits.force_limit), "force")
+    force = limits.force_limit.si
     if limits.travel_limit is None:
         travel = travel_for(load_gains(Path(str(asked.gains))), force)
     else:
-        travel = in_si("--travel-limit", limits.travel_limit, "length")
-    most = PressLimits(
-        force,
-        in_si("--speed-limit", str(limits.speed_limit), "velocity"),
-        travel,
-        in_si("--time-limit", str(limits.time_limit), "time"),
-    )
-    retreat = min(RETREAT, travel) if wire.retreat is None else in_si("--retreat", wire.retreat, "length")
-    return PressTask(asked.desired_force, normal, asked.seconds, retreat, asked.probe or 0.0), most
+        travel = limits.travel_limit.si
+    retreat = min(RETREAT, travel) if wire.retreat is None else wire.retreat.si
+    most = PressLimits(force, limits.speed_limit.si, travel, limits.time_limit.si)
+    return PressTask(asked.desired_force, normal.si, asked.seconds, retreat, asked.probe or 0.0), most
 
 
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.values import FLAG, SIGNED, span, vector, with_std
+from palpate.cli.options.values import FLAG, SIGNED, Angles, Interval, Point, si, vector, with_std
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,11 +22,11 @@ class FrameOptions:
 
     wrench_frame: Literal["base", "tool", "sensor"] | None = None
     "Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool."
-    sensor_rpy: Annotated[str | None, SIGNED] = None
+    sensor_rpy: Angles | None = None
     "Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad."
-    tcp: Annotated[str | None, SIGNED] = None
+    tcp: Point | None = None
     "The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm."
-    wrench_at: Annotated[str | None, SIGNED] = None
+    wrench_at: Point | None = None
     "The reference point of the torque, likewise; the pose's origin if not given."
     force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
     """+1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction:
@@ -36,7 +36,7 @@ class FrameOptions:
     given."""
     gravity_compensated: Annotated[bool, FLAG] = False
     "The tool's weight is already subtracted from the wrench."
-    free: str | None = None
+    free: Interval | None = None
     "BEGIN,END in seconds of an interval of free motion; detected if not given."
 
     @property
@@ -67,14 +67,14 @@ class FrameOptions:
             raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
         return ContactFrame(
             wrench_frame=self.wrench_frame,
-            sensor_rpy=vector("sensor-rpy", self.sensor_rpy, "angle"),
-            tcp=vector("tcp", self.tcp, "length") or (0.0, 0.0, 0.0),
-            wrench_at=vector("wrench-at", self.wrench_at, "length") or (0.0, 0.0, 0.0),
+            sensor_rpy=si(self.sensor_rpy),
+            tcp=si(self.tcp) or (0.0, 0.0, 0.0),
+            wrench_at=si(self.wrench_at) or (0.0, 0.0, 0.0),
             force_sign=sides[self.sign],
-            normal=vector("normal", plain or None, "number"),
+            normal=vector("--normal", plain, "number") if plain else None,
             normal_frame="tool" if axes == "tool" else "base",
             gravity_compensated=self.gravity_compensated,
-            free=span("free", self.free),
+            free=si(self.free),
             payload=hung,
         )
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import FLAG, SIGNED, in_si, in_si_if_given, with_std
+from palpate.cli.options.values import FLAG, SIGNED
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,31 +50,14 @@ class LoopArmOptions:
 class SurfaceOptions:
     """Prior of the surface, without a log."""
 
-    stiffness: Annotated[str | None, SIGNED] = None
+    stiffness: values.StiffnessRange | None = None
     "Range of its stiffness, LOW:HIGH in N/m or LOW:HIGH:UNIT."
-    stiffness_cap: Annotated[str | None, SIGNED] = None
+    stiffness_cap: values.Stiffness | None = None
     "Largest possible stiffness, N/m."
-    damping_max: Annotated[str | None, SIGNED] = None
+    damping_max: values.Damping | None = None
     "Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives."
     surface_speed: Annotated[float | None, SIGNED] = None
     "Speed of a moving surface, m/s."
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """Lowest and highest stiffness [N/m]."""
-        from palpate.cli.options.values import spread
-
-        return spread("--stiffness", str(self.stiffness), "stiffness")
-
-    @property
-    def highest_damping(self) -> float | None:
-        """The largest B [N s/m]."""
-        return in_si_if_given("--damping-max", self.damping_max, "damping")
-
-    @property
-    def cap(self) -> float | None:
-        """Stiffness of the stiffest surface [N/m]."""
-        return in_si_if_given("--stiffness-cap", self.stiffness_cap, "stiffness")
 
 
 @Parameter(name="*", group=Group("The press", sort_key=3))
@@ -81,20 +65,10 @@ class SurfaceOptions:
 class PressOptions:
     """Desired force and its limit."""
 
-    force: Annotated[str, SIGNED]
+    force: values.Force
     "Desired force, N; the smallest one if it varies."
-    peak: Annotated[str | None, SIGNED] = None
+    peak: values.Force | None = None
     "Highest force allowed at the touch, N."
-
-    @property
-    def desired_force(self) -> float:
-        """Desired force F_d [N]."""
-        return in_si("--force", self.force, "force")
-
-    @property
-    def highest(self) -> float | None:
-        """Force at the touch [N]."""
-        return in_si_if_given("--peak", self.peak, "force")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,13 +77,13 @@ class SlideLimits:
 
     mu_max: Annotated[float, SIGNED] = 0.9
     "Largest friction coefficient that there may be."
-    speed: Annotated[str, SIGNED] = "30:mm/s"
+    speed: values.Velocity = values.quantity_default("30:mm/s", "velocity")
     "Speed along the surface, as 30:mm/s."
     tilt: Annotated[float, SIGNED] = 7.0
     "Standard deviation of the given normal, in degrees."
-    step: Annotated[str, SIGNED] = "0:mm"
+    step: values.Length = values.quantity_default("0:mm", "length")
     "Highest step that is expected in the surface, as 1:mm: the slide is slow enough to stop on it."
-    touches: Annotated[str, SIGNED] = "10:mm"
+    touches: values.Length = values.quantity_default("10:mm", "length")
     "Spacing of three light touches that measure the normal before the slide; 0:mm for none."
 
     def gains_with(self, gains: Gains, radius: float) -> Gains:
@@ -128,10 +102,7 @@ class SlideLimits:
 
         from palpate.force.slide_table import Slide
 
-        v, most = in_si("--speed", self.speed, "velocity"), gains.arm.limits.speed
-        lengths = {
-            f"--{name}": in_si(f"--{name}", getattr(self, name), "length") for name in ("step", "touches")
-        }
+        v, most = self.speed.si, gains.arm.limits.speed
         if not 0.0 < self.mu_max <= 2.0:
             raise InputError(
                 f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {self.mu_max:g}"
@@ -142,12 +113,18 @@ class SlideLimits:
             raise InputError(f"--radius must be from 1 mm to 10 km, got {radius:g} m")
         if not 0.1 <= self.tilt <= 25.0:
             raise InputError(f"--tilt must be from 0.1 to 25 degrees, got {self.tilt:g}")
-        for name, length in lengths.items():
+        for name, length in (("--step", self.step.si), ("--touches", self.touches.si)):
             if not 0.0 <= length <= 0.1:
                 raise InputError(f"{name} must be from 0 to 100 mm, got {1e3 * length:g} mm")
-        step, touches = lengths.values()
         slope = radians(self.tilt)
-        slide = Slide(speed=v, mu_max=self.mu_max, radius=radius, slope=slope, step=step, touches=touches)
+        slide = Slide(
+            speed=v,
+            mu_max=self.mu_max,
+            radius=radius,
+            slope=slope,
+            step=self.step.si,
+            touches=self.touches.si,
+        )
         return replace(gains, slide=slide)
 
 
@@ -158,12 +135,12 @@ class SlideTuningOptions(SlideLimits):
 
     slide: Annotated[bool, FLAG] = False
     "Tune for a slide too, and print on which surfaces it holds the force within 3 % rms."
-    radius: Annotated[str, SIGNED] = "100:mm"
+    radius: values.Length = values.quantity_default("100:mm", "length")
     "Smallest radius of curvature of the surface, as 100:mm."
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return self.gains_with(gains, in_si("--radius", self.radius, "length")) if self.slide else gains
+        return self.gains_with(gains, self.radius.si) if self.slide else gains
 
 
 @Parameter(name="*", group=Group("Signals of the logs", sort_key=4))
@@ -260,4 +237,4 @@ class IndenterOptions:
     @property
     def ratio(self) -> tuple[float, float] | None:
         """Poisson's ratio, with its standard deviation."""
-        return with_std("poisson", self.poisson, "0.45:0.05")
+        return values.with_std("poisson", self.poisson, "0.45:0.05")

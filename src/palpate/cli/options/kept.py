@@ -68,7 +68,7 @@ class CellOptions:
 def options_given(parts: Iterable[Any]) -> dict[str, Any]:
     """Options that differ from their defaults, by name."""
     return {
-        _name(part, field.name): value
+        _name(part, field.name): str(value) if isinstance(value, str) else value
         for part in parts
         for field in fields(part)
         if (value := getattr(part, field.name)) != field.default

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.kept import options_given
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, in_si, vector
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,14 +25,14 @@ if TYPE_CHECKING:
 class AskOptions:
     """The press, of any arm."""
 
-    force: Annotated[str | None, SIGNED] = None
+    force: values.Force | None = None
     "Desired force, N, or with a unit as 20:N."
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from the touch on."
     gains: Path | None = None
     """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
     left out."""
-    normal: Annotated[str | None, SIGNED] = None
+    normal: values.Direction | None = None
     """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
     arm presses where its tip points at home if left out."""
     probe: Annotated[float | None, SIGNED] = None
@@ -54,7 +55,7 @@ class AskOptions:
         """Desired force F_d [N]."""
         if self.force is None:
             raise InputError("the desired force is missing; add --force, as 20:N")
-        force = in_si("--force", self.force, "force")
+        force = self.force.si
         if not force > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")
         return force
@@ -77,7 +78,7 @@ class SimulatedOptions:
     "own or mujoco (extra: arms)."
     controller: Annotated[Controller, QUIET] = "cautious"
     "cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance."
-    at: Annotated[str | None, SIGNED] = None
+    at: values.Point | None = None
     "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
     seed: Annotated[int, WHOLE] = 0
     "Of the noise; the same seed gives the same numbers."
@@ -102,8 +103,8 @@ class SimulatedOptions:
         touched = surface if surface is not None else surface_of(str(self.surface))
         return Question(
             arm=self.arm, force=asked.desired_force, surface=touched, site=self.site, mode=self.mode,
-            physics=self.physics, controller=self.controller, gains=asked.gains, at=vector("at", self.at, "length"),
-            normal=vector("normal", asked.normal, "number"), seconds=asked.seconds,
+            physics=self.physics, controller=self.controller, gains=asked.gains, at=si(self.at),
+            normal=si(asked.normal), seconds=asked.seconds,
             probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,
         )  # fmt: skip
 
@@ -127,7 +128,7 @@ class PhantomOptions:
     m, N/m and N s/m."""
     presses: Annotated[int, WHOLE] = 40
     "How many presses: sixteen on a grid, then where the map is worst known."
-    stiffer_than: str | None = None
+    stiffer_than: values.Stiffness | None = None
     "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
     page: Path | None = None
     "Where to write the page after each map; it loads itself again until the last."
@@ -150,7 +151,7 @@ class WireOptions:
     "Folder for all readings and commands; palpate identify reads its record.parquet."
     certificate: Path | None = None
     "File of palpate certify; without it the lateness is measured, and nothing is proved."
-    retreat: Annotated[str | None, SIGNED] = None
+    retreat: values.Length | None = None
     "Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter."
     ordinary_priority: Annotated[bool, FLAG] = False
     "Do not request real-time priority from the system."
@@ -163,14 +164,14 @@ class WireOptions:
 class LimitOptions:
     """Limits that end a press over a wire."""
 
-    force_limit: Annotated[str | None, SIGNED] = None
+    force_limit: values.Force | None = None
     "Force of any axis, as 40:N."
-    speed_limit: Annotated[str | None, SIGNED] = None
+    speed_limit: values.Velocity | None = None
     "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
-    travel_limit: Annotated[str | None, SIGNED] = None
+    travel_limit: values.Length | None = None
     """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
     stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
-    time_limit: Annotated[str | None, SIGNED] = None
+    time_limit: values.Time | None = None
     "Total duration, as 20:s."
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import isfinite, isnan
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar
 
 from cyclopts import Parameter, Token
 
-from palpate.errors import InputError, unknown
+from palpate.errors import InputError, PalpateError, unknown
 from palpate.units import UNITS, unit
 
 FACTORS: dict[str, dict[str, float]] = {
@@ -154,20 +155,6 @@ WHOLE = Parameter(converter=_whole_number)
 """A seed; the conversion of cyclopts would silently round 1.5."""
 
 
-def in_si(option: str, text: str, kind: str) -> float:
-    """`NUMBER` or `NUMBER:UNIT` in SI.
-
-    Raises:
-        InputError: not a number, or not a unit of this kind.
-    """
-    return quantity(option, text, kind)
-
-
-def in_si_if_given(option: str, text: str | None, kind: str) -> float | None:
-    """The same of an option that may be left out."""
-    return None if text is None else in_si(option, text, kind)
-
-
 def lag_of(text: str | None) -> tuple[float, float] | None:
     """`VALUE`, `VALUE:STD`, either with a unit of time behind it, as two numbers in s.
 
@@ -207,7 +194,7 @@ def with_std(option: str, text: str | None, example: str = "0.0076:0.0002") -> t
     return found[0], found[1]
 
 
-def vector(option: str, text: str | None, quantity: str) -> tuple[float, float, float] | None:
+def vector(option: str, text: str, quantity: str) -> tuple[float, float, float]:
     """`x,y,z` or `x,y,z:UNIT` as three numbers in SI units.
 
     Args:
@@ -215,25 +202,21 @@ def vector(option: str, text: str | None, quantity: str) -> tuple[float, float, 
         text: the given text.
         quantity: of the unit; `number` for a direction.
     """
-    if text is None:
-        return None
     plain, _, symbol = text.partition(":")
     found = _numbers(plain.split(","))
     if found is None or len(found) != 3:
-        raise InputError(f"--{option} needs three numbers, as {_EXAMPLES[quantity]}, got {text!r}")
+        raise InputError(f"{option} needs three numbers, as {_EXAMPLES[quantity]}, got {text!r}")
     own = unit(symbol) if symbol else unit(_DEFAULTS[quantity])
     if own.quantity != quantity:
-        raise InputError(f"{symbol!r} of --{option} is a unit of {own.quantity}; it needs one of {quantity}")
+        raise InputError(f"{symbol!r} of {option} is a unit of {own.quantity}; it needs one of {quantity}")
     return found[0] * own.factor, found[1] * own.factor, found[2] * own.factor
 
 
-def span(option: str, text: str | None) -> tuple[float, float] | None:
+def span(option: str, text: str) -> tuple[float, float]:
     """`BEGIN,END` as two numbers."""
-    if text is None:
-        return None
     found = _numbers(text.split(","))
     if found is None or len(found) != 2:
-        raise InputError(f"--{option} needs BEGIN,END in seconds, as 0,2.5, got {text!r}")
+        raise InputError(f"{option} needs BEGIN,END in seconds, as 0,2.5, got {text!r}")
     return found[0], found[1]
 
 
@@ -250,3 +233,86 @@ def _numbers(words: list[str]) -> list[float] | None:
     except ValueError:
         return None
     return found if all(isfinite(value) for value in found) else None
+
+
+T = TypeVar("T")
+
+
+class Typed(str, Generic[T]):
+    """An option as it was typed, with its value in SI.
+
+    Args:
+        text: as typed.
+        si: its value.
+    """
+
+    __slots__ = ("si",)
+    si: T
+
+    def __new__(cls, text: str, si: T) -> Typed[T]:
+        """Keep the text and its value."""
+        typed = super().__new__(cls, text)
+        typed.si = si
+        return typed
+
+
+class OptionError(PalpateError):
+    """An option's value is wrong, in one line that names the option."""
+
+
+def si(typed: Typed[T] | None) -> T | None:
+    """Value of an option in SI; None if it was not given."""
+    return None if typed is None else typed.si
+
+
+def quantity_default(text: str, kind: str) -> Typed[float]:
+    """A quantity that an option has if it is not given."""
+    return Typed(text, quantity("the default", text, kind))
+
+
+def spread_default(text: str, kind: str) -> Typed[tuple[float, float]]:
+    """A range that an option has if it is not given."""
+    return Typed(text, spread("the default", text, kind))
+
+
+def typed(parse: Callable[[str, str], Any]) -> Parameter:
+    """An option that is kept as it is typed, beside its value.
+
+    Args:
+        parse: its name and its text into the value.
+    """
+
+    def convert(_: Any, tokens: Sequence[Token]) -> Typed[Any]:
+        (token,) = tokens
+        try:
+            return Typed(token.value, parse(token.keyword or "it", token.value))
+        except InputError as error:
+            raise OptionError(str(error)) from None
+
+    return Parameter(converter=convert, allow_leading_hyphen=True)
+
+
+if TYPE_CHECKING:
+    Quantity: TypeAlias = Typed[float]
+    Ends: TypeAlias = Typed[tuple[float, float]]
+    Triple: TypeAlias = Typed[tuple[float, float, float]]
+else:
+    Quantity = Ends = Triple = str  # what the help names
+
+Damping = Annotated[Quantity, typed(partial(quantity, kind="damping"))]
+Force = Annotated[Quantity, typed(partial(quantity, kind="force"))]
+ForceRate = Annotated[Quantity, typed(partial(quantity, kind="force rate"))]
+Frequency = Annotated[Quantity, typed(partial(quantity, kind="frequency"))]
+Length = Annotated[Quantity, typed(partial(quantity, kind="length"))]
+Mass = Annotated[Quantity, typed(partial(quantity, kind="mass"))]
+Stiffness = Annotated[Quantity, typed(partial(quantity, kind="stiffness"))]
+Time = Annotated[Quantity, typed(partial(quantity, kind="time"))]
+Velocity = Annotated[Quantity, typed(partial(quantity, kind="velocity"))]
+DampingRange = Annotated[Ends, typed(partial(spread, kind="damping"))]
+MassRange = Annotated[Ends, typed(partial(spread, kind="mass"))]
+StiffnessRange = Annotated[Ends, typed(partial(spread, kind="stiffness"))]
+TimeRange = Annotated[Ends, typed(partial(spread, kind="time"))]
+Interval = Annotated[Ends, typed(span)]
+Angles = Annotated[Triple, typed(partial(vector, quantity="angle"))]
+Direction = Annotated[Triple, typed(partial(vector, quantity="number"))]
+Point = Annotated[Triple, typed(partial(vector, quantity="length"))]

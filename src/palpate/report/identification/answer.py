@@ -18,6 +18,7 @@ from palpate.report.identification.words import (
     ADVICE,
     CALLED,
     MARKS,
+    STYLES,
     UNIT_WARNINGS,
     UNTOUCHED,
     Source,
@@ -40,7 +41,6 @@ from palpate.text import printable
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 VERDICTS = {
     Verdict.IDENTIFIED: "identified",
     Verdict.NOT_IDENTIFIABLE: "not identified",

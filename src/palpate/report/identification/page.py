@@ -9,13 +9,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from palpate.identification.result import Identification, Parameter, Traces, Verdict
-from palpate.report.identification import evidence_panels as evidence
-from palpate.report.identification import evidence_panels as fit
-from palpate.report.identification import evidence_panels as trust
-from palpate.report.identification.evidence_panels import shown_by
-from palpate.report.identification.figure import Panel, both_parts, one
+from palpate.report.identification import figure
+from palpate.report.identification.details import BUDGET_HEAD, BUDGET_WORDS, METHOD, budgets, correlation
+from palpate.report.identification.figure import Panel, both_parts, one, shown_by
 from palpate.report.identification.spectra import over_noise, whiteness_of
-from palpate.report.identification.uncertainty import HEAD, METHOD, WORDS, correlation, tables
 from palpate.report.identification.words import (
     CALLED,
     NO_NUMBER,
@@ -144,7 +141,7 @@ Drawn = Callable[[Identification, Traces, int, int], "Figure"]
 
 TONES = {Verdict.IDENTIFIED: "ok", Verdict.NOT_IDENTIFIABLE: "warn", Verdict.REJECTED: "fail"}
 _COLOURED = ("K", "B", "M")
-_WIDE, _HALF, _NARROW = 1150, 560, 360
+_WIDE, HALF, NARROW = 1150, 560, 360
 """Pixels of a panel: of a page's width, of half of it, of a telephone's."""
 _SHARE = 0.25
 """Of the value: the ends of the bar that shows how narrow an interval is, the same on all cards."""
@@ -173,9 +170,9 @@ def page(found: Identification, source: Source) -> str:
             {"code": w.code.word, "text": printable(w.text), "advice": advice(w.code)} for w in found.warnings
         ],
         figures=_figures(found),
-        budgets=list(tables(found)),
-        budget_head=HEAD,
-        budget_words=WORDS,
+        budgets=list(budgets(found)),
+        budget_head=BUDGET_HEAD,
+        budget_words=BUDGET_WORDS,
         budget_notes=[note for note in (correlation(found), METHOD) if note],
         models=_models(found),
         octaves=_octaves(found),
@@ -304,8 +301,8 @@ def _evidence(found: Identification) -> list[dict[str, str]]:
     if found.traces is None or not found.contacts:
         return []
     return [
-        _figure(found, "Dynamic stiffness", both_parts, spectrum, (_HALF, 430)),
-        _figure(found, "Press", partial(one, evidence.press), press, (_HALF, 430)),
+        _figure(found, "Dynamic stiffness", both_parts, spectrum, (HALF, 430)),
+        _figure(found, "Press", partial(one, figure.press), press, (HALF, 430)),
     ]
 
 
@@ -315,11 +312,11 @@ def _figures(found: Identification) -> list[dict[str, str]]:
     if traces is None:
         return []
     if not len(traces.fitted_time):
-        return [_panel(found, "Force over time", fit.force, untouched, (_WIDE, 260))]
+        return [_panel(found, "Force over time", figure.force, untouched, (_WIDE, 260))]
     return [
-        _panel(found, "Force over time", fit.force, force, (_WIDE, 260)),
-        _panel(found, "Misfit over time", fit.residual, residual, (_HALF, 260)),
-        _panel(found, "Is the misfit noise?", trust.residual_spectrum, noise, (_HALF, 260)),
+        _panel(found, "Force over time", figure.force, force, (_WIDE, 260)),
+        _panel(found, "Misfit over time", figure.residual, residual, (HALF, 260)),
+        _panel(found, "Is the misfit noise?", figure.residual_spectrum, noise, (HALF, 260)),
     ]
 
 
@@ -343,9 +340,9 @@ def _figure(
     """A picture at the two widths at which it is looked at, so that its letters keep their size."""
     traces = found.traces
     assert traces is not None
-    narrow = (_NARROW, min(size[1], 330))
+    narrow = (NARROW, min(size[1], 330))
     drawn_at = [drawn(found, traces, *own) for own in (size, narrow)]
-    return picture(title, caption(found, traces), drawn_at, full=size[0] > _HALF)
+    return picture(title, caption(found, traces), drawn_at, full=size[0] > HALF)
 
 
 def picture(title: str, caption: str, drawn: Sequence[Figure], *, full: bool = False) -> dict[str, str]:

@@ -29,6 +29,7 @@ CALLED = {
     "Fc": "Coulomb friction",
     "x0": "place of the surface",
 }
+STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 MARKS = {Verdict.IDENTIFIED: "✓", Verdict.NOT_IDENTIFIABLE: "?", Verdict.REJECTED: "✕"}
 NO_NUMBER = "no number"
 

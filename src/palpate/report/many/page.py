@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from palpate.errors import InputError
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
-from palpate.report.identification.page import TONES, picture, split
+from palpate.report.identification.figure import LETTERS, WIDE
+from palpate.report.identification.page import HALF, NARROW, TONES, picture, split
 from palpate.report.identification.words import CALLED, Source, facts_of, formatted, interval
 from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many.table import (
@@ -39,8 +40,6 @@ _ROW, _BESIDE = 0.31, 1.25
 """Height of a log's row, and of what is above and below all of them [in]."""
 _LONGEST = 26
 """Letters of a log's name that stand beside its row."""
-_LETTERS = 12
-_WIDE = 13.0
 _TICKS = 5
 """Numbers under a panel at most: more run into each other where it is narrow."""
 
@@ -58,7 +57,7 @@ def draw_logs(rows: Sequence[LogRow], pooled: Pooled) -> Figure:
     names = quantities_with_number(rows, pooled) or [POINT]
     high = height(rows) * -(-len(names) // 2)
     with style.ink():
-        figure = Figure(figsize=(_WIDE, high + 1.0), dpi=style.DPI, layout="constrained")
+        figure = Figure(figsize=(WIDE, high + 1.0), dpi=style.DPI, layout="constrained")
         parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, high))
         head, body = parts
         text = fill(f"{sentence(rows, pooled)} {failures(rows)}".strip(), 125)
@@ -75,7 +74,7 @@ def one(rows: Sequence[LogRow], pooled: Pooled, name: str, width: int) -> Figure
     """One forest plot, so many pixels wide on a page."""
     from matplotlib.figure import Figure
 
-    with style.ink(_LETTERS):
+    with style.ink(LETTERS):
         figure = Figure(figsize=(width / 72, height(rows)), dpi=style.DPI, layout="constrained")
         forest(figure.subplots(), rows, name, quantities(pooled).get(name))
     return figure
@@ -132,7 +131,6 @@ def _short(row: LogRow) -> str:
 
 
 _COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
-_HALF, _NARROW = 560, 360
 
 
 def page_of_logs(rows: Sequence[LogRow], pooled: Pooled) -> str:
@@ -204,7 +202,7 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
         f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
-    return picture(title, words, [one(rows, pooled, name, width) for width in (_HALF, _NARROW)])
+    return picture(title, words, [one(rows, pooled, name, width) for width in (HALF, NARROW)])
 
 
 HEAD = ("pooled", "mean ± 95 %", "next press", "logs", "verdict", "why")

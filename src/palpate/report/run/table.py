@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from palpate.identification.result import Identification
 from palpate.report.answer import Card
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity, with_half
-from palpate.report.page import Table
+from palpate.report.page import CommandAnswer, Table
 from palpate.text import printable
 
 
@@ -151,6 +151,12 @@ def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]
         title = f"Surface, by palpate identify: {found.model}"
         own = [surface_table(title, found.to_json()["parameters"], summary["truth"])]
     return [Table("Force", ("", "value"), force_rows(summary)), *own, thesis_table(summary)]
+
+
+def answer_of(title: str, summary: dict[str, Any], shown: Sequence[Table]) -> CommandAnswer:
+    """The answer of a run, with the tables that its terminal shows."""
+    head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
+    return CommandAnswer(title, f"{head}\n{sentence(summary)}", shown, notes(summary), summary)
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
