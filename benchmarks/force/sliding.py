@@ -12,7 +12,8 @@ each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (stan
 palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along paths of at most 60 mm. `rivals` begin
 where the force is first held, with the same K_u; `leaderboard` has a row for each.
 `dither`: stiffness along the path. `faults`: steps of 1 mm over 2 mm, up or down, with and without
-`step` in the gains, and friction that is 1.5 times as high at rest, from the near start.
+`step` in the gains, and no faster than the speed that `palpate tune --slide` prints for a step on the cap (here for K);
+and friction that is 1.5 times as high at rest, from the near start.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from palpate.force.arm import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
-from palpate.force.sliding.slide_domain import obeys, slide_terms
+from palpate.force.sliding.slide_domain import edge_speed, obeys, slide_terms
 from palpate_slide.dither import dither_frequency, stiffness_along
 from palpate_slide.ground import ground_of
 from palpate_slide.jointed_arm import jointed_arm
@@ -37,7 +38,8 @@ from palpate_slide.world import figures_of, simulate
 
 SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)
-STEPS = {"a step of 1 mm": 0.0, "the same, expected (`--step 1:mm`)": 1e-3}
+SLOWLY = "the same, not expected, no faster than the speed printed for it"
+STEPS = {"a step of 1 mm": 0.0, "the same, expected (`--step 1:mm`)": 1e-3, SLOWLY: 0.0}
 SHIPPED = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
 TITLES = SHIPPED | {"servo-ur5e": "UR5e, servos", "servo-iiwa14": "iiwa 14, servos"}
 STARTS = {"touches": "far, three touches", "far": "far", "near": "near"}
@@ -71,7 +73,8 @@ def drawn(arm, rng, start, fault=None, widest=np.inf):
     if path == "line":  # and back where a longer one would leave the surface
         path = "back"
     if fault in STEPS:
-        gains = replace(gains, slide=replace(gains.slide, step=STEPS[fault]))
+        speed = min(speed, edge_speed(gains, K)) if fault == SLOWLY else speed
+        gains = replace(gains, slide=replace(gains.slide, speed=speed, step=STEPS[fault]))
         more = {"height": rng.choice([-1e-3, 1e-3]), "period": 0.8 * speed}
         shape, heading, path = "step", 0.0, "line"
     elif fault is not None:

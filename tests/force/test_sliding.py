@@ -17,9 +17,17 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.paths import directions
-from palpate.force.sliding.slide_domain import slide_domain, slide_terms
+from palpate.force.sliding.slide_domain import edge_speed, slide_domain, slide_terms
 from palpate.force.sliding.slide_law import slide_from, stiffness_in
-from palpate.force.sliding.tangent_filter import COVARIANCE, STATES, Observation, begin, correct, predict
+from palpate.force.sliding.tangent_filter import (
+    COVARIANCE,
+    STATES,
+    Observation,
+    begin,
+    confine,
+    correct,
+    predict,
+)
 from palpate_slide.ground import ground_of
 from palpate_slide.world import figures_of, simulate
 
@@ -133,7 +141,7 @@ def test_a_step_halts_the_slide_and_leaves_stiffness_and_normal(height: float) -
     assert halted.any()
     assert speed[halted].max() < 1e-12
     assert found.said
-    assert found.worst < 1.7
+    assert found.worst < 1.5
     assert not found.lost
     assert found.stiffness > 0.95
     assert rows[-100:, 7].max() < np.radians(1.0)
@@ -166,6 +174,39 @@ def test_a_sensor_that_is_not_tared_holds_the_tip_between_touches() -> None:
     v = loop.update([0.3, 0.1, -9.0], tip, [1.0, 0.0, 0.0])
     assert loop.trouble.startswith("the sensor shows a force")
     assert not v.any()
+
+
+@pytest.mark.parametrize("arm", ["ur5e", "fr3"])
+def test_a_step_that_is_not_expected_costs_half_the_force_at_the_speed_that_is_printed(arm: str) -> None:
+    gains = tuned(arm)
+    gains = replace(gains, slide=Slide(speed=edge_speed(gains, 2e4), mu_max=0.9, slope=0.04))
+    ground = ground_of("step", 0.2, 2e4, friction=0.1, height=1e-3, period=0.01)
+    ways = directions("line", 2.5, gains.arm.rate, gains.slide.speed, 0.1)
+    found = figures_of(simulate(gains, ground, ways), gains, ground)
+    assert 1.1 < found.worst < 1.5
+    assert found.said
+
+
+def test_a_slide_without_friction_is_held_on_a_soft_surface() -> None:
+    """Taken for a contact that sticks, it turned the normal by 40 degrees and pressed with 1.45 F again and again."""
+    gains, ground = tuned("fr3", 22.0, 0.02), ground_of("cylinder", 0.2, 1.3e3, friction=0.0)
+    ways = directions("circle", 2.0, gains.arm.rate, 0.02, 0.07)
+    for seed in range(8):
+        angle = 0.785 * seed
+        into = [0.2 * np.cos(angle), 0.2 * np.sin(angle), -1.0]
+        assert figures_of(simulate(gains, ground, ways, into=into, seed=seed), gains, ground).worst < 1.15
+
+
+def test_a_confined_state_moves_the_others_as_their_covariance_says() -> None:
+    s = np.zeros(COVARIANCE + STATES * STATES + 1)
+    begin(s, 15.0, 0.1, 10.0, 5e3, 0.1, 0.35, 0.3, 0.1)
+    s[7], s[8] = -0.2, 0.1
+    P = s[COVARIANCE : COVARIANCE + STATES**2].reshape(STATES, STATES)
+    P[7, 8] = P[8, 7] = 0.5 * P[7, 7]
+    confine(s, 7, 0.0, 0.9)
+    assert s[7] == pytest.approx(0.0, abs=1e-15)
+    assert s[8] == pytest.approx(0.2)
+    assert s[0] == 15.0
 
 
 def test_a_press_without_an_estimate_leaves_stiffness_uncertain(loop: SlidingLoop) -> None:

@@ -6,7 +6,9 @@ from typing import Any
 
 from palpate.errors import InputError
 from palpate.force.gains import Gains
+from palpate.force.lag import sum_of_lags
 from palpate.force.slide_table import Slide
+from palpate.force.sliding.slide_law import EXCESS
 from palpate.force.sliding.touches import slope_of_touches
 
 LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
@@ -54,6 +56,20 @@ def obeys(terms: dict[str, float]) -> bool:
     return all(terms[name] < limit for name, limit in LIMITS.items())
 
 
+def lead_of(gains: Gains) -> float:
+    """Sum of the lags from a reading to the tip [s]; of a servo what its own lead leaves."""
+    return gains.theta if gains.arm.kind == "servo" else sum_of_lags(gains.arm)
+
+
+def edge_speed(gains: Gains, stiffness: float) -> float:
+    """Largest speed at which a step that was not expected costs half of F_d at most on a surface K [m/s].
+
+    On an edge of 45 degrees the force rises by K_eff v L before the tip stops, with the sum L of the lags. That is
+    `EXCESS` of F_d here; the rest up to a half is for the detection, the friction and the way on.
+    """
+    return EXCESS * gains.force / (gains.arm.seen(stiffness) * lead_of(gains))
+
+
 def slide_domain(gains: Gains) -> tuple[float, float] | None:
     """Stiffnesses between which a slide with friction mu_max on the smallest radius is in the domain [N/m]."""
     slide, points = numbers_of(gains), 400
@@ -80,6 +96,7 @@ def slide_json(gains: Gains) -> dict[str, Any]:
     return {
         "speed_m_s": slide.speed, "mu_max": slide.mu_max, "slope_std_rad": slide.slope, "radius_m": slide.radius,
         "floor_of_force": (1.0 + slide.mu_max**2) ** 0.5, "domain": {"stiffness": list(domain) if domain else None},
+        "edge_speed_m_s": edge_speed(gains, gains.cap),
     }  # fmt: skip
 
 
@@ -89,7 +106,10 @@ def slide_sentence(gains: Gains) -> str:
     least = (
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
-    floor = f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest"
+    floor = (
+        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step costs "
+        f"0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap:.3g} N/m"
+    )
     if domain is None:
         better = "slow down, or give a better normal"
         return f"no surface lies in the domain of a slide {least}{slide.mu_max:g}: {better}; {floor}"

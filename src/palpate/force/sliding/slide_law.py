@@ -88,6 +88,7 @@ from palpate.force.sliding.tangent_filter import (
     STIFF,
     Observation,
     begin,
+    confine,
     correct,
     predict,
     slope_variance,
@@ -106,6 +107,8 @@ GATE = 6.0
 """Deviations of the normal force that are a step's."""
 AFTER = 0.5, 0.1
 """Standard deviations of the normal after a step, each way [rad], and of mu: an edge of 45 degrees is within two."""
+AT_REST = 1.5
+"""Friction at rest over that of a slide, at most."""
 JERKY = 6.0
 """Mean squared deviation of the force's angle that is said as stick-slip."""
 WORTH = 0.06
@@ -119,6 +122,8 @@ CROOKED = 0.4
 have 0.48."""
 LIGHT = 0.3
 """Share of F_d with which a normal is touched."""
+HALF = 0.5
+"""Share of the speed after a step, and where the force is off."""
 RECOVERY = 0.5
 """Time in which the speed is as asked again after a step [s]."""
 LIKELY = 0.35, 0.3
@@ -254,9 +259,32 @@ def slide_from(law, s, n, size, stiffness, relative, slope, mu, mu_std):
 def halt(s, n, trouble):
     """Stops the tip, with a normal along which the force is controlled until the slide goes on."""
     s[HALT], s[TROUBLE] = 1.0, trouble
+    halt_along(s, n)
+
+
+@law
+def halt_along(s, n):
+    """The tip stands along the surface, with a normal along which the force is controlled."""
     put_vector(s, NORMAL, n)
     put_vector(s, EDGE, beside(n))
     put_vector(s, VELOCITY, ZERO3)
+
+
+@law
+def friction_bound(law, s):
+    """Largest friction that the estimate of it admits, at rest too."""
+    return min(AT_REST * s[MU] + GATE * sqrt(max(variance(s, MU, MU), 0.0)), law.mu_max)
+
+
+@law
+def into_cone(n, force, friction):
+    """The normal next to n from which the force is off by the angle of friction at most."""
+    normal = force @ n
+    pull = force - normal * n
+    ratio = sqrt(pull @ pull) / normal
+    if ratio <= friction:
+        return n
+    return unit(n + (ratio - friction) / (1.0 + ratio * friction) / (ratio * normal) * pull, n)
 
 
 @law
@@ -272,6 +300,10 @@ def learn(law, s, work, late, desired, force):
     predict(s, d1, d2, dz, law.ratio, law.turning, law.encoder + law.doubt * abs(dz) / c.period)
     f, f1, f2 = force @ n, force @ e1, force @ e2
     if f < max(c.level, 0.1 * desired):
+        return
+    pull = sqrt(f1 * f1 + f2 * f2)
+    if pull > f * (friction_bound(law, s) + CONE + GATE * sqrt(slope_variance(s))) + GATE * c.noise:
+        halt(s, n, STEPPED)
         return
     noise, N = c.noise * c.noise, s[FORCE]
     # the product of two uncertain states is noise here: before slip no reading shows the normal
@@ -290,7 +322,8 @@ def learn(law, s, work, late, desired, force):
     s[ROUGH] += 0.02 * (min(both, 100.0) - s[ROUGH])
     if s[ROUGH] > JERKY and s[TROUBLE] == FINE:
         s[TROUBLE] = JERKS
-    s[MU], s[FORCE] = min(max(s[MU], 0.0), law.mu_max), max(s[FORCE], 0.0)
+    confine(s, MU, 0.0, law.mu_max)
+    s[FORCE] = max(s[FORCE], 0.0)
     s[STIFF] = max(s[STIFF], 0.05)
     t1, t2 = turn(s)
     n = unit(n + t1 * e1 + t2 * e2, n)
@@ -319,18 +352,24 @@ def command(law, s, desired, force, direction):
     if s[LOSS] * c.tick > 2.0 * c.theta:
         press_again(law, s, n, LOST)
         return ZERO3
+    if s[HALT] > 0.0 and s[TROUBLE] == STEPPED and normal > CROOKED * size > 0.3 * CROOKED * desired:
+        n = into_cone(n, force, min(s[MU], law.mu_max))
+        halt_along(s, n)
+        normal = force @ n
     felt = max(normal, size / sqrt(1.0 + law.mu_max * law.mu_max))
     likely = 2.0 * sqrt(max(variance(s, FORCE, FORCE), 0.0))
     if s[TROUBLE] == FINE and abs(s[FORCE] - desired) + likely > BAND * desired:
-        s[TROUBLE] = AWAY
+        s[TROUBLE], s[SLOW] = AWAY, min(s[SLOW], HALF)
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
     if s[HALT] > 0.0:
         s[HALT] = s[HALT] + 1.0 if abs(felt - desired) < BAND * desired else 1.0
         if s[HALT] * c.tick > law.lead:
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
-            slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], s[MU], AFTER[1])
-            s[SLOW] = 0.5
+            stepped = s[TROUBLE] == STEPPED
+            mu, mu_std = s[MU] if stepped else LIKELY[0], AFTER[1] if stepped else LIKELY[1]
+            slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], mu, mu_std)
+            s[SLOW] = HALF
         return press * n
     v = along_surface(law, s, desired, direction)
     put_vector(s, VELOCITY, v)

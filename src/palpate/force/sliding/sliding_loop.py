@@ -16,9 +16,8 @@ from palpate.errors import InputError
 from palpate.force.flat import flattened
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST
-from palpate.force.lag import sum_of_lags
 from palpate.force.sliding import slide_state as places
-from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.slide_domain import lead_of, numbers_of
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
@@ -53,11 +52,10 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
             f"the direction into the surface needs three numbers that are not all 0, got {into!r}"
         )
     arm = gains.arm
-    lead = gains.theta if arm.kind == "servo" else sum_of_lags(arm)  # of a servo what its own lead leaves
     return Sliding(
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
-        acceleration=slide.acceleration, lead=lead, late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
+        acceleration=slide.acceleration, lead=lead_of(gains), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
         encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 

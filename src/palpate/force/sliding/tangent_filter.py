@@ -35,8 +35,8 @@ HUBER = 3.0
 """Deviations from which an innovation counts no more than linearly."""
 WANDER = 0.05
 """Standard deviation of phi about Dahl's law after one length of its relaxation, in units of mu."""
-STICKS = 0.15
-"""The same in units of what phi lacks of mu: what Dahl's law leaves of a contact that sticks."""
+STICKS = 0.86
+"""The same in units of what phi lacks of mu, which is as uncertain as the friction of dry contacts."""
 CHANGES = 0.1, 0.3
 """Relative standard deviation of K, and that of mu, after a metre of path; they grow as its square root."""
 
@@ -160,6 +160,16 @@ def correct(s, row, innovation, noise, gate, work):
             s[COVARIANCE + STATES * i + j] -= work[i] * work[j] / total
     spread(s, STIFF, kept - variance(s, STIFF, STIFF))
     return deviations
+
+
+@law
+def confine(s, i, low, high):
+    """Moves a state between two bounds, and the others with it as the covariance has them: K alone stays."""
+    change = (min(max(s[i], low), high) - s[i]) / max(variance(s, i, i), 1e-12)
+    if change != 0.0:
+        for j in range(STATES):
+            if j != STIFF:
+                s[j] += change * variance(s, j, i)
 
 
 # More than seven arguments: each is a number of the prior.
