@@ -163,7 +163,7 @@ def test_the_step_is_of_first_order():
 
 
 def test_scaled_friction_slides_at_scaled_levels_and_preslides_alike():
-    twice = ONE.scaled(2.0)
+    twice = ONE.scaled_by(2.0)
     motion = 0.05 * np.sin(np.arange(4000) * 0.01)
     np.testing.assert_allclose(slide(twice, motion)[0], 2.0 * slide(ONE, motion)[0], rtol=1e-12)
     np.testing.assert_allclose(slide(twice, motion)[1], slide(ONE, motion)[1], rtol=1e-12)
@@ -181,7 +181,7 @@ def along(friction, compensator, v, n, dt):
         v = -0.999 * v + 1e-3 * v * k
         torque, z = friction.step(z, v, dt)
         helped = helped + compensator.torque(v)
-    return torque, z, helped, friction.steady(v), friction.stored_energy(z), friction.scaled(0.5)
+    return torque, z, helped, friction.steady(v), friction.stored_energy(z), friction.scaled_by(0.5)
 
 
 @pytest.mark.parametrize(

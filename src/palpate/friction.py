@@ -75,7 +75,7 @@ class LuGre(NamedTuple):
         """Energy in the bristles [J], joint by joint."""
         return 0.5 * self.sigma0 * z * z
 
-    def scaled(self, factor):
+    def scaled_by(self, factor):
         """The same friction `factor` times as strong, with the same presliding and Stribeck speed."""
         k = factor
         return LuGre(
