@@ -94,7 +94,7 @@ def test_regression_on_the_force_without_noise_returns_the_parameters(name):
 def test_a_small_sine_has_the_dynamic_stiffness_of_the_formula(name):
     surface, depth = drawn(name)
     formula = dynamic_stiffness(surface, 3.0, depth, 0.1 * depth)
-    nearly = surface.scaled_by(K3=1e-9 * surface["K"] / depth**2)
+    nearly = surface.scaled(K3=1e-9 * surface["K"] / depth**2)
     assert not nearly.linear
     measured = dynamic_stiffness(replace(nearly, arms=surface.arms), 3.0, depth, 0.1 * depth)
     # Eight time constants leave 3e-4 of an arm, and the ramp to the depth as much in the first line of the period.
