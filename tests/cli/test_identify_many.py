@@ -13,6 +13,7 @@ from identification.synthetic_contacts import pressed
 from palpate.cli import main
 from palpate.cli.one_log import OneLog
 from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of
+from palpate.logs.covariates import read_covariates
 
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 
@@ -71,6 +72,12 @@ def test_the_dependence_on_a_temperature_is_pooled(presses, capsys):
     printed = capsys.readouterr().out
     assert "N/m per temperature_C" in printed
     assert "temperature_C 20.17" in " ".join(printed.split())
+
+
+def test_a_covariate_is_the_mean_of_a_logs_own_readings(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time_s;warm\n0;20,5\n1;-1\n2;21,5\n")
+    assert read_covariates([log], ["warm"], missing=["-1"], delimiter=";")["warm"] == pytest.approx([21.0])
 
 
 @pytest.mark.long

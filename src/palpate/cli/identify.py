@@ -113,7 +113,7 @@ class CovariateOptions:
     covariates: Path | None = None
     "CSV table that has the covariates instead: a column log with the logs' file names, and one for each."
 
-    def of(self, logs: Sequence[Path]) -> dict[str, Array]:
+    def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
         """One number of each log, by the covariate's name."""
         from palpate.logs.covariates import read_covariates
 
@@ -121,7 +121,7 @@ class CovariateOptions:
             raise InputError(
                 "--covariates names a table; name its columns, too, as in --covariate temperature_C"
             )
-        return read_covariates(logs, self.covariate, self.covariates)
+        return read_covariates(logs, self.covariate, self.covariates, source.missing, source.delimiter)
 
 
 # More than seven arguments: one for each group of options.
@@ -193,7 +193,7 @@ def identify(
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
     logs = gather_logs(logs)
-    known = beside.of(logs)
+    known = beside.of(logs, source)
     return many(logs, asked, known, (figure, page, table), json=output.json, dpi=output.dpi)
 
 

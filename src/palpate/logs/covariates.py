@@ -16,7 +16,11 @@ from palpate.logs.tables import open_table
 
 
 def read_covariates(
-    logs: Sequence[Path], names: Sequence[str], table: Path | None = None
+    logs: Sequence[Path],
+    names: Sequence[str],
+    table: Path | None = None,
+    missing: Sequence[str] = (),
+    delimiter: str | None = None,
 ) -> dict[str, Array]:
     """One number of each log by the covariate's name, each of shape (logs,): the mean of the log's column.
 
@@ -25,21 +29,26 @@ def read_covariates(
         names: of the covariates.
         table: a CSV file with the column `log`, which holds the logs' file names, and a column for each covariate; the
             logs' own columns when None.
+        missing: values in the logs that mean "no reading".
+        delimiter: between two cells of a log; found when None.
 
     Raises:
         InputError: a log has no such column or no row, or a value is no number.
     """
     rows = None if table is None else _rows(table, names)
-    found = [[_mean(log, name) for name in names] if rows is None else _row(log, rows, table) for log in logs]
+    found = [
+        [_mean(log, name, missing, delimiter) for name in names] if rows is None else _row(log, rows, table)
+        for log in logs
+    ]
     return dict(zip(names, np.array(found, np.float64).reshape(len(logs), len(names)).T, strict=True))
 
 
-def _mean(log: Path, name: str) -> float:
+def _mean(log: Path, name: str, missing: Sequence[str], delimiter: str | None) -> float:
     kind = kind_of(log)
     if kind.is_bag:
         raise InputError(f"{log} is a bag, which has no column {name}; give a table by --covariates")
-    sheet = open_table(log, kind)
-    (column,) = sheet.numbers([sheet.resolve(name)])
+    sheet = open_table(log, kind, delimiter)
+    (column,) = sheet.numbers([sheet.resolve(name)], missing)
     if not np.isfinite(column).any():
         raise InputError(f"{log}: column {name!r} has no reading; give a table by --covariates")
     return float(np.nanmean(column))

@@ -268,13 +268,16 @@ def cells(rows: Sequence[LogRow], pooled: Pooled | None) -> tuple[Row, list[Row]
         own = [(whole.get(name), scales[name][0]) for name in names]
         body += [
             ("n", *(text for p, _ in own for text in (str(len(p.logs)) if p else "", ""))),
-            ("mean", *(text for p, factor in own for text in _mean(p, factor))),
+            ("mean", *(text for p, factor in own for text in _number(p.parameter if p else None, factor))),
             (
                 "next press",
                 *(text for p, factor in own for text in _next(p.prediction95 if p else None, factor)),
             ),
             ("deviation", *(text for p, factor in own for text in _deviation(p, factor))),
         ]
+        for name in dict.fromkeys(name for p in whole.values() for name in p.slopes):
+            slopes_of = [(p.slopes.get(name) if p else None, factor) for p, factor in own]
+            body.append((f"per {name}", *(text for pair in slopes_of for text in _number(*pair))))
     else:
         point = rows[0].found.working_point if rows[0].found else None
         again = point.prediction95 if point else None
@@ -302,12 +305,13 @@ def _scale(rows: Sequence[LogRow], name: str) -> tuple[float, str]:
 
 
 def _values(row: LogRow, scales: dict[str, tuple[float, str]]) -> list[str]:
-    texts: list[str] = []
-    for name, (factor, _) in scales.items():
-        p = row.value_of(name)
-        half = (p.ci95[1] - p.ci95[0]) / 2 if p and p.ci95 else 0.0
-        texts += ("", "") if p is None or p.value is None else _pair(p.value / factor, half / factor)
-    return texts
+    return [text for name, (factor, _) in scales.items() for text in _number(row.value_of(name), factor)]
+
+
+def _number(p: Parameter | None, factor: float) -> tuple[str, str]:
+    if p is None or p.value is None:
+        return "", ""
+    return _pair(p.value / factor, (p.ci95[1] - p.ci95[0]) / 2 / factor if p.ci95 else 0.0)
 
 
 def _pair(value: float, half: float) -> tuple[str, str]:
@@ -315,13 +319,6 @@ def _pair(value: float, half: float) -> tuple[str, str]:
     left, _, right = with_half(value, half).partition(" ± ")
     plain = re.fullmatch(r"[-0-9.]+", left) and re.fullmatch(r"[-0-9.]+", right)
     return (left, right) if plain else (f"{value:.6g}", f"{half:.2g}" if half else "")
-
-
-def _mean(p: PooledParameter | None, factor: float) -> tuple[str, str]:
-    if p is None or p.parameter.value is None or p.parameter.ci95 is None:
-        return "", ""
-    low, high = p.parameter.ci95
-    return _pair(p.parameter.value / factor, (high - low) / 2 / factor)
 
 
 def _next(ends: tuple[float, float] | None, factor: float) -> tuple[str, str]:
