@@ -1,5 +1,7 @@
 """The first lines in Python: any table is a log, and what is wrong is one line in Python's words."""
 
+import re
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -127,3 +129,25 @@ def test_what_is_wrong_is_one_line_in_pythons_words(call, message, record):
         call(record)
     assert "\n" not in str(error.value)
     assert "--" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "palpate.identify_log",
+        "palpate.force.ForceLoop.load",
+        "palpate.force.SlidingLoop.load",
+        "palpate.identifiers.RecursiveLeastSquares.update",
+        "palpate.maps.StiffnessMap.predict",
+        "palpate.networks.Perceptron.learn",
+        "palpate.robots.Planar3R.jacobian_dot",
+        "palpate.robots.SerialArm.from_urdf",
+    ],
+)
+def test_a_name_that_scripts_rely_on(name):
+    """Whatever distribution it is of."""
+    module, *rest = re.fullmatch(r"([a-z_.]+?)\.([A-Z]\w*|identify_log)(?:\.(\w+))?", name).groups()
+    found = import_module(module)
+    for part in filter(None, rest):
+        found = getattr(found, part)
+    assert callable(found)

@@ -26,7 +26,6 @@ The rooms, each `palpate.ROOM`:
     controllers     of force and motion
     environments    surfaces: Kelvin-Voigt, Hunt-Crossley, standard linear solid
     instruments     encoders, force sensors, filters, each with its lag
-    checks          the conformance suite of all parts, for your own too
     report          figures, tables, pages
 
 Names and rooms are imported when they are first used, so that `import palpate` costs next to nothing. The same from
@@ -57,7 +56,6 @@ _HOME = {
 
 _ROOMS = (
     "bench",
-    "checks",
     "contact_frame",
     "controllers",
     "environments",
