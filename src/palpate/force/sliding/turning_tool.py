@@ -66,7 +66,8 @@ class TurningTool:
             force: reading [N], in the base's axes, shape (3,).
             position: of the tool's point [m], shape (3,).
             rotation: of the tool, its axes in columns, shape (3, 3).
-            direction, missed: as for `SlidingLoop.update`.
+            direction: as for `SlidingLoop.update`.
+            missed: as for `SlidingLoop.update`.
         """
         R = _rotation(rotation)
         arm = R @ self._centre
