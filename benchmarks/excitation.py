@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.bench import build, load
-from palpate.bench.tables import changed, parse
+from palpate.bench.tables import parse, with_values
 from palpate.identification import identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
@@ -46,7 +46,7 @@ def errors(design_: Design, seed: int) -> dict[str, NDArray[np.float64]]:
     """Relative errors of K, B and M in one run, by the sensor of the position."""
     rng = np.random.default_rng(seed)
     change = {"force_sensor.phase": float(rng.uniform(0, 1 / 480)), "robot.start": START}
-    asked = changed(parse(experiment(design_), "the design"), change)
+    asked = with_values(parse(experiment(design_), "the design"), change)
     run = build(asked).run(asked.run.duration, seed=seed, press=asked.run.press)
     rows = np.flatnonzero(run["phase"] == 1.0)
     rows = rows[rows >= rows[0] + round(1000 * design_.settle)]

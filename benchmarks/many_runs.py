@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from palpate.bench import build, load
 from palpate.bench.speed import cores
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 
 SHORT = {"approach.hold": 0.2, "approach.first": 0.464, "run.duration": 6.0, "run.press": 5.0}
 RUNS, ROUNDS = 12, 5
@@ -20,7 +20,7 @@ RUNS, ROUNDS = 12, 5
 
 def one(seed: int) -> int:
     """A run, reduced to its number of ticks."""
-    return len(build(changed(load("foam-neural"), SHORT)).run(6.0, seed, press=5.0))
+    return len(build(with_values(load("foam-neural"), SHORT)).run(6.0, seed, press=5.0))
 
 
 def ticks_per_second(pool: ThreadPoolExecutor) -> float:

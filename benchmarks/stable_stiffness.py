@@ -12,7 +12,7 @@ import argparse
 from itertools import product
 
 from palpate.bench import load
-from palpate.bench.tables import Experiment, changed
+from palpate.bench.tables import Experiment, with_values
 from palpate_studies.analysis import stable_stiffness
 
 AT, LOW, HIGH = 0.469, 1e3, 3e6  # m, N/m
@@ -23,7 +23,7 @@ ALONE = {"robot.rotor_inertia": (0.0, 0.0, 0.0), "wall.side_friction": 0.0}
 def experiment(damping: float, gain: float, integral: float) -> Experiment:
     """Hybrid control of a surface with a damping [N s/m], a force gain and an integral gain per tick."""
     surface = {"surface.damping": damping, "surface.mass": 0.05}
-    return changed(load("foam-hybrid"), {**surface, "controller.kf": gain, "controller.ki": integral})
+    return with_values(load("foam-hybrid"), {**surface, "controller.kf": gain, "controller.ki": integral})
 
 
 def limit(of: Experiment, friction: bool = False) -> str:
@@ -40,7 +40,7 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for damping, (gain, integral) in cases:
         own = experiment(damping, gain, integral)
-        limits = limit(own), limit(changed(own, ALONE)), limit(own, friction=True)
+        limits = limit(own), limit(with_values(own, ALONE)), limit(own, friction=True)
         print(f"| {damping:g} | {gain:g}, {integral:g} | {' | '.join(limits)} |")
 
 

@@ -6,7 +6,7 @@ compilation takes some ten seconds: once for a part in an imported module, at ea
 
 from typing import NamedTuple
 
-from palpate.bench import build, changed, load, part
+from palpate.bench import build, load, part, with_values
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState
 
 
@@ -33,7 +33,7 @@ class Cushion(NamedTuple):
         s = state.deflection / (1.0 + dt * self.stiffness / self.damping)
         return SurfaceState(s, (s - state.deflection) / dt, 0.0, 0.0)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         p = state.deflection
         return 0.5 * self.stiffness * p * p + 0.25 * self.hardening * p**4
 
@@ -41,7 +41,7 @@ class Cushion(NamedTuple):
         return {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m")}
 
 
-experiment = changed(
+experiment = with_values(
     load("foam-hybrid"), {"force.first": 8.0, "force.second": 20.0, "force.period": 2.0, "run.press": 8.0}
 )
 cushion = Cushion(2000.0, 4e8, 150.0)

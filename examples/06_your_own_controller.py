@@ -7,7 +7,7 @@ A controller is a NamedTuple of gains with `start()`, its state before the first
 import time
 from typing import NamedTuple
 
-from palpate.bench import Vec3, build, changed, load, part
+from palpate.bench import Vec3, build, load, part, with_values
 
 
 @part
@@ -31,7 +31,7 @@ class Damped(NamedTuple):
 
 
 # Near the wall and without the wait, so that plain Python reaches it soon.
-experiment = changed(
+experiment = with_values(
     load("foam-hybrid"),
     {
         "robot.start": (0.4635, 0.0, 0.0),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.bench import build, changed, load, march, start_at
+from palpate.bench import build, load, march, start_at, with_values
 from palpate.bench.force_input import COLUMNS
 
 near = {
@@ -11,7 +11,7 @@ near = {
     "approach.first": 0.470,
     "approach.period": 0.1,
 }
-bench = build(changed(load("foam-hybrid"), near))
+bench = build(with_values(load("foam-hybrid"), near))
 noise = np.random.default_rng(1).standard_normal(260)
 row = np.empty((1, len(COLUMNS)))
 

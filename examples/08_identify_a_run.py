@@ -4,10 +4,10 @@ The identification gets the signals of a real log, measured position and force, 
 """
 
 import palpate
-from palpate.bench import build, changed, load
+from palpate.bench import build, load, with_values
 from palpate.records import Record
 
-experiment = changed(
+experiment = with_values(
     load("foam-hybrid"),
     {
         "force.first": 10.0,

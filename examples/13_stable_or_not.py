@@ -5,7 +5,7 @@ The model is the derivative of the bench's own tick about a press at rest: three
 """
 
 from palpate.bench import load
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate_studies.analysis import linearise, margins, stable_intervals, stable_stiffness
 
 foam = load("foam-hybrid")
@@ -23,7 +23,7 @@ print(f"  it bears {found.gain:.1f} times the gain, or {1e3 * found.delay:.0f} m
 low, high = stable_stiffness(foam, 1e3, 1e6)
 print(f"the same gains are stable up to {high / 1e3:.0f} kN/m, B_e being {foam.surface.damping:g} N s/m")
 
-stiff = changed(foam, {"surface.stiffness": 1.2 * high})
+stiff = with_values(foam, {"surface.stiffness": 1.2 * high})
 print(f"a fifth beyond: {'stable' if linearise(stiff).stable else 'unstable'}")
 for low, high in stable_intervals(stiff, "controller.kf", 0.0, 2.0):
     print(f"  there kf may lie in {low:.2f} ... {high:.2f}")

@@ -45,7 +45,7 @@ class Spring(NamedTuple):
         s = state.deflection / (1.0 + dt * self.stiffness / self.damping)
         return SurfaceState(s, (s - state.deflection) / dt, 0.0, 0.0)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         return 0.5 * self.stiffness * state.deflection**2
 
 

@@ -108,7 +108,7 @@ def test_no_motion_gets_more_work_out_than_was_put_in(motion, dt, sigma1):
     z = friction.start()
     for v in motion:
         torque, new = friction.step(z, v, dt)
-        gained = friction.stored(new) - friction.stored(z)
+        gained = friction.stored_energy(new) - friction.stored_energy(z)
         # Rounding: each part of the torque and each deflection by some last bits. Below 1e-300 there are no more bits.
         forces = 1250.0 * (abs(z) + abs(new)) + abs(torque - 1250.0 * new)
         rounding = 16 * np.finfo(float).eps * forces * (abs(z) + abs(new) + abs(v) * dt) + 1e-300
@@ -123,7 +123,7 @@ def test_the_papers_constant_damping_would_give_work_away():
     rate = v - 1250.0 * v * z / level
     assert ((1250.0 * z + 11.0 * rate) * v - 1250.0 * z * rate).min() < -10.0
     torque, new = DRY.step(z[-1], v, 1e-9)
-    assert torque * v * 1e-9 > DRY.stored(new) - DRY.stored(z[-1])
+    assert torque * v * 1e-9 > DRY.stored_energy(new) - DRY.stored_energy(z[-1])
 
 
 @pytest.mark.parametrize("v", [0.5, -5.0, 500.0])
@@ -132,7 +132,7 @@ def test_the_damping_is_as_strong_as_passivity_allows(v):
     friction = ONE._replace(sigma1=1e9, sigma2=0.0, static=0.6)
     z, dt = np.sign(v) * 2.0 * 0.25 / 1250.0, 1e-9
     torque, new = friction.step(z, v, dt)
-    spare = torque * v - (friction.stored(new) - friction.stored(z)) / dt
+    spare = torque * v - (friction.stored_energy(new) - friction.stored_energy(z)) / dt
     assert -1e-6 * abs(v) < spare < 1e-3 * abs(v)
 
 
@@ -163,7 +163,7 @@ def test_the_step_is_of_first_order():
 
 
 def test_scaled_friction_slides_at_scaled_levels_and_preslides_alike():
-    twice = ONE.scaled(2.0)
+    twice = ONE.scaled_by(2.0)
     motion = 0.05 * np.sin(np.arange(4000) * 0.01)
     np.testing.assert_allclose(slide(twice, motion)[0], 2.0 * slide(ONE, motion)[0], rtol=1e-12)
     np.testing.assert_allclose(slide(twice, motion)[1], slide(ONE, motion)[1], rtol=1e-12)
@@ -181,7 +181,7 @@ def along(friction, compensator, v, n, dt):
         v = -0.999 * v + 1e-3 * v * k
         torque, z = friction.step(z, v, dt)
         helped = helped + compensator.torque(v)
-    return torque, z, helped, friction.steady(v), friction.stored(z), friction.scaled(0.5)
+    return torque, z, helped, friction.steady(v), friction.stored_energy(z), friction.scaled_by(0.5)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from touches import Key, resumed
 
 from palpate.bench.build import build
 from palpate.bench.force_input import COLUMNS
-from palpate.bench.tables import changed, load
+from palpate.bench.tables import load, with_values
 from palpate.environments.surface import alone, join
 from palpate.force.law import CautiousState
 
@@ -86,7 +86,7 @@ def one(name: str, what: str, case: tuple[float, ...], seed: int) -> tuple[float
     """Whether contact was lost, largest force over 20 N, rms error of the last second [N], whether it was kept."""
     K = case[0]
     surface = {"kind": "kelvin-voigt", "stiffness": K, "damping": float(2.0 * RATIO * sqrt(K)), "mass": MASS}
-    bench = build(changed(load(name), {"surface": surface, "run.losses": 0}))
+    bench = build(with_values(load(name), {"surface": surface, "run.losses": 0}))
     simulation, rows = bench.simulation(seed), []
     wall, moved, told = simulation.loop.plant.wall, np.inf, len(case) == 2 or what == "sways"
     while simulation.since_contact < PRESS and simulation.ticks * bench.loop.tick < LOOK:

@@ -17,7 +17,7 @@ import numpy as np
 from touches import Key, resumed
 
 from palpate.bench.build import build
-from palpate.bench.tables import changed, load
+from palpate.bench.tables import load, with_values
 
 CONTROLLERS = ("foam-cautious", "foam-hybrid", "foam-pi", "foam-neural")
 PRESS = 4.0
@@ -81,7 +81,7 @@ def judged(
     changes = {"surface": surface, "run.press": PRESS, "run.losses": 1}
     for key in ("coulomb", "static"):
         changes[f"friction.{key}"] = tuple(friction * v for v in getattr(own.friction, key))
-    record = build(changed(own, changes)).run(60.0, seed=seed, press=PRESS)
+    record = build(with_values(own, changes)).run(60.0, seed=seed, press=PRESS)
     force = record["force"][record["phase"] == 1.0]
     if len(force) < 100:
         return np.nan, 0.0, 1.0, np.nan, 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.bench import build, load
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate.identification import Identification, identify
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
@@ -77,7 +77,7 @@ def press(condition: Condition, seed: int) -> tuple[Record, LowPass, float]:
         f"surface.{FIELDS[n]}": float(getattr(nominal.surface, FIELDS[n]) * f)
         for n, f in zip(NAMES, factor, strict=True)
     }
-    experiment = changed(
+    experiment = with_values(
         nominal,
         {
             **truth,

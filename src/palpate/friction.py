@@ -71,11 +71,11 @@ class LuGre(NamedTuple):
         """Torque of steady sliding at v [N m]."""
         return self.level(v) * sign(v) + self.sigma2 * v
 
-    def stored(self, z):
+    def stored_energy(self, z):
         """Energy in the bristles [J], joint by joint."""
         return 0.5 * self.sigma0 * z * z
 
-    def scaled(self, factor):
+    def scaled_by(self, factor):
         """The same friction `factor` times as strong, with the same presliding and Stribeck speed."""
         k = factor
         return LuGre(

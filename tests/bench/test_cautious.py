@@ -8,7 +8,7 @@ import pytest
 from palpate._vector import Mat3, Vec3
 from palpate.bench.build import build
 from palpate.bench.summary import summarise
-from palpate.bench.tables import changed, load
+from palpate.bench.tables import load, with_values
 from palpate.controllers.cautious_press import without_last_joint
 from palpate.report.run.table import alerts
 
@@ -17,7 +17,7 @@ from palpate.report.run.table import alerts
 @pytest.mark.parametrize(("K", "B"), [(1.3e3, 20.0), (1.1e4, 120.0), (1.2e5, 200.0)])
 def test_it_settles_under_friction_on_any_surface(K, B):
     surface = {"surface.stiffness": K, "surface.damping": B, "surface.mass": 0.05, "run.press": 2.0}
-    record = build(changed(load("foam-cautious"), surface)).run(30.0, seed=11, press=2.0)
+    record = build(with_values(load("foam-cautious"), surface)).run(30.0, seed=11, press=2.0)
     assert record.meta["end"] == "done"
     force = record["force"][record["phase"] == 1.0]
     assert abs(force[-500:].mean() - 20.0) < 0.3  # 1.5 %: half a second of noise and stick
@@ -34,7 +34,9 @@ def test_with_twice_the_friction_it_settles_or_says_which_motor_cannot():
             for key in ("coulomb", "static")
         }
         surface = {"kind": "kelvin-voigt", "stiffness": K, "damping": float(0.06 * np.sqrt(K)), "mass": 0.05}
-        bench = build(changed(experiment, {"surface": surface, "run.press": 4.0, "run.losses": 1, **twice}))
+        bench = build(
+            with_values(experiment, {"surface": surface, "run.press": 4.0, "run.losses": 1, **twice})
+        )
         record = bench.run(60.0, seed=100, press=4.0)
         pressing = record["phase"] == 1.0
         force = np.convolve(record["force"][pressing], np.full(10, 0.1), "valid")

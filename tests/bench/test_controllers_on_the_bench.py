@@ -30,7 +30,7 @@ def pressed(controller, press=8.0, seed=1, friction=1.0, **tables):
     bench = build(msgspec.convert(tables, Experiment))
     plant = bench.loop.plant
     bench = Bench(
-        bench.loop._replace(plant=plant._replace(friction=plant.friction.scaled(friction))), bench.q
+        bench.loop._replace(plant=plant._replace(friction=plant.friction.scaled_by(friction))), bench.q
     )
     record = bench.run(60.0, seed, press=press)
     first = int(np.argmax(record.columns["phase"] == 1))

@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from palpate.bench import Experiment, build, changed, load, names, source
+from palpate.bench import Experiment, build, load, names, source, with_values
 from palpate.bench.tables import parse
 from palpate.errors import InputError
 
@@ -124,7 +124,7 @@ TOGETHER = {
 
 @pytest.mark.parametrize(("changes", "told"), TOGETHER.values(), ids=TOGETHER)
 def test_numbers_that_do_not_go_together_are_refused(changes, told):
-    experiment = changed(parse(GOOD, "mine.toml"), changes)
+    experiment = with_values(parse(GOOD, "mine.toml"), changes)
     with pytest.raises(InputError, match=told) as caught:
         build(experiment)
     assert "\n" not in str(caught.value)
@@ -132,11 +132,11 @@ def test_numbers_that_do_not_go_together_are_refused(changes, told):
 
 def test_changed_says_which_change_was_wrong():
     with pytest.raises(InputError, match=r"^run.press: press in \[run\] must be a number above 0, got -1"):
-        changed(load("foam-hybrid"), {"run.press": -1.0})
+        with_values(load("foam-hybrid"), {"run.press": -1.0})
     with pytest.raises(InputError, match="unknown key 'runn'"):
-        changed(load("foam-hybrid"), {"runn.press": 1.0})
+        with_values(load("foam-hybrid"), {"runn.press": 1.0})
     with pytest.raises(InputError, match="unknown key 'pres'"):
-        changed(load("foam-hybrid"), {"run.pres": 1.0})
+        with_values(load("foam-hybrid"), {"run.pres": 1.0})
 
 
 def test_names_that_are_none():

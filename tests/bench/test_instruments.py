@@ -42,7 +42,7 @@ def test_a_fresh_reading_is_the_filtered_force_of_its_instant(phase):
     """No noise and 32 bits: what is left is the true force, through a continuous Butterworth, so much earlier."""
     plant = Plant(
         Arm3().with_rotors(),
-        LuGre().scaled(0.3),
+        LuGre().scaled_by(0.3),
         join(KelvinVoigt(5200, 200, 0.1)),
         StickSlip(5000, 20, 0.7),
         0.465,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate._vector import Vec3
-from palpate.bench import build, changed, load
+from palpate.bench import build, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.bench.plant import RIGID, Plant, elastic_mode
 from palpate.environments import KelvinVoigt, StickSlip, join
@@ -16,7 +16,7 @@ from palpate.robots.arm3 import Arm3
 
 SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3, "run.press": 2.0}
 """An approach of a few steps, and a short press."""
-FOAM = changed(load("foam-hybrid"), SHORT)
+FOAM = with_values(load("foam-hybrid"), SHORT)
 DT = 5e-5
 
 
@@ -44,7 +44,7 @@ def test_a_struck_mode_swings_at_its_frequency_and_dies_away_by_its_damping():
 def test_the_tip_of_an_arm_that_gives_way_lies_behind_what_its_joints_say():
     stiffness = 4e4
     record = build(
-        changed(FOAM, {"elastic": {"stiffness": stiffness, "frequency": 60.0, "damping": 0.3}})
+        with_values(FOAM, {"elastic": {"stiffness": stiffness, "frequency": 60.0, "damping": 0.3}})
     ).run(30.0, press=2.0)
     late = (record["phase"] == CONTACT) & (record["t"] > record["t"][-1] - 0.2)
     behind = record["x"][late] - FOAM.wall.x - record["penetration"][late]
@@ -53,7 +53,7 @@ def test_the_tip_of_an_arm_that_gives_way_lies_behind_what_its_joints_say():
 
 def test_a_mode_that_the_physics_cannot_resolve_is_refused():
     with pytest.raises(InputError, match=r"frequency in \[elastic\] must be at most 1000 Hz"):
-        build(changed(FOAM, {"elastic": {"stiffness": 1e5, "frequency": 1500.0}}))
+        build(with_values(FOAM, {"elastic": {"stiffness": 1e5, "frequency": 1500.0}}))
 
 
 def test_friction_is_higher_forward_than_backward_by_its_asymmetry():
@@ -61,7 +61,7 @@ def test_friction_is_higher_forward_than_backward_by_its_asymmetry():
     v = Vec3(0.5, 0.5, 0.5)
     assert tuple(uneven.steady(v)) == pytest.approx([1.25 * x for x in LuGre().steady(v)])
     assert tuple(uneven.steady(-v)) == pytest.approx([-0.75 * x for x in LuGre().steady(v)])
-    assert uneven.scaled(2.0).asymmetry == 0.25
+    assert uneven.scaled_by(2.0).asymmetry == 0.25
     with pytest.raises(InputError, match="asymmetry"):
         LuGre(asymmetry=1.0).checked()
 
@@ -82,7 +82,7 @@ def test_what_lies_beyond_the_sensor_is_read_as_its_mass_times_its_acceleration(
 
 def test_rough_noise_is_that_of_before_at_rest_and_larger_in_motion():
     plain, rough = (
-        build(changed(FOAM, {"force_sensor.roughness": r})).run(30.0, 5, press=1.0) for r in (0.0, 200.0)
+        build(with_values(FOAM, {"force_sensor.roughness": r})).run(30.0, 5, press=1.0) for r in (0.0, 200.0)
     )
     n = min(len(plain), len(rough))
     plain_force, rough_force, t = plain["force_sampled"][:n], rough["force_sampled"][:n], plain["t"][:n]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from palpate.bench import changed, names, summarise
+from palpate.bench import names, summarise, with_values
 from palpate.bench.build import FILES, build_any, load_any, parse_any
 from palpate.bench.one_direction import OneDirection
 from palpate.errors import InputError
@@ -20,7 +20,9 @@ stiffness = 5e3
 
 
 def run(name, **changes):
-    experiment = changed(load_any(name), {key.replace("__", "."): value for key, value in changes.items()})
+    experiment = with_values(
+        load_any(name), {key.replace("__", "."): value for key, value in changes.items()}
+    )
     return build_any(experiment).run(experiment.run.duration, 3, press=experiment.run.press)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from bench.quick import quick
 from own_parts import HEAD, Normal, Push, controller
-from palpate.bench import build, changed
+from palpate.bench import build, with_values
 from palpate.bench.build import check_parts
 from palpate.bench.tables import parse
 from palpate.cli import main
@@ -56,7 +56,7 @@ def module(tmp_path, monkeypatch, request):
 
 
 def with_controller(kind):
-    return changed(quick("foam-hybrid"), {"controller": {"kind": kind}})
+    return with_values(quick("foam-hybrid"), {"controller": {"kind": kind}})
 
 
 def test_an_experiment_is_made_of_them():
@@ -73,14 +73,14 @@ def test_an_experiment_is_made_of_them():
 
 
 def test_its_numbers_change_as_any_other_and_it_goes_to_another_process():
-    experiment = changed(parse(EXPERIMENT, "mine"), {"controller.ki": 5.0})
+    experiment = with_values(parse(EXPERIMENT, "mine"), {"controller.ki": 5.0})
     assert experiment.controller.ki == 5.0
     assert pickle.loads(pickle.dumps(experiment)) == experiment
 
 
 def test_identifiers_of_palpate_are_named_by_their_kind():
     for kind in ("least-squares", "restarting-least-squares", "kalman-filter"):
-        experiment = changed(quick("foam-hybrid"), {"identifier": {"kind": kind}})
+        experiment = with_values(quick("foam-hybrid"), {"identifier": {"kind": kind}})
         record = build(experiment).run(0.5, seed=1, press=0.2)
         assert np.isfinite(record["K_identifier"][-1])
         assert record["K_identifier"][-1] == pytest.approx(record["K_matched"][-1], rel=0.05)
@@ -177,7 +177,7 @@ def test_a_bad_identifier_is_told(module):
         "class Bad:\n    def update(self, regressor, force): pass\n    def estimate(self): return 3.0\n"
     )
     with pytest.raises(InputError, match="AttributeError"):
-        check_parts(build(changed(quick("foam-hybrid"), {"identifier": {"kind": f"{name}:Bad"}})))
+        check_parts(build(with_values(quick("foam-hybrid"), {"identifier": {"kind": f"{name}:Bad"}})))
 
 
 def test_the_command_refuses_in_one_line_and_leaves_nothing(module, tmp_path, capsys):

@@ -104,7 +104,7 @@ compiled_shake = kernel(shake)
 
 def misfit(surface, dt, depth=4e-3):
     """Normal force less what the surface's law gives in central differences of p; and what half a step does to it."""
-    plant = plant_with(surface, LuGre().scaled(0.3))
+    plant = plant_with(surface, LuGre().scaled_by(0.3))
     state = pressed(plant, depth)
     static = surface.force(state.surface, depth, 0.0)
     out = np.empty((round(0.2 / dt), 3))
@@ -142,7 +142,7 @@ def kinetic(plant, state):
 
 def imbalance(dt, seconds=0.25):
     """Work of the motors over a press from the air, less what became of it, by account [J]."""
-    plant = plant_with(friction=LuGre().scaled(0.3))
+    plant = plant_with(friction=LuGre().scaled_by(0.3))
     state = at_rest(plant, WALL - 2e-3)
     torque = push(plant, (40.0, 4.0, 0.0), state.q)
     end, out = after(plant, state, torque, dt, seconds)
@@ -155,7 +155,7 @@ def imbalance(dt, seconds=0.25):
     )
     speed = plant.arm.jac(before.q).r1 @ before.qd
     lost = 0.5 * speed**2 * tip_mass * FOAM.mass / (tip_mass + FOAM.mass)
-    stored = plant.surface.stored(end.surface)
+    stored = plant.surface.stored_energy(end.surface)
     elastic = 0.5 * FOAM.stiffness * end.surface.deflection**2
     assert stored >= elastic
     normal = out[landed[0] + 1 :, 2].sum()
@@ -191,7 +191,7 @@ def test_friction_takes_what_its_bristles_do_not_hold():
     plant = plant_with()
     state = at_rest(plant, 0.40)
     end, out = after(plant, state, push(plant, (40.0, 0.0, 0.0), state.q), 50e-6, 0.2)
-    stored = sum(plant.friction.stored(end.bristles))
+    stored = sum(plant.friction.stored_energy(end.bristles))
     assert out[:, 1].sum() > stored
     assert np.all(np.cumsum(out[:, 1]) > -1e-12)
 
@@ -249,8 +249,8 @@ def test_contact_never_pulls_and_nothing_blows_up(first, second, name):
 
 def energy(plant, state):
     """All the energy there is [J]: of the arm, the surface, the joints' bristles and the one along the surface."""
-    bristles = sum(plant.friction.stored(state.bristles)) + plant.side.bent(state.side)
-    return kinetic(plant, state) + plant.surface.stored(state.surface) + bristles
+    bristles = sum(plant.friction.stored_energy(state.bristles)) + plant.side.bending_energy(state.side)
+    return kinetic(plant, state) + plant.surface.stored_energy(state.surface) + bristles
 
 
 def test_compiled_is_plain_to_the_bit():

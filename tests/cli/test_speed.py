@@ -7,7 +7,7 @@ import pytest
 
 from palpate.bench import build, load, speed
 from palpate.bench.force_input import COLUMNS, CONTACT
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate.cli import main
 
 
@@ -47,7 +47,7 @@ def test_the_figures_follow_from_a_clock_and_the_ticks_that_were_run(monkeypatch
 
 
 def test_what_is_measured_presses_and_learns():
-    bench = build(changed(load(speed.EXPERIMENT), speed.PRESSING))
+    bench = build(with_values(load(speed.EXPERIMENT), speed.PRESSING))
     record = bench.run(1.0)
     assert (record["phase"] == CONTACT).mean() > 0.5
     assert record["adapted2"][-1] != record["adapted2"][0]  # a norm of the network's weights

@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from bench.quick import quick
-from palpate.bench import build, changed
+from palpate.bench import build, with_values
 from palpate.controllers import ControllerTable
 from palpate.signals.types import example, kinds
 from palpate_checks import controllers as laws
@@ -37,5 +37,5 @@ def test_it_obeys_those_that_compile_it(table, law):
 @each
 def test_an_experiment_may_ask_for_it(table):
     asked = {"controller": {"kind": table.__struct_config__.tag, **msgspec.to_builtins(table)}}
-    record = build(changed(quick("foam-hybrid"), asked)).run(0.002, compiled=False)
+    record = build(with_values(quick("foam-hybrid"), asked)).run(0.002, compiled=False)
     assert len(record) == 2

@@ -18,7 +18,7 @@ def drag(grip, rate, normal, dt, out):
     state = grip.start()
     for k in range(rate.size):
         out[k, 0], state = grip.slide(state, rate[k], normal[k], dt)
-        out[k, 1] = grip.bent(state)
+        out[k, 1] = grip.bending_energy(state)
 
 
 def run(rate, normal, dt=DT, grip=GRIP, kernel=drag):

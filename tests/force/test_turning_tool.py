@@ -81,6 +81,18 @@ def test_turning_is_about_the_centre_of_the_tip() -> None:
     assert twist[3:] @ np.cross(R[:, 2], turning.loop.normal) > 0.0
 
 
+def test_a_tool_whose_loop_missed_ticks_stops_turning() -> None:
+    gains = replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9))
+    tool, R = TurningTool(SlidingLoop(gains)), turned(DOWN, np.array([40.0, 25.0, 0.0]))
+    state = tool.loop.state
+    state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
+    slide_from(tool.loop.law, state, places.Vec3(0.0, 0.0, -1.0), 10.0, 2e4, 0.1, 0.12, 0.35, 0.3)
+    reading = (np.array([0.0, 0.0, -10.0]), np.zeros(3), R, np.array([1.0, 0.0, 0.0]))
+    assert tool.update(*reading)[3:].any()
+    assert not tool.update(*reading, missed=1e3)[3:].any()
+    assert "missed" in tool.loop.trouble
+
+
 def test_a_tool_that_is_none_is_refused() -> None:
     loop = SlidingLoop(
         replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9))

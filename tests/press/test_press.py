@@ -206,7 +206,7 @@ def test_a_users_own_gains(tmp_path):
 
 def test_a_plan_is_steady_at_both_ends():
     plan = Plan(20.0, 6.0, 0.2)
-    assert [plan.desired(t) for t in (0.0, 1.9, 2.1, 2.4, 4.1, 5.9)] == [20.0, 20.0, 16.0, 20.0, 20.0, 20.0]
+    assert [plan.force_at(t) for t in (0.0, 1.9, 2.1, 2.4, 4.1, 5.9)] == [20.0, 20.0, 16.0, 20.0, 20.0, 20.0]
 
 
 def test_every_arm_by_its_name():
@@ -325,7 +325,7 @@ def cell(damping=0.0):
     from palpate.robots import SerialArm
     from palpate.robots.serial.serial_arm import mjcf
 
-    arm = SerialArm.named("iiwa14")
+    arm = SerialArm.from_name("iiwa14")
     text = mjcf(arm).replace('armature="0.1"', f'armature="0.1" damping="{damping}"')
     text = re.sub(
         r"<site [^>]*>", '<body name="hand" pos="0 0 0.045"><geom size="0.02" mass="0.1"/>'

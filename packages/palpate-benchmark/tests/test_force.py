@@ -191,7 +191,9 @@ def test_ablations_of_the_law_are_not_shipped_as_entries():
     assert not [name for name in names if name.startswith("cautious,")]
 
 
-def test_recorded_presses_are_judged_as_simulated_ones(tmp_path):
+@pytest.mark.parametrize(("noise", "theta"), [(0.0, 0.0), (0.5, 0.04)])
+def test_recorded_presses_are_judged_as_simulated_ones(tmp_path, noise, theta):
+    """Noise of 2.5 % of the force is none of it: the mean over the lag has settled when the force has."""
     rate, hold = 500.0, 6.0
     t = np.arange(round((0.5 + hold) * rate)) / rate
     since = np.maximum(t - 0.5, 0.0)
@@ -202,18 +204,20 @@ def test_recorded_presses_are_judged_as_simulated_ones(tmp_path):
     for k in range(len(t)):
         state += (wanted[k] * (t[k] >= 0.5) - state) / rate / 0.05
         force[k] = state
+    force = force + noise * np.random.default_rng(3).standard_normal(len(t))
     columns = {"t": t, "force_sampled": force, "phase": (t >= 0.5) * 1.0}
-    about = {"title": "an arm", "desired_N": 20.0, "hold_s": hold, "probe": 0.2}
+    about = {"title": "an arm", "desired_N": 20.0, "hold_s": hold, "probe": 0.2, "theta_s": theta}
     write_record(
         Record(columns, {"t": "s", "force_sampled": "N", "phase": "1"}, {"wire": about}),
         tmp_path / "record.parquet",
     )
     result = judge((tmp_path / "record.parquet",))
     (run,) = result.runs
-    assert run.touch.passed
-    assert run.touch.settling == pytest.approx(0.05 * np.log(20.0), abs=0.01)
-    assert run.up.rise == pytest.approx(0.05 * np.log(9.0), abs=0.01)
-    assert run.down.rise == pytest.approx(0.05 * np.log(9.0), abs=0.01)
+    assert run.touch.settling == pytest.approx(0.05 * np.log(20.0), abs=0.01 + theta)
+    if noise == 0.0:
+        assert run.touch.passed
+        assert run.up.rise == pytest.approx(0.05 * np.log(9.0), abs=0.01)
+        assert run.down.rise == pytest.approx(0.05 * np.log(9.0), abs=0.01)
     assert run.bandwidth is None
     assert "an arm: 1 of 1 presses" in sentence([result])
 

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from cli.json_keys import documented
-from palpate.bench import Experiment, build, changed, load
+from palpate.bench import Experiment, build, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
@@ -92,7 +92,7 @@ def test_the_hand_chosen_bench_changes_nothing(experiment: Experiment):
 
 def test_what_a_figure_varies_is_varied_about_the_laboratorys_own_value():
     lab = Laboratory(friction=0.5, foam_damping=100.0)
-    twice = lab.of(changed(FOAM, {**rougher(FOAM, 2.0), "surface.damping": 400.0}))
+    twice = lab.of(with_values(FOAM, {**rougher(FOAM, 2.0), "surface.damping": 400.0}))
     assert twice.friction.coulomb == pytest.approx(FOAM.friction.coulomb)
     assert twice.surface.damping == pytest.approx(200.0)
 
@@ -107,7 +107,7 @@ def test_a_laboratory_changes_what_it_names():
         arm_stiffness=1e5,
         asymmetry=0.2,
     )
-    e = lab.of(changed(FOAM, SINE))
+    e = lab.of(with_values(FOAM, SINE))
     assert e.wall.x - e.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
     assert e.robot.torque_limits == (16.0, 5.0, 0.6)
     assert e.force_sensor.noise == pytest.approx(0.3)
@@ -123,7 +123,7 @@ TRIED = {
     "rubber press": press_runs.RUBBER,
     "steps on foam": FOAM,
     "steps on rubber": RUBBER,
-    "sine on foam": changed(FOAM, SINE),
+    "sine on foam": with_values(FOAM, SINE),
 }
 IN_THE_NETWORK = {"amplitude", "weights", "start"}  # of the identifier, which thinks after the run
 
@@ -154,7 +154,7 @@ def test_every_unknown_enters_some_experiment(unknown: Unknown):
 )
 def test_what_no_figure_had_tried_changes_the_runs(case: str, of: dict[str, float]):
     press = 5.5 if "restart" in of else 0.5  # the clock starts anew after 5 s
-    short = changed(TRIED[case], {"run.press": press, "run.steps": 5})
+    short = with_values(TRIED[case], {"run.press": press, "run.steps": 5})
     bench, other = (build(lab.of(short)).run(60.0, 0, press=press) for lab in (CHOSEN, Laboratory(**of)))
     force = [record["force_measured"][record["phase"] == CONTACT] for record in (bench, other)]
     rows = min(map(len, force))
@@ -577,7 +577,7 @@ def test_claims_are_counted_without_the_rows_that_sum_them_up():
 
 
 def test_the_listings_weights_stay_where_a_figure_has_others():
-    e = changed(load("foam-neural"), {"controller.weights": "random", "controller.weights_seed": 7})
+    e = with_values(load("foam-neural"), {"controller.weights": "random", "controller.weights_seed": 7})
     assert Laboratory(controller_weights=2.0).of(e).controller.weights_seed == 7
     assert Laboratory(controller_weights=LISTING, noise=0.3).of(FOAM).controller.weights == "thesis"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate._vector import Vec3
-from palpate.bench import build, changed
+from palpate.bench import build, with_values
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
 from palpate_thesis.configuration import GRAVITY, FrictionByConfiguration, tilting
@@ -28,7 +28,7 @@ def test_the_tilting_moment_is_that_of_the_links_own_weights():
 
 
 def test_at_its_reference_it_is_the_friction_itself_and_follows_the_angles():
-    bench = build(changed(PARAMETERS, {"run.duration": 0.6}))
+    bench = build(with_values(PARAMETERS, {"run.duration": 0.6}))
     arm, plant = bench.loop.conditioning.arm, bench.loop.plant
     part = FrictionByConfiguration(LuGre(), arm, tilting(arm, bench.q), bench.q)
     torque, state = part.step(part.start(), Vec3(1e-9, 0.0, 0.0), 5e-5)

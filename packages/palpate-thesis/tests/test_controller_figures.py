@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from palpate._vector import Vec3
-from palpate.bench import build, changed, load
+from palpate.bench import build, load, with_values
 from palpate.environments import KelvinVoigt
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
@@ -32,7 +32,7 @@ from palpate_thesis.force_control.disturbances import (
 from palpate_thesis.force_control.tracking import since_contact
 from palpate_thesis.runs import Runs
 
-FOAM = changed(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
+FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)
 
 
@@ -156,7 +156,7 @@ def test_a_hopeless_loop_has_no_limit():
 
 
 def test_without_friction_the_arm_is_the_target_spring_and_damper():
-    e = changed(fig_2_02.PARAMETERS, fig_2_02.FREE)
+    e = with_values(fig_2_02.PARAMETERS, fig_2_02.FREE)
     found = fig_2_02.found_in(fig_2_02.record_jumps(e, 0))
     assert pytest.approx(1.0, abs=0.05) == found.K
     assert pytest.approx(1.0, abs=0.25) == found.B
@@ -173,8 +173,8 @@ def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
 
 
 def test_without_friction_a_step_of_force_turns_the_tip_less_when_decoupled():
-    world = changed(fig_4_19.PARAMETERS, fig_4_19.FREE)
-    coupled = stray(press_with_jumps(changed(world, fig_4_19.COUPLED), 0))
+    world = with_values(fig_4_19.PARAMETERS, fig_4_19.FREE)
+    coupled = stray(press_with_jumps(with_values(world, fig_4_19.COUPLED), 0))
     decoupled = stray(press_with_jumps(world, 0))
     assert decoupled.phi < 0.6 * coupled.phi
     assert decoupled.lost == 0
@@ -214,7 +214,7 @@ def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
     record = run_with(compensation.PLAIN, 0, [])
     assert compensation.listing_factor(record) < 1e-6
     slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
-    finer = changed(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
+    finer = with_values(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
     patched = type(record)({**record.columns, **slow}, record.units, record.meta)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compensation, "PLAIN", finer)
@@ -264,11 +264,11 @@ def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
     case = (60.0, 1.0, 0.003)
     stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
     runs = Runs((0,))
-    free = changed(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
+    free = with_values(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
     assert not fig_4_03.stays_quiet(runs.one(free))
     assert fig_4_03.stays_quiet(runs.one(fig_4_03.press_of(case, stiffness, 1.0)))
 
 
 def test_rougher_friction_is_what_it_says():
-    half = changed(FOAM, rougher(FOAM, 0.5))
+    half = with_values(FOAM, rougher(FOAM, 0.5))
     assert half.friction.coulomb == tuple(0.5 * v for v in FOAM.friction.coulomb)

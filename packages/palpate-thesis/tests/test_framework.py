@@ -15,7 +15,7 @@ import pytest
 
 import palpate_thesis
 from frozen import kept
-from palpate.bench import changed, load
+from palpate.bench import load, with_values
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, tables, verdict_of, with_wholes
@@ -403,9 +403,9 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
 
 
 def test_a_run_cut_short_is_never_measured():
-    experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
+    experiment = with_values(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
     runs = Runs()
-    runs.one(changed(experiment, {"run.press": 0.1}))  # compiles
+    runs.one(with_values(experiment, {"run.press": 0.1}))  # compiles
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         runs.one(experiment)
@@ -414,9 +414,9 @@ def test_a_run_cut_short_is_never_measured():
 @pytest.mark.long
 def test_ctrl_c_stops_the_runs_of_all_threads():
     """Hours of simulated time are under way on other threads; they end within a look."""
-    experiment = changed(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
+    experiment = with_values(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
     runs = Runs()
-    runs.one(changed(experiment, {"run.press": 0.1}))  # compiles
+    runs.one(with_values(experiment, {"run.press": 0.1}))  # compiles
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     before, begun = threading.active_count(), time.monotonic()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.bench.force_input import COLUMNS, CONTACT, LOST
 from palpate.records import Record
 from palpate_studies.metrics.following import LIMIT
@@ -96,14 +96,14 @@ def test_nine_of_ten_are_enough_and_eight_are_not():
 
 
 def test_variations_change_what_they_say_and_nothing_else():
-    there = changed(FOAM, move_wall(FOAM, 0.40))
+    there = with_values(FOAM, move_wall(FOAM, 0.40))
     assert there.wall.x == 0.40
     assert there.wall.x - there.robot.start[0] == pytest.approx(FOAM.wall.x - FOAM.robot.start[0])
     assert there.wall.x - there.approach.first == pytest.approx(FOAM.wall.x - FOAM.approach.first)
     assert there.surface == FOAM.surface
-    rough = changed(FOAM, rougher(FOAM, 2.0))
+    rough = with_values(FOAM, rougher(FOAM, 2.0))
     assert rough.friction.coulomb == tuple(2.0 * f for f in FOAM.friction.coulomb)
-    names = [set(variations(e, 0)) for e in (FOAM, RUBBER, changed(RUBBER, SINE))]
+    names = [set(variations(e, 0)) for e in (FOAM, RUBBER, with_values(RUBBER, SINE))]
     assert "relaxing\nfoam" in names[0]
     assert "relaxing\nfoam" not in names[1]
     assert names[2] - names[1] == {"clock\nruns on", "motor 2\nto 4 N m"}
@@ -157,7 +157,7 @@ def test_the_text_s_learning_rate_is_five_per_second():
 
 def test_watching_sees_the_run_of_the_bench():
     """Chunks and looks must not change what happens: the last row is the one of the recorded run."""
-    experiment = changed(FOAM, {"run.press": 2.0})
+    experiment = with_values(FOAM, {"run.press": 2.0})
     record = Runs(range(1)).one(experiment)
     seen = []
     lost = watch(
@@ -173,11 +173,11 @@ def test_watching_sees_the_run_of_the_bench():
 
 def test_a_network_that_loses_contact_is_noticed():
     """The relaxing foam at ten times the listing's rate: lost at once, while the bench's PI holds."""
-    wild = changed(e3_divergence.RELAXING, {"controller.learning_rate": 1e-3})
+    wild = with_values(e3_divergence.RELAXING, {"controller.learning_rate": 1e-3})
     lost = watch(wild, 0, 10.0, lambda one: None)
     assert lost is not None
     assert 0.0 < lost < 10.0
-    assert watch(changed(wild, e2_integrator.PI), 0, 10.0, lambda one: None) is None
+    assert watch(with_values(wild, e2_integrator.PI), 0, 10.0, lambda one: None) is None
 
 
 def test_sizes_of_the_weights_add_up():

@@ -67,7 +67,7 @@ def test_one_joint_under_the_integral_swings_as_its_edge_says(share, stable):
     """Sensor clock, one-sided contact and sub-steps are the bench's; its friction is a thousandth."""
     ki = DIRECT.ki[1]
     stiffness = share * edge(ForceLaw("", 0.0, (ki, ki), DIRECT.tip), 200.0)
-    link = Link(friction=JOINT_2.friction.scaled(1e-3), limit=100.0)
+    link = Link(friction=JOINT_2.friction.scaled_by(1e-3), limit=100.0)
     schedule = ForceSchedule(20.0, 20.0, 1e3, 0.0, 0.5, 0.0)
     bench = one_joint(
         KelvinVoigt(stiffness, 200.0, 0.05), DirectIntegral(ki * link.lever), schedule, link=link, noise=1e-3

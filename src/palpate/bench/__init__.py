@@ -13,7 +13,7 @@ from palpate.bench.build import build
 from palpate.bench.given_motion import GivenMotion, given_motion
 from palpate.bench.plant import Loop, march, start_at
 from palpate.bench.summary import summarise
-from palpate.bench.tables import Experiment, ForceSensorTable, changed, load, names, source
+from palpate.bench.tables import Experiment, ForceSensorTable, load, names, source, with_values
 
 __all__ = [
     "Bench",
@@ -23,7 +23,6 @@ __all__ = [
     "Loop",
     "Vec3",
     "build",
-    "changed",
     "given_motion",
     "law",
     "load",
@@ -33,4 +32,5 @@ __all__ = [
     "source",
     "start_at",
     "summarise",
+    "with_values",
 ]

@@ -12,7 +12,7 @@ import numpy as np
 from palpate.bench.build import build
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import compiled_march, start_at
-from palpate.bench.tables import changed, load
+from palpate.bench.tables import load, with_values
 
 EXPERIMENT = "foam-neural"
 PRESSING = {
@@ -36,7 +36,7 @@ def measure(waiting: Callable[[], None] | None = None) -> dict[str, float | int]
 
     `waiting` is called if the loop has to be compiled first.
     """
-    bench = build(changed(load(EXPERIMENT), PRESSING))
+    bench = build(with_values(load(EXPERIMENT), PRESSING))
     noise = np.random.default_rng(0).standard_normal((CHUNKS, TICKS))
     ticks = TICKS * CHUNKS
 

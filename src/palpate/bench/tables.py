@@ -241,7 +241,7 @@ def parse(text: str, where: str) -> Experiment:
     return convert(read_toml(text, where), where, Experiment)
 
 
-def changed(experiment: T, changes: Mapping[str, Any]) -> T:
+def with_values(experiment: T, changes: Mapping[str, Any]) -> T:
     """The experiment with other values: {"friction.coulomb": (6.0, 0.5, 0.06), "run.press": 20.0}.
 
     Raises:

@@ -216,7 +216,7 @@ SURFACE = Role(
         "relax": ("state, p, v, dt", "SurfaceState"),
         "free": ("state, dt", "SurfaceState"),
     },
-    optional={"stored": ("state", "energy"), "truth": ("", "{name: (value, unit)}")},
+    optional={"stored_energy": ("state", "energy"), "truth": ("", "{name: (value, unit)}")},
 )
 IDENTIFIER = Role(
     "identifier", {"update": ("regressor, force", "None"), "estimate": ("", "Estimate")}, compiled=False

@@ -101,7 +101,7 @@ def _surface_of(found: Path | None, surface: SurfaceOptions, columns: ColumnOpti
     if found is not None and surface.stiffness is not None:
         raise InputError("give a file or --stiffness, not both")
     if surface.stiffness is not None:
-        return Known.stated(surface.stiffness.si, highest)
+        return Known.of_range(surface.stiffness.si, highest)
     if found is None:
         raise InputError(
             "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"

@@ -58,7 +58,7 @@ class HuntCrossley(NamedTuple):
         s, v = swing(self.mass, damping, stiffness, 0.0, state.deflection, state.rate, weight, dt)
         return SurfaceState(s, v, 0.0, 0.0)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
         s, v, n = abs(state.deflection), state.rate, self.exponent + 1.0
         return self.stiffness * s**n / n + 0.5 * self.mass * v * v

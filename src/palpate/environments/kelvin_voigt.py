@@ -47,7 +47,7 @@ class KelvinVoigt(NamedTuple):
         s, v = swing(self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt)
         return SurfaceState(s, v, 0.0, 0.0)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
         s, v = state.deflection, state.rate
         return 0.5 * (self.stiffness * s * s + self.mass * v * v)

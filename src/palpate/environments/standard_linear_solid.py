@@ -75,7 +75,7 @@ class StandardLinearSolid(NamedTuple):
         s, v = swing(self.mass, self.damping, stiffness, load, state.deflection, state.rate, weight, dt)
         return SurfaceState(s, v, stretch_after(z, s - state.deflection, time, weight, dt), 0.0)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
         s, v, z = state.deflection, state.rate, state.internal
         return 0.5 * (self.stiffness * s * s + self.branch_stiffness * z * z + self.mass * v * v)

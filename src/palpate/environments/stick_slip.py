@@ -45,7 +45,7 @@ class StickSlip(NamedTuple):
         )
         return -pull, StickSlipState(bend)
 
-    def bent(self, state):
+    def bending_energy(self, state):
         """Energy in the bristle [J]."""
         return 0.5 * self.stiffness * state.bend * state.bend
 

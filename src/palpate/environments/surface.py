@@ -52,11 +52,11 @@ class Surface(NamedTuple):
             return self.first.free(state, dt)
         return self.second.free(state, dt)
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Energy that can be given back, motion of the mass included [J]."""
         if self.chosen == 1:
-            return self.first.stored(state)
-        return self.second.stored(state)
+            return self.first.stored_energy(state)
+        return self.second.stored_energy(state)
 
     def truth(self):
         """Parameter names with value and unit, for reports."""

@@ -177,8 +177,8 @@ def identify_inner_loop(
         InputError: too short, uneven, without motion, or without the excitation to tell the numbers apart.
     """
     log_ = _Log.of(time, command, position, force, where)
-    p = _fitted(log_)
-    errors, best, gain_std = _errors(log_, p, [_fitted(part, p) for part in log_.cut(2)])
+    p = _fit_loop(log_)
+    errors, best, gain_std = _errors(log_, p, [_fit_loop(part, p) for part in log_.cut(2)])
     w, z, late, gain = exp(p[0]), exp(p[1]), float(p[2]), float(best[0])
     half = errors.half(np.eye(len(errors.halves))[2])
     delay, lag = (
@@ -289,7 +289,7 @@ class _Log:
         ]
 
 
-def _fitted(log_: _Log, start: Array | None = None) -> Array:
+def _fit_loop(log_: _Log, start: Array | None = None) -> Array:
     """log w, log z and delay [s], shape (3,), of the least residual."""
     from scipy.optimize import least_squares
 

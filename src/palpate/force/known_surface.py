@@ -60,7 +60,7 @@ class Known:
     force: float | None = None
 
     @classmethod
-    def stated(cls, stiffness: tuple[float, float], damping: float | None = None) -> Known:
+    def of_range(cls, stiffness: tuple[float, float], damping: float | None = None) -> Known:
         """A surface from a range of K [N/m] and the highest B [N s/m]; no damping is assumed when None."""
         none = {"damping": Assumed(0.0, "N s/m", "none is given: --damping-max allows for one")}
         return cls(stiffness, assumed=none).with_damping_up_to(damping)
@@ -139,7 +139,7 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     if not high > 0.0:
         raise InputError(f"{source}: a stiffness of {low:g} to {high:g} N/m is none that one can press on")
     damping, assumed = _damping(parameters.get("B"), logs if isinstance(logs, list) else [])
-    value, warnings = K.get("value"), _warned(found.get("warnings")) + _of_mass(parameters.get("M"))
+    value, warnings = K.get("value"), _warnings_of(found.get("warnings")) + _of_mass(parameters.get("M"))
     force = point.get("force_N") if isinstance(point, Mapping) else None
     return Known(
         (max(low, SOFTEST), high + _relaxing(parameters)),
@@ -206,7 +206,7 @@ def _relaxing(parameters: Mapping[str, Any]) -> float:
     return max(interval[1], 0.0) if interval else 0.0
 
 
-def _warned(warnings: object) -> tuple[tuple[str, str], ...]:
+def _warnings_of(warnings: object) -> tuple[tuple[str, str], ...]:
     """Warnings of an identification, as far as they are text."""
     given = warnings if isinstance(warnings, list) else []
     return tuple(

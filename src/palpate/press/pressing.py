@@ -174,7 +174,7 @@ def press(
     Returns:
         One row a tick; ``meta["end"]`` says why it ended, ``meta["why"]`` in a sentence.
     """
-    rows, sequence = _Rows(arm.arm.joints), PressSequence(arm, driver, plan.desired, arm.loop.tick)
+    rows, sequence = _Rows(arm.arm.joints), PressSequence(arm, driver, plan.force_at, arm.loop.tick)
     ending, k = None, 0
     while ending is None:
         try:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, Protocol
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
@@ -48,7 +49,7 @@ class Plan:
         if not 0.0 <= self.probe <= 0.9:
             raise InputError(f"the probe is a share of the force from 0 to 0.9, got {self.probe:g}")
 
-    def desired(self, since: float) -> float:
+    def force_at(self, since: float) -> float:
         """Desired force at a time since the touch [N]: steady, in the middle third in steps down and up, steady."""
         third = self.seconds / 3.0
         if not third <= since < 2.0 * third:
@@ -60,6 +61,18 @@ class Plan:
 def plan_for(force: float, seconds: float, probe: float, gap: float, speed: float) -> Plan:
     """A plan that looks for the surface three times as long as the way to it takes, and a second."""
     return Plan(force, seconds, probe, 1.0 + _PATIENCE * gap / speed)
+
+
+def mean_over(forces: Array, lag: float, tick: float) -> Array:
+    """Running mean over a loop's lag [s], of which single readings' noise is no part; shape (n - lag/tick + 1,).
+
+    Args:
+        forces: one a tick [N], shape (n,).
+        lag: theta [s].
+        tick: [s].
+    """
+    width = max(round(lag / tick), 1)
+    return np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
 
 
 class TipSample(NamedTuple):

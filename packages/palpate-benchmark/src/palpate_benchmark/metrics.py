@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.press.sequence import mean_over
 from palpate_benchmark.plan import LINES, PERIOD, STEP_HEIGHT, SWAY, SWAYS, ForcePlan
 
 BAND = 0.05
@@ -51,7 +52,7 @@ class TouchMetrics:
         return self.settling is not None and self.overshoot <= OVER and not self.lost
 
 
-def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> TouchMetrics:
+def touch(force: Array, desired: float, rate: float, free: float = 0.0, lag: float = 0.0) -> TouchMetrics:
     """Metrics of a touch.
 
     Args:
@@ -59,19 +60,19 @@ def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> Touch
         desired: F_d [N].
         rate: of the rows [Hz].
         free: largest force that counts as free motion [N].
+        lag: over which the mean of readings has to settle [s]; 0 for each of them.
     """
     contact = force > free
     last = force[-round(rate) :]
-    if not contact.any() or not np.isfinite(force).all():
-        finite = np.isfinite(force).all()
-        return TouchMetrics(
-            None, 0.0 if finite else math.inf, 0, 0, -desired if finite else math.nan, math.nan
-        )
+    if not np.isfinite(force).all():
+        return TouchMetrics(None, math.inf, 0, 0, math.nan, math.nan)
+    if not contact.any():
+        return TouchMetrics(None, 0.0, 0, 0, -desired, math.nan)
     start, over = int(np.argmax(contact)), force > FIRM * desired
     firm = int(np.argmax(over)) if over.any() else len(force)
     ends = np.flatnonzero(contact[:-1] & ~contact[1:])
     return TouchMetrics(
-        settling_time(force[start:], desired, rate),
+        settling_time(force[start:], desired, rate, lag),
         float(force.max() / desired - 1.0),
         int((ends < firm).sum()),
         int((ends >= firm).sum()),
@@ -80,8 +81,9 @@ def touch(force: Array, desired: float, rate: float, free: float = 0.0) -> Touch
     )
 
 
-def settling_time(force: Array, desired: float, rate: float) -> float | None:
-    """From the first row until the force stays within 5 % of F_d [s]; None if it is not within at the end."""
+def settling_time(force: Array, desired: float, rate: float, lag: float = 0.0) -> float | None:
+    """From the first row until the mean over a lag [s] stays within 5 % of F_d [s]; None if it is not so at the end."""
+    force = mean_over(force, lag, 1.0 / rate)
     outside = np.flatnonzero(np.abs(force - desired) > BAND * desired)
     first = int(outside[-1]) + 1 if len(outside) else 0
     return first / rate if first <= len(force) - round(STAYS * rate) else None
@@ -102,7 +104,7 @@ class ForceStep:
     overshoot: float
 
 
-def step(force: Array, before: float, after: float, rate: float) -> ForceStep:
+def step(force: Array, before: float, after: float, rate: float, lag: float = 0.0) -> ForceStep:
     """Metrics of a step.
 
     Args:
@@ -110,11 +112,13 @@ def step(force: Array, before: float, after: float, rate: float) -> ForceStep:
         before: F_d before it [N].
         after: F_d after it [N].
         rate: of the rows [Hz].
+        lag: as of `touch`.
     """
     share = (force - before) / (after - before)
     at = [int(np.argmax(share >= level)) if (share >= level).any() else None for level in (0.1, 0.9)]
     rise = None if at[0] is None or at[1] is None else (at[1] - at[0]) / rate
-    return ForceStep(rise, settling_time(force, after, rate), max(float(share.max()) - 1.0, 0.0))
+    over = max(float(share.max()) - 1.0, 0.0)
+    return ForceStep(rise, settling_time(force, after, rate, lag), over)
 
 
 def response(force: Array, desired: Array, lines: tuple[int, ...], periods: int) -> Array:

@@ -1,7 +1,8 @@
 """The test over a wire: presses of `palpate press --wire ... --record`, judged by their records.
 
 The arm moves under the guards of `palpate press` and nothing else. A press that lowers its force now and then has three
-steps down and up in its middle third; the force before is that of the touch.
+steps down and up in its middle third; the force before is that of the touch. A force has settled when
+its mean over the loop's lag has, as palpate press says it; peaks, losses and rises are those of single readings.
 """
 
 from __future__ import annotations
@@ -75,21 +76,22 @@ def _run(record: Record, path: Path) -> RunMetrics:
     since = t[begin:] - t[begin]
     held = since < plan.seconds
     force, before = force[begin:][held], force[:begin]
-    wanted = np.array([plan.desired(s) for s in since[held]])
+    wanted = np.array([plan.force_at(s) for s in since[held]])
     first = since[held] < plan.seconds / 3.0
-    found = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before))
-    steps = _steps(force, wanted, rate)
+    lag = float(about.get("theta_s", 0.0))
+    met = touch(np.concatenate([before, force[first]]), plan.force, rate, FREE * _noise(before), lag)
+    steps = _steps(force, wanted, rate, lag)
     none = ForceStep(None, None, np.nan)
     down, up = ([s for s, lower in steps if lower is side] or [none] for side in (True, False))
-    return RunMetrics(found, _slowest(up), _slowest(down), None, np.nan, None)
+    return RunMetrics(met, _slowest(up), _slowest(down), None, np.nan, None)
 
 
-def _steps(force: Array, wanted: Array, rate: float) -> list[tuple[ForceStep, bool]]:
+def _steps(force: Array, wanted: Array, rate: float, lag: float) -> list[tuple[ForceStep, bool]]:
     """Each step of the desired force, and whether it lowers the force."""
     at = np.flatnonzero(np.diff(wanted)) + 1
     ends = [*at[1:], len(wanted)]
     return [
-        (step(force[i:end], wanted[i - 1], wanted[i], rate), bool(wanted[i] < wanted[i - 1]))
+        (step(force[i:end], wanted[i - 1], wanted[i], rate, lag), bool(wanted[i] < wanted[i - 1]))
         for i, end in zip(at, ends, strict=True)
     ]
 

@@ -52,22 +52,6 @@ class Integral(NamedTuple):
 
 
 @part
-class FixedAdmittance(NamedTuple):
-    """M vdot + D v = e: admittance of a mass and a damper (Hogan)."""
-
-    mass: float
-    damping: float
-    tick: float
-
-    def start(self):
-        return 0.0
-
-    def step(self, state, desired, force, position):
-        speed = state + self.tick / self.mass * (desired - force - self.damping * state)
-        return speed, speed
-
-
-@part
 class FilteredDerivative(NamedTuple):
     """v = g (e - T_d dF/dt), the rate through a low-pass (thesis, 2.3)."""
 
@@ -121,9 +105,8 @@ class Fuzzy(NamedTuple):
         smooth += 0.1 * ((force - last) / self.tick - smooth)
         far = min(abs(error) / self.scale, 1.0)
         closing = max(min(smooth * error / (abs(error) + 1e-9) / self.rate_scale, 1.0), -1.0)
-        rule = far * (1.0 - closing) - (1.0 - far) * max(
-            closing, 0.0
-        )  # far and not closing: more; near and fast: less
+        # far and not closing: more; near and fast: less
+        rule = far * (1.0 - closing) - (1.0 - far) * max(closing, 0.0)
         return self.gain * exp(1.1 * max(min(rule, 1.0), -1.0)) * error, (smooth, force)
 
 
@@ -147,8 +130,8 @@ class FeedbackErrorLearning(NamedTuple):
 
 
 @part
-class LearnedImpedance(NamedTuple):
-    """The damping of an admittance goes down the squared force error (after Cohen and Flash)."""
+class Admittance(NamedTuple):
+    """M vdot + D v = e (Hogan); at a rate its damping goes down the squared force error (after Cohen and Flash)."""
 
     mass: float
     damping: float
@@ -197,17 +180,17 @@ class Observer(NamedTuple):
     tick: float
 
     def start(self):
-        return 1.0, 0.0, 0.0, 0.0
+        return 1.0, 0.0, 0.0
 
     def step(self, state, desired, force, position):
-        share, index, side, before = state
+        share, index, side = state
         error = desired - force
         now = 1.0 if error > 0.05 * desired else -1.0 if error < -0.05 * desired else side
         index += self.tick / self.window * (-index)
         if now * side < 0.0:
             index += 1.0
         share += self.tick / self.window * ((1.0 if index < 1.0 else 0.1) - share)
-        return self.gain * share * error, (share, index, now, before)
+        return self.gain * share * error, (share, index, now)
 
 
 @part
@@ -257,10 +240,10 @@ class TaughtNeurons(NamedTuple):
     third: Vec3
 
     def start(self):
-        return self.first, self.second, self.third, Vec3(0.0, 0.0, 0.0), 0.0, 0.0
+        return self.first, self.second, self.third, Vec3(0.0, 0.0, 0.0)
 
     def step(self, state, desired, force, position):
-        a, b, c, out, sum_, last = state
+        a, b, c, out = state
         error = desired - force
         inputs = Vec3(error / self.scale, force / self.scale, 1.0)
         h = Vec3(sigmoid(a, inputs), sigmoid(b, inputs), sigmoid(c, inputs))
@@ -270,7 +253,7 @@ class TaughtNeurons(NamedTuple):
         b += (delta * out.y * 0.5 * (1.0 - h.y * h.y)) * inputs
         c += (delta * out.z * 0.5 * (1.0 - h.z * h.z)) * inputs
         out += delta * h
-        return self.feedback * self.gain * error + push, (a, b, c, out, sum_, last)
+        return self.feedback * self.gain * error + push, (a, b, c, out)
 
 
 def rivals(gains: Any, rng: Any) -> dict[str, Any]:
@@ -282,19 +265,18 @@ def rivals(gains: Any, rng: Any) -> dict[str, Any]:
     """
     theta, tick, sigma = gains.theta, gains.arm.tick, gains.arm.sensor.noise
     unit = gains.alpha / theta
-    compliance = gains.compliance
-    g, stiff = unit * (compliance + 1.0 / NOMINAL), gains.gain
+    g = unit * (gains.compliance + 1.0 / NOMINAL)
     damping, mass = 1.0 / g, theta / g
     draw = lambda: Vec3(*(0.3 * rng.standard_normal(3)).tolist())  # noqa: E731
     first = {
         "fixed integral, 7 kN/m": Integral(g),
-        "fixed integral, stiffest": Integral(stiff),
-        "impedance": FixedAdmittance(mass, damping, tick),
+        "fixed integral, stiffest": Integral(gains.gain),
+        "impedance": Admittance(mass, damping, 0.0, tick),
         "filtered force derivative": FilteredDerivative(g, theta, 0.01, tick),
         "estimated force rate": EstimatedRate(g, theta, NOMINAL, tick),
         "fuzzy compensation": Fuzzy(g, 0.5 * gains.force, gains.force / theta, tick),
         "feedback-error learning": FeedbackErrorLearning(g, 2.0, tick),
-        "learned impedance": LearnedImpedance(mass, damping, 0.5, tick),
+        "learned impedance": Admittance(mass, damping, 0.5, tick),
         "self-tuning": DescendingGain(g, 20.0, tick),
         "stability observer": Observer(g, 6.0 * theta, tick),
         "EKF gain scheduling": Ekf(unit, sigma, 1e4, NOMINAL, tick),

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
-from palpate.bench import build, changed, load
+from palpate.bench import build, load, with_values
 from palpate.bench.bench import Bench
 from palpate.bench.build import check_parts
 from palpate.controllers.controller import controller as registered
@@ -114,7 +114,7 @@ def it_starts_anew_with_each_run(controller: Any) -> None:
 
 
 def _bench(controller: Any) -> Bench:
-    return build(changed(load("foam-hybrid"), _NEAR)).with_controller(controller)
+    return build(with_values(load("foam-hybrid"), _NEAR)).with_controller(controller)
 
 
 LAWS = (

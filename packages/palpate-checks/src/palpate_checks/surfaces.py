@@ -102,9 +102,11 @@ def gives_back_no_more(
     # What the trapezoidal sums leave: they are second order in the step.
     slack = 2e-4 * np.max(np.abs(work))
     lost = work[::10]
-    if hasattr(surface, "stored"):
-        lost = lost - np.array([surface.stored(SurfaceState(s, v, z, 1.0)) for _, s, v, z in out[::10]])
-    worst = float(min(np.min(lost) if hasattr(surface, "stored") else 0.0, work[-1]))
+    if hasattr(surface, "stored_energy"):
+        lost = lost - np.array(
+            [surface.stored_energy(SurfaceState(s, v, z, 1.0)) for _, s, v, z in out[::10]]
+        )
+    worst = float(min(np.min(lost) if hasattr(surface, "stored_energy") else 0.0, work[-1]))
     told = f"pressed by {1e3 * depth:.3g} mm it gives or stores {-worst:.3g} J more than it was given"
     require(worst >= -slack, told)
 
@@ -114,7 +116,7 @@ def never_gains_when_free(surface: Any, start: SurfaceState, dt: float, slack: f
     out = np.empty((2000, 3))
     recover(surface, start, dt, out)
     states = [start, *(SurfaceState(s, v, z, 0.0) for s, v, z in out)]
-    energy = np.array([surface.stored(one) for one in states])
+    energy = np.array([surface.stored_energy(one) for one in states])
     require(np.isfinite(energy).all(), "released, its energy is not finite")
     require(np.all(np.diff(energy) <= slack * energy[0] + 1e-30), "released, it gains energy")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.bench import build, changed, load
+from palpate.bench import build, load, with_values
 from palpate.errors import InputError
 from palpate_excitation import HybridLoop, KnownBandwidth, LinearSurface
 from palpate_excitation.force_loops import contact_force
@@ -95,7 +95,7 @@ def test_it_foretells_what_the_arm_on_the_bench_lets_through(name):
     waves = {"frequencies": frequencies, "amplitudes": amplitudes, "phases": phases}
     change = {"force.first": 15.0, "run.press": 5.0}
     change |= {f"force.multisine.{key}": tuple(values.tolist()) for key, values in waves.items()}
-    run = build(changed(experiment, change)).run(60.0, seed=1, press=5.0)
+    run = build(with_values(experiment, change)).run(60.0, seed=1, press=5.0)
     force = run["force"][np.flatnonzero(run["phase"] == 1.0)[1000:5000]]
 
     own = experiment.controller

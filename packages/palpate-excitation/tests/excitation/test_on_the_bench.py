@@ -7,7 +7,7 @@ import pytest
 
 import palpate
 from palpate.bench import build
-from palpate.bench.tables import changed, parse
+from palpate.bench.tables import parse, with_values
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 from palpate_excitation import Budget, DesignProblem, SurfaceRange, design
@@ -30,7 +30,7 @@ def test_the_spread_over_seeds_is_the_predicted_one(kind):
     values = []
     for seed in range(RUNS):
         phase = {"force_sensor.phase": float(rng.uniform(0, 1 / 480))}
-        run = build(changed(asked, phase)).run(asked.run.duration, seed=seed, press=asked.run.press)
+        run = build(with_values(asked, phase)).run(asked.run.duration, seed=seed, press=asked.run.press)
         rows = np.flatnonzero(run["phase"] == 1.0)
         rows = rows[rows >= rows[0] + round(1000 * found.settle)]
         # A position sensor at the tip; the arm's own angles bend the motion in ways of their own.

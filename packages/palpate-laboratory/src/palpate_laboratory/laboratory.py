@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.bench.toml_parts import TomlFiles
 from palpate.controllers.neural import NeuralController
 from palpate.environments import KelvinVoigtSurface
@@ -174,7 +174,7 @@ class Laboratory:
         surface = self._surface(experiment.surface)
         if surface is not None:
             changes["surface"] = surface
-        return changed(experiment, changes)
+        return with_values(experiment, changes)
 
     def _friction(self, e: Experiment) -> dict[str, Any]:
         f = e.friction

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from palpate.bench import Experiment, build, changed
+from palpate.bench import Experiment, build, with_values
 from palpate.bench.force_input import DONE, INTERRUPTED
 from palpate.records import Record
 from palpate_laboratory.laboratory import Laboratory
@@ -41,8 +41,8 @@ verdicts turn as with another draw of the noise (`benchmarks/steps.py`)."""
 SWITCHED = 4.0
 """Seconds of contact that figure 4.2 looks at [s]."""
 LARGEST_RATE = fig_6_06.RATES[-1]
-UNSTUCK = changed(FOAM.PARAMETERS, {"wall.side_friction": 0.0})
-HYBRID = changed(fig_6_10.PARAMETERS, {"run.press": 10.0})
+UNSTUCK = with_values(FOAM.PARAMETERS, {"wall.side_friction": 0.0})
+HYBRID = with_values(fig_6_10.PARAMETERS, {"run.press": 10.0})
 """One interval of each force, of those that figure 6.10 looks at."""
 
 
@@ -76,7 +76,7 @@ class Trial:
 
     def record(self, experiment: Experiment) -> Record:
         """The run of an experiment here, up to the first loss of contact: no verdict changes after that."""
-        e = changed(self.laboratory.of(experiment), {"run.steps": self.steps, "run.losses": 1})
+        e = with_values(self.laboratory.of(experiment), {"run.steps": self.steps, "run.losses": 1})
         record = build(e).run(e.run.duration, self.seed, press=e.run.press, progress=self._look)
         if record.meta["end"] == INTERRUPTED:
             raise KeyboardInterrupt

@@ -12,7 +12,7 @@ from palpate.bench.build import build, check_parts
 from palpate.bench.force_input import COLUMNS as ROW
 from palpate.bench.force_input import CONTACT, LOST, StopCondition
 from palpate.bench.given_motion import rest_for
-from palpate.bench.tables import Experiment, changed
+from palpate.bench.tables import Experiment, with_values
 from palpate.environments import SurfaceState
 from palpate.signals.types import NORMAL
 from palpate.text import printable
@@ -127,7 +127,7 @@ class WatchedSimulation:
         self.view.check(key, value)
         if value == self.state.values[key]:
             return
-        experiment = changed(self._experiment, {key: value})
+        experiment = with_values(self._experiment, {key: value})
         new = build(experiment).loop
         if key.startswith("surface."):
             self._resurface(new.plant.surface)

@@ -8,7 +8,7 @@ import headless
 import numpy as np
 import pytest
 
-from palpate.bench.tables import changed, load
+from palpate.bench.tables import load, with_values
 from palpate_live.player import Feed, Player
 from palpate_live.server import serve
 from palpate_live.simulation import WatchedSimulation
@@ -68,7 +68,7 @@ class Stream:
 
 def near(name="foam-hybrid", **more):
     """An experiment that touches soon, so that nothing is waited for."""
-    return changed(load(name), {"approach.hold": 0.1, "approach.first": 0.463, **more})
+    return with_values(load(name), {"approach.hold": 0.1, "approach.first": 0.463, **more})
 
 
 @pytest.fixture

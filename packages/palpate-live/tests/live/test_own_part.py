@@ -3,18 +3,20 @@
 import pytest
 
 from palpate.bench import load
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate_live.simulation import sliders_of
 
 pytestmark = pytest.mark.usefixtures("permitted")
 
 
 def test_sliders_are_those_that_the_part_has():
-    experiment = changed(load("foam-hybrid"), {"surface": {"kind": "own_parts:Spring", "stiffness": 4000.0}})
+    experiment = with_values(
+        load("foam-hybrid"), {"surface": {"kind": "own_parts:Spring", "stiffness": 4000.0}}
+    )
     assert {one.key for one in sliders_of(experiment)} >= {
         "surface.stiffness",
         "surface.damping",
         "controller.kf",
     }
-    bare = changed(load("foam-hybrid"), {"surface": {"kind": "own_parts:Rigid"}})
+    bare = with_values(load("foam-hybrid"), {"surface": {"kind": "own_parts:Rigid"}})
     assert {one.key for one in sliders_of(bare)} == {"force.first", "controller.kf"}

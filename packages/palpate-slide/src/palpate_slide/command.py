@@ -156,7 +156,7 @@ class SlideOptions(SlideLimits):
             raise InputError("--dither needs --physics own; leave out --physics mujoco")
         return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
 
-    def tuned(self) -> Gains:
+    def tuned_gains(self) -> Gains:
         """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
         from msgspec.structs import replace as msgspec_replace
 
@@ -218,7 +218,7 @@ def slide(
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
     check_share(asked.dither)
-    gains = asked.tuned()
+    gains = asked.tuned_gains()
     slide_numbers = numbers_of(gains)
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
     ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
@@ -261,7 +261,7 @@ def _watch(asked: SlideOptions) -> int:
         raise InputError(
             "--live needs palpate-live, which is not installed: pip install palpate-live"
         ) from None
-    gains = asked.tuned()
+    gains = asked.tuned_gains()
     ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
     ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
     return show_live(

@@ -96,7 +96,7 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     units = {name: _UNITS.get(name, "1") for name in columns}
     write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
     with style.ink():
-        drawing = _drawn(rows, gains, summary)
+        drawing = _draw(rows, gains, summary)
         style.save(drawing, folder / "slide.png")
         panels = panels_of(drawing)
     alerts = [
@@ -151,7 +151,7 @@ def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
     return [("Stiffness along the path", f"{len(rows)} places, for palpate map --table places.csv", rows)]
 
 
-def _drawn(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
+def _draw(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
     """Force error, speed, normal, friction and stiffness against the path; stretches where the slide was slower."""
     on = rows[:, COLUMNS.index("sliding")] > 0.0
     kept = rows[on] if on.any() else rows

@@ -56,7 +56,7 @@ def test_a_film_moves_along_the_path(slid) -> None:
     assert (float(gone[0]), float(gone[-1])) == (1.0, 0.0)
 
 
-def test_a_film_of_a_surface_that_was_never_touched_is_one(slid) -> None:
+def test_film_and_page_of_a_surface_that_was_never_touched(slid, tmp_path) -> None:
     rows, gains, ground = slid
     before = rows[:50]
     assert not before[:, COLUMNS.index("normal_force")].any()
@@ -64,6 +64,9 @@ def test_a_film_of_a_surface_that_was_never_touched_is_one(slid) -> None:
     summary = summarise(before, gains, ground)
     assert summary["end"] == "no contact"
     assert "never touched" in sentence(summary)
+    write_report(before, gains, ground, summary | {"command": "palpate slide", "seed": 0}, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert '<p class="lead">The surface was never touched' in page
 
 
 def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:

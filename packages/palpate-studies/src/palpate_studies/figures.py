@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Mask
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.bench.force_input import DONE
 from palpate.controllers import NeuralController
 from palpate.errors import InputError
@@ -302,7 +302,7 @@ def equivalent(experiment: Experiment) -> Experiment:
         return experiment
     ki = c.learning_rate * (c.amplitude[0] / 2.0) ** 2 * experiment.run.rate
     table = {"kind": "proportional-integral", "kp": c.kp, "kv": c.kv, "kf": c.kf, "ki": ki}
-    return changed(experiment, {"controller": table})
+    return with_values(experiment, {"controller": table})
 
 
 def _growing(part: StudyPart, name: str, fixed: Mapping[str, Any]) -> Growing:
@@ -318,7 +318,7 @@ def _growing(part: StudyPart, name: str, fixed: Mapping[str, Any]) -> Growing:
         if not isinstance(experiment, Experiment):
             return None
         # Friction is not in the linear model: panels that differ in it alone share their boundary.
-        return _growth(changed(equivalent(experiment), {"friction": {}}))
+        return _growth(with_values(equivalent(experiment), {"friction": {}}))
 
     return growing
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.bench.build import AnyExperiment
 from palpate.errors import InputError
 from palpate_studies.study import StudyParameter, flat
@@ -33,7 +33,7 @@ def experiment_of(base: AnyExperiment, tables: Tables) -> AnyExperiment:
     before = tables_of(base)
     changes = {key: value for key, value in tables.items() if value != before[key]}
     try:
-        return changed(base, changes)
+        return with_values(base, changes)
     except InputError as error:
         raise type(error)(str(error).removeprefix(f"{', '.join(changes)}: ")) from error
 

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.worlds import surface
 from palpate.bench import build
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate.errors import InputError
 from palpate.force.boundary import stable_between
 from palpate_studies.analysis import linearise, stable_intervals, stable_stiffness
@@ -29,7 +29,7 @@ def test_the_boundary_is_where_the_growth_is_one():
     low, high = stable_stiffness(base, 5e4, 2e5, x=0.4688)
     assert low == 5e4
     for share in (0.999, 1.001):
-        on = linearise(changed(base, {"surface.stiffness": share * high}), x=0.4688)
+        on = linearise(with_values(base, {"surface.stiffness": share * high}), x=0.4688)
         assert on.stable == (share < 1.0)
 
 
@@ -92,4 +92,4 @@ def test_no_value_of_a_grid_is_on_the_wrong_side():
     found = stable_intervals(base, "controller.kf", 1.0, 4.0)
     for value in np.geomspace(1.0, 4.0, 7).tolist():
         told = any(a <= value <= b for a, b in found)
-        assert linearise(changed(base, {"controller.kf": value})).stable == told
+        assert linearise(with_values(base, {"controller.kf": value})).stable == told

@@ -8,7 +8,7 @@ import pytest
 from analysis.one_direction import growth
 from analysis.worlds import decoupled, ringing, surface, tip_mass
 from palpate.bench import build, load
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate.errors import InputError
 from palpate_studies.analysis import growth_with, linearise, stable_stiffness
 from palpate_studies.analysis.linear_model import period_of
@@ -53,7 +53,7 @@ def test_the_simulated_bench_swings_as_predicted_on_both_sides_of_the_boundary(d
     boundary = stable_stiffness(base, low, high, x=0.466)[1]
     assert low < boundary < high
     for share in (0.97, 1.03):
-        loop = linearise(changed(base, {"surface.stiffness": share * boundary}), x=0.466)
+        loop = linearise(with_values(base, {"surface.stiffness": share * boundary}), x=0.466)
         assert loop.stable == (share < 1.0)
         # After half a second the slowest swing is alone but for the integral's exponential, which the mean takes out.
         error = ringing(loop, 4000, 0.1)[2000:]
@@ -76,7 +76,7 @@ def test_a_neural_controller_is_the_integrator_that_its_gain_says():
     assert plain.stable
     ours, theirs = ([mode.rate for mode in loop.modes[:3]] for loop in (neural, plain))
     np.testing.assert_allclose(ours, theirs, rtol=0.01)
-    faster = linearise(changed(load("foam-neural"), {"controller.learning_rate": 1e-4}))
+    faster = linearise(with_values(load("foam-neural"), {"controller.learning_rate": 1e-4}))
     assert faster.modes[0].rate < 1.2 * neural.modes[0].rate  # both negative
 
 
@@ -98,19 +98,19 @@ def test_ticks_multiply_to_a_period_and_the_eigenvalues_are_of_both():
 
 def test_when_the_sensor_s_clock_starts_does_not_matter():
     base = load("foam-hybrid")
-    late = changed(base, {"force_sensor.phase": 1.3e-3})
+    late = with_values(base, {"force_sensor.phase": 1.3e-3})
     # A sample is taken at the first physics step after the clock's tick: up to 50 us, 1/150 of the lag.
     assert linearise(late).growth == pytest.approx(linearise(base).growth, abs=2e-6)
 
 
 @pytest.mark.parametrize(("sampling", "period"), [(480, 25), (1000, 1), (500, 2), (400, 5)])
 def test_a_period_is_when_sampling_falls_on_the_ticks_as_before(sampling, period):
-    loop = build(changed(load("foam-hybrid"), {"force_sensor.sampling": sampling})).loop
+    loop = build(with_values(load("foam-hybrid"), {"force_sensor.sampling": sampling})).loop
     assert period_of(loop) == period
 
 
 def test_a_sensor_as_fast_as_the_ticks_is_linear_as_well():
-    loop = linearise(changed(load("foam-hybrid"), {"force_sensor.sampling": 1000}))
+    loop = linearise(with_values(load("foam-hybrid"), {"force_sensor.sampling": 1000}))
     assert loop.period == 1
     assert loop.stable
     assert np.isfinite([mode.frequency for mode in loop.modes]).all()

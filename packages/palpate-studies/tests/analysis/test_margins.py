@@ -7,7 +7,7 @@ import pytest
 
 from analysis.worlds import surface
 from palpate.bench import load
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 from palpate.errors import InputError
 from palpate_studies.analysis import growth_with, linearise, loop_gain, margins
 
@@ -44,8 +44,8 @@ def test_a_lag_turns_the_phase_and_nothing_else():
     """A millisecond of further sampling delay at 20 Hz: 7.2 degrees."""
     base = load("foam-hybrid")
     f = np.array([2.0, 5.0, 20.0])
-    before = loop_gain(linearise(changed(base, {"force_sensor.sampling": 1000})), f)
-    after = loop_gain(linearise(changed(base, {"force_sensor.sampling": 500})), f)
+    before = loop_gain(linearise(with_values(base, {"force_sensor.sampling": 1000})), f)
+    after = loop_gain(linearise(with_values(base, {"force_sensor.sampling": 500})), f)
     # One more period of computing, half a period more of holding: 1 ms + 0.5 ms.
     np.testing.assert_allclose(np.degrees(np.angle(before / after)), 360.0 * f * 1.5e-3, rtol=0.05)
     np.testing.assert_allclose(np.abs(after / before), 1.0, rtol=0.01)

@@ -6,7 +6,7 @@ from palpate._vector import Vec3, solve
 from palpate.bench import load
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import compiled_march
-from palpate.bench.tables import changed
+from palpate.bench.tables import with_values
 
 NONE = (0.0, 0.0, 0.0)
 
@@ -15,7 +15,7 @@ def surface(stiffness, damping, kf, ki, **others):
     """Hybrid control of a surface of 0.05 kg."""
     numbers = {"stiffness": stiffness, "damping": damping, "mass": 0.05}
     gains = {"controller.kf": kf, "controller.ki": ki}
-    return changed(load("foam-hybrid"), {f"surface.{k}": v for k, v in numbers.items()} | gains | others)
+    return with_values(load("foam-hybrid"), {f"surface.{k}": v for k, v in numbers.items()} | gains | others)
 
 
 def ringing(loop, ticks, kick):
@@ -32,7 +32,7 @@ def ringing(loop, ticks, kick):
 
 def decoupled(experiment):
     """The same with y and phi free of the force: a model without error, nothing to stick to."""
-    return changed(experiment, {"robot.rotor_inertia": NONE, "wall.side_friction": 0.0})
+    return with_values(experiment, {"robot.rotor_inertia": NONE, "wall.side_friction": 0.0})
 
 
 def tip_mass(loop):

@@ -50,6 +50,6 @@ class FrictionByConfiguration(NamedTuple):
     def step(self, state, v, dt):
         """As that of `LuGre`; the plant's angles are the integral of its rates."""
         q = state.q + dt * v
-        now = self.friction.scaled(tilting(self.arm, q) / self.reference)
+        now = self.friction.scaled_by(tilting(self.arm, q) / self.reference)
         torque, bristles = now.step(state.bristles, v, dt)
         return torque, ConfigurationState(bristles, q)

@@ -3,7 +3,7 @@
 from palpate.wires import Command, LostError, Sense, Wire
 from palpate_wires.at_rest import AtRest, look
 from palpate_wires.opening import KINDS, open_wire
-from palpate_wires.order import Order, PressLimits, PressTask, checked
+from palpate_wires.order import Order, PressLimits, PressTask, check_order
 from palpate_wires.outcome import Outcome, Rows, recover
 from palpate_wires.press import press
 
@@ -19,7 +19,7 @@ __all__ = [
     "Rows",
     "Sense",
     "Wire",
-    "checked",
+    "check_order",
     "look",
     "open_wire",
     "press",

@@ -14,7 +14,7 @@ from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
 from palpate.wires import Sense, Wire, unreadable
-from palpate_wires.order import Order, checked
+from palpate_wires.order import Order, check_order
 from palpate_wires.orientation import turn_vector
 
 _FEWEST = 20
@@ -99,7 +99,7 @@ def with_noise_of(rest: AtRest, order: Order) -> tuple[Order, str | None]:
     said = f"the force's noise is {rest.noise:.2g} N at rest, and the gains are for {expected:g} N"
     if order.loop.certificate is not None:
         raise InputError(f"{said}: the certificate is of other gains; tune for this noise, and certify again")
-    retuned = checked(ForceLoop(gains), order.task, order.limits)
+    retuned = check_order(ForceLoop(gains), order.task, order.limits)
     return retuned, f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
 
 

@@ -20,7 +20,7 @@ from palpate.press.engines import mass_note
 from palpate.wires import Wire
 from palpate_wires.at_rest import AtRest, look, notes_on, with_noise_of
 from palpate_wires.opening import name_of, open_wire
-from palpate_wires.order import Order, PressLimits, PressTask, checked, stiffest, travel_for
+from palpate_wires.order import Order, PressLimits, PressTask, check_order, stiffest, travel_for
 from palpate_wires.order import Path as SlidePath
 from palpate_wires.outcome import Outcome, Rows, recover
 from palpate_wires.press import press
@@ -59,7 +59,7 @@ def press_over(
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     assert asked.gains is not None
-    order = checked(ForceLoop.load(asked.gains, options.certificate), replace(task, path=path), most)
+    order = check_order(ForceLoop.load(asked.gains, options.certificate), replace(task, path=path), most)
     tool = asked.tool
     with PluginOptions().consent(given=name_of(str(options.wire))[0] or ""):
         arm = open_wire(str(options.wire))
@@ -105,7 +105,7 @@ def task_of(asked: AskOptions, wire: WireOptions, limits: LimitOptions) -> tuple
         travel = limits.travel_limit.si
     retreat = min(RETREAT, travel) if wire.retreat is None else wire.retreat.si
     most = PressLimits(force, limits.speed_limit.si, travel, limits.time_limit.si)
-    return PressTask(asked.desired, normal.si, asked.seconds, retreat, asked.probe or 0.0), most
+    return PressTask(asked.desired_force, normal.si, asked.seconds, retreat, asked.probe or 0.0), most
 
 
 def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
@@ -118,6 +118,7 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "desired_N": task.force,
         "hold_s": task.hold,
         "probe": task.probe,
+        "theta_s": order.loop.gains.theta,
         # The encoders of a servo show how it gives way, so that nothing is in series with the surface.
         "position_from": "tip" if order.loop.gains.arm.kind == "servo" else "joints",
         **({} if tool is None else tool.meta),

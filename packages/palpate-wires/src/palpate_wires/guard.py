@@ -159,7 +159,7 @@ class Moment(NamedTuple):
     since_touch: float | None
 
 
-def spoiled(sense: Sense, last: Sense, rest: AtRest, theta: float) -> str | None:
+def fault_of(sense: Sense, last: Sense, rest: AtRest, theta: float) -> str | None:
     """Why a reading is none, in words; None if it is one.
 
     Args:

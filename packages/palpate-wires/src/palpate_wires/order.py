@@ -156,7 +156,7 @@ def travel_for(gains: Gains, force: float) -> float:
     return force / stiffest(gains)
 
 
-def checked(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
+def check_order(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
     """The request as an order, its direction of unit length; refused where it contradicts the gains.
 
     Raises:

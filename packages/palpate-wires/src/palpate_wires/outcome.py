@@ -20,6 +20,7 @@ from palpate.errors import InputError
 from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
 from palpate.force import SlidingLoop
 from palpate.logs import write_record
+from palpate.press.sequence import mean_over
 from palpate.records import Record
 from palpate_wires.at_rest import AtRest
 from palpate_wires.order import Order
@@ -104,8 +105,7 @@ def settling_time(times: Array, forces: Array, order: Order) -> float | None:
         before = times < times[-1] / 3.0
         times, forces = times[before], forces[before]
     gains = order.loop.gains
-    width = max(round(gains.theta / gains.arm.tick), 1)
-    smooth = np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
+    smooth = mean_over(forces, gains.theta, gains.arm.tick)
     outside = np.flatnonzero(np.abs(smooth / order.task.force - 1.0) > _BAND)
     if not len(outside):
         return 0.0

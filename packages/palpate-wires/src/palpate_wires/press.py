@@ -19,7 +19,7 @@ from palpate.force import ForceLoop, SlidingLoop
 from palpate.press.sequence import CautiousDriver, PressSequence, SlidingDriver, TipSample
 from palpate.wires import Command, EndedError, Wire, triple
 from palpate_wires.at_rest import AtRest, look, with_noise_of
-from palpate_wires.guard import Guard, Moment, end_if, reason_to_stop, spoiled
+from palpate_wires.guard import Guard, Moment, end_if, fault_of, reason_to_stop
 from palpate_wires.order import Order
 from palpate_wires.outcome import Outcome, Rows, force_reached, settling_time, surface_of
 from palpate_wires.realtime import Stopwatch
@@ -69,7 +69,7 @@ def press(
 
     Args:
         wire: to an arm at rest in free motion.
-        order: what to do with it, from `checked`.
+        order: what to do with it, from `check_order`.
         rows: keeps everything.
         asked_to_stop: the reason why the user wants it to end; None while he does not.
         show: called with each sentence for the user while it presses; must not block.
@@ -116,7 +116,7 @@ class GuardedArm:
             EndedError: none came, or a stop condition.
         """
         sense = self.guard.read()
-        end_if(spoiled(sense, self.now.sense, self.rest, self._order.loop.gains.theta))
+        end_if(fault_of(sense, self.now.sense, self.rest, self._order.loop.gains.theta))
         force, position = np.array(sense.force) - self.rest.bias, np.array(sense.position)
         last = self.now.sense
         ticks = (sense.stamp - last.stamp) / self._tick
@@ -146,7 +146,7 @@ class GuardedArm:
             velocity = velocity * min(1.0, limits.speed / max(size, _STILL))
         self.velocity, self.commanded = velocity, self.commanded + self._tick * velocity
         self.guard.write(Command(triple(velocity), triple(self.rest.position + self.commanded)))
-        self.watch.done(self.now.sense.stamp, time.monotonic(), self.now.missed)
+        self.watch.note_sent(self.now.sense.stamp, time.monotonic(), self.now.missed)
 
 
 class _Press:
@@ -166,7 +166,7 @@ class _Press:
                 loop.limit_speed(order.limits.speed)
             rate, last = gains.arm.rate, len(ways) - 1
             self._driver = SlidingDriver(arm, loop, lambda since: ways[min(round(since * rate), last)], show)
-        self._sequence = PressSequence(arm, self._driver, task.plan.desired, gains.arm.tick)
+        self._sequence = PressSequence(arm, self._driver, task.plan.force_at, gains.arm.tick)
         self._pressed: list[tuple[float, float]] = []
         self._stiffness: tuple[float, float] | None = None
 

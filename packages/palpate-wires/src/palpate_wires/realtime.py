@@ -161,7 +161,7 @@ class Stopwatch:
         self._at = now
         return now - stamp - self._offset
 
-    def done(self, stamp: float, now: float, missed: int) -> None:
+    def note_sent(self, stamp: float, now: float, missed: int) -> None:
         """The command of a reading has gone out."""
         age = self.age(stamp, now)
         if self._allowed is not None and age > self._allowed:

@@ -15,7 +15,7 @@ def run(late, allowed=TICK, drift=0.0, missed=()):
     watch = Stopwatch(TICK, allowed, len(late))
     for k, delay in enumerate(late):
         stamp = 5.0 + k * TICK * (1.0 + drift)
-        watch.done(stamp, 100.0 + k * TICK + 0.001 + delay, 1 if k in missed else 0)
+        watch.note_sent(stamp, 100.0 + k * TICK + 0.001 + delay, 1 if k in missed else 0)
     return watch.summary()
 
 

@@ -12,7 +12,7 @@ from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import LostError, Sense
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm
-from palpate_wires import PressLimits, PressTask, Rows, checked, press
+from palpate_wires import PressLimits, PressTask, Rows, check_order, press
 from palpate_wires.order import travel_for
 from wires.slow_cell import cell, servo_cell
 
@@ -74,7 +74,7 @@ def lying(
     if noise is not None:
         arm.world = arm.world._replace(noise=noise)
     wire = FakeWire(arm, lie, since)
-    order = checked(
+    order = check_order(
         ForceLoop.load(folder / "gains.toml"), PressTask(10.0, (0.0, 0.0, -1.0), hold, 0.001),
         PressLimits(force=25.0, speed=speed, travel=travel, seconds=20.0),
     )  # fmt: skip

@@ -21,7 +21,7 @@ from palpate.force.simulated_press import surface
 from palpate.force.slide_table import Slide
 from palpate.logs import read_record
 from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
-from palpate_wires import PressLimits, PressTask, Rows, checked, press
+from palpate_wires import PressLimits, PressTask, Rows, check_order, press
 from palpate_wires.order import Path as SlidePath
 from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, servo_cell, wait_for_rows
 from wires.test_press import FakeWire
@@ -52,7 +52,7 @@ def servo(tmp_path_factory):
 def order_of(folder, path=PATH, **limits):
     numbers = {"force": 25.0, "speed": 0.05, "travel": 0.03, "seconds": 30.0, **limits}
     task = PressTask(10.0, (0.0, 0.0, -1.0), 6.0, 0.001, path=path)
-    return checked(ForceLoop.load(folder / "gains.toml"), task, PressLimits(**numbers))
+    return check_order(ForceLoop.load(folder / "gains.toml"), task, PressLimits(**numbers))
 
 
 def sliding(folder, lie=lambda sense, first: sense, since=4.0):

@@ -10,8 +10,8 @@ import pytest
 from palpate.force import ForceLoop, load_arm
 from palpate.press.engines import gains_for
 from palpate.wires import Sense
-from palpate_wires import AtRest, PressLimits, PressTask, checked
-from palpate_wires.guard import Moment, reason_to_stop, spoiled
+from palpate_wires import AtRest, PressLimits, PressTask, check_order
+from palpate_wires.guard import Moment, fault_of, reason_to_stop
 
 GAINS = gains_for(load_arm("ur5e"), 10.0)
 THETA = GAINS.theta
@@ -24,7 +24,7 @@ MOMENT = Moment(SENSE, 10.0, 0.001, 0.0, 0, 0.0, 1.0, None)
 def order():
     """Made by the first test: a loop is compiled where there is none yet."""
     task = PressTask(10.0, (0.0, 0.0, -1.0), 3.0, 0.001)
-    return checked(ForceLoop(GAINS), task, PressLimits(force=40.0, speed=0.02, travel=0.01, seconds=20.0))
+    return check_order(ForceLoop(GAINS), task, PressLimits(force=40.0, speed=0.02, travel=0.01, seconds=20.0))
 
 
 def test_a_press_within_its_limits_goes_on(order):
@@ -66,10 +66,10 @@ def test_each_limit_says_what_was_passed(order, changed, says):
 )
 def test_a_reading_that_is_none_is_named(changed, says):
     sense = SENSE._replace(**{"stamp": 5.002, "received": 100.002} | changed)
-    assert says in spoiled(sense, SENSE, REST, THETA)
+    assert says in fault_of(sense, SENSE, REST, THETA)
 
 
 def test_a_reading_that_catches_up_within_the_lag_counts():
     late = SENSE._replace(received=SENSE.received + 0.9 * THETA)
     caught_up = SENSE._replace(stamp=5.0 + THETA, received=late.received + 0.1 * THETA)
-    assert spoiled(caught_up, late, REST, THETA) is None
+    assert fault_of(caught_up, late, REST, THETA) is None

@@ -51,7 +51,7 @@ class AskOptions:
         return None if self.payload is None else load_payload(self.payload)
 
     @property
-    def desired(self) -> float:
+    def desired_force(self) -> float:
         """Desired force F_d [N]."""
         if self.force is None:
             raise InputError("the desired force is missing; add --force, as 20:N")
@@ -102,7 +102,7 @@ class SimulatedOptions:
             )
         touched = surface if surface is not None else surface_of(str(self.surface))
         return Question(
-            arm=self.arm, force=asked.desired, surface=touched, site=self.site, mode=self.mode,
+            arm=self.arm, force=asked.desired_force, surface=touched, site=self.site, mode=self.mode,
             physics=self.physics, controller=self.controller, gains=asked.gains, at=si(self.at),
             normal=si(asked.normal), seconds=asked.seconds,
             probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,

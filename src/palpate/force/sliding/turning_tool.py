@@ -53,7 +53,12 @@ class TurningTool:
         self._bias = np.zeros(3) if tared is None else _rotation(tared).T @ self._weight
 
     def update(
-        self, force: ArrayLike, position: ArrayLike, rotation: ArrayLike, direction: ArrayLike
+        self,
+        force: ArrayLike,
+        position: ArrayLike,
+        rotation: ArrayLike,
+        direction: ArrayLike,
+        missed: float = 0.0,
     ) -> Array:
         """Velocity of the tool's point [m/s] above its turning [rad/s] for this tick, in the base's axes, shape (6,).
 
@@ -62,12 +67,13 @@ class TurningTool:
             position: of the tool's point [m], shape (3,).
             rotation: of the tool, its axes in columns, shape (3, 3).
             direction: as for `SlidingLoop.update`.
+            missed: as for `SlidingLoop.update`.
         """
         R = _rotation(rotation)
         arm = R @ self._centre
         rest = self._weight - R @ self._bias
         velocity = self.loop.update(
-            three("force", force) - rest, three("position", position) + arm, direction
+            three("force", force) - rest, three("position", position) + arm, direction, missed
         )
         if not self.loop.sliding:
             self._rate *= 0.0

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
-from palpate.bench.tables import Experiment, changed
+from palpate.bench.tables import Experiment, with_values
 from palpate.environments.surface import alone
 from palpate.errors import InputError, unknown
 from palpate.force.lyapunov import single
@@ -230,7 +230,7 @@ def stable_stiffness(
 def _with(of: Experiment | Bench, key: str, value: float) -> Experiment | Bench:
     """The experiment, or the bench, with another value of a number."""
     if isinstance(of, Experiment):
-        return changed(of, {key: value})
+        return with_values(of, {key: value})
     path = PLACE + key.removeprefix(SURFACE) if key.startswith(SURFACE) else key
     return replace(of, loop=_put(of.loop, path, value, key))
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.bench import Experiment, build, changed, load
+from palpate.bench import Experiment, build, load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
@@ -34,7 +34,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "implicit-schemes"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(load("foam-neural"), {**SHORT, "run.losses": 0, "run.duration": 450.0})
+PARAMETERS = with_values(load("foam-neural"), {**SHORT, "run.losses": 0, "run.duration": 450.0})
 BEYOND = 0.0138
 """Of the search's desired x beyond the wall [m], as in figure 2.2."""
 WINDOW = 10.0
@@ -86,7 +86,7 @@ def run(runs: Runs) -> Data:
     found = {
         name: by_condition(
             runs,
-            {world: (scheme, changed(PARAMETERS, change)) for world, change in WORLDS.items()},
+            {world: (scheme, with_values(PARAMETERS, change)) for world, change in WORLDS.items()},
             lambda case, seed: _learning_of(press(*case, seed), case[0].seconds),
             _NAMED,
         )

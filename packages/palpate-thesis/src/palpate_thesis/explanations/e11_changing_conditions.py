@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, build, changed
+from palpate.bench import Experiment, build, with_values
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.uncertainty import student
 from palpate.report import style
@@ -25,7 +25,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "changing-conditions"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(COMPENSATED, {"force.first": 15.0})
+PARAMETERS = with_values(COMPENSATED, {"force.first": 15.0})
 WALLS = (0.40, 0.43, 0.465, 0.49)
 """x of the surface [m]; friction is as chosen for the third."""
 MORE = 1.25
@@ -63,20 +63,21 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Presses at each wall with both frictions, and a press at each temperature."""
-    walls = [changed(PARAMETERS, move_wall(PARAMETERS, x)) for x in WALLS]
+    walls = [with_values(PARAMETERS, move_wall(PARAMETERS, x)) for x in WALLS]
     arm = build(PARAMETERS).loop.conditioning.arm
     moments = np.array([list(tilting(arm, build(wall).q)) for wall in walls])
     plain, compensated = (
         by_condition(
             runs,
-            {f"{x:g}": changed(wall, change) for x, wall in zip(WALLS, walls, strict=True)},
+            {f"{x:g}": with_values(wall, change) for x, wall in zip(WALLS, walls, strict=True)},
             errors,
             [f"{x:g}" for x in WALLS],
         )
         for change in ({"compensation.level": PLAIN.compensation.level}, {})
     )
     presses = [
-        changed(IDENTIFIED, {"surface.stiffness": stiffness_at(t), "run.press": 4.0}) for t in TEMPERATURES
+        with_values(IDENTIFIED, {"surface.stiffness": stiffness_at(t), "run.press": 4.0})
+        for t in TEMPERATURES
     ]
     cases = [(press, runs.seeds[i % len(runs.seeds)]) for i, press in enumerate(presses)]
     ends = np.array(runs.over(cases, lambda r: (r["K_matched"][-1], r["K_matched_std"][-1])))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate.report import style
@@ -131,7 +131,7 @@ def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]
 NUMBER = "why-negative-mass"
 TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = {
-    name: changed(e, {"run.press": 4.2})
+    name: with_values(e, {"run.press": 4.2})
     for name, e in {
         "plain foam": press_runs.PLAIN,
         "rubber": press_runs.RUBBER,

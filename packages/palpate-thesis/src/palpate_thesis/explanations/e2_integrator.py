@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
@@ -37,10 +37,10 @@ GAIN = RATE * (AMPLITUDE / 2) ** 2 / TICK
 PI: Mapping[str, Any] = {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": GAIN}}
 LONG = {"run.press": 15.0}
 PARAMETERS: Mapping[str, Experiment] = {
-    "foam, steps": changed(FOAM, LONG),
-    "foam, steps and sine": changed(FOAM, {**LONG, **SINE}),
-    "rubber, steps": changed(RUBBER, LONG),
-    "rubber, steps and sine": changed(RUBBER, {**LONG, **SINE}),
+    "foam, steps": with_values(FOAM, LONG),
+    "foam, steps and sine": with_values(FOAM, {**LONG, **SINE}),
+    "rubber, steps": with_values(RUBBER, LONG),
+    "rubber, steps and sine": with_values(RUBBER, {**LONG, **SINE}),
 }
 RATES = (1e-6, 5e-6, 1e-5, 5e-5, 1e-4, 2e-4, 5e-4)
 JUDGED = (10.0, 15.0)
@@ -199,13 +199,13 @@ def _ratio_panel(axis: Axes, pairs: Mapping[str, BothControllers]) -> None:
 
 def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
     measure = tracking(*JUDGED)
-    plain = changed(experiment, PI)
+    plain = with_values(experiment, PI)
     found, pi_found = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
     held: dict[str, float] = {}
     ratios = {"as\nchosen": [a.rms / b.rms for a, b in zip(found, pi_found, strict=True)]}
     for name, e in variations(experiment, 0).items():
         if name not in OUTSIDE:
-            network, pi = runs.over([(one, runs.seeds[0]) for one in (e, changed(e, PI))], measure)
+            network, pi = runs.over([(one, runs.seeds[0]) for one in (e, with_values(e, PI))], measure)
             ratios[name] = [network.rms / pi.rms]
             held[name] = _error_without_torques(runs, e) / pi.rms
     network_shown, pi_shown = (slot(runs.one(e), *JUDGED) for e in (experiment, plain))
@@ -227,7 +227,9 @@ def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
 
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
-    by_rate = [changed(experiment, {"controller.learning_rate": rate, "run.press": FITTED}) for rate in RATES]
+    by_rate = [
+        with_values(experiment, {"controller.learning_rate": rate, "run.press": FITTED}) for rate in RATES
+    ]
     return np.array([runs.over_seeds(e, gain_of) for e in by_rate])
 
 

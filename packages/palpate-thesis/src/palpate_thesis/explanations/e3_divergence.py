@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.controllers.neural import NeuralState
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, texts
@@ -156,7 +156,7 @@ def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> No
 
 NUMBER = "delayed-divergence"
 TITLE, CAPTION = texts(NUMBER)
-RELAXING = changed(FOAM, RELAXING_FOAM)
+RELAXING = with_values(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
 RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
 FEW_RATES = (1e-4, 5e-5, 1e-5)
@@ -205,11 +205,11 @@ def run(runs: Runs) -> Data:
     courses: dict[str, dict[float, list[LongRun]]] = {}
     for name, e in PARAMETERS.items():
         rates, seeds = (RATES, runs.seeds[:5]) if e is RELAXING else (FEW_RATES, runs.seeds[:1])
-        cases = [(changed(e, {"controller.learning_rate": r}), s) for r in rates for s in seeds]
+        cases = [(with_values(e, {"controller.learning_rate": r}), s) for r in rates for s in seeds]
         found = runs.map(lambda case: _course(runs, *case), cases)
         courses[name] = {r: found[i * len(seeds) : (i + 1) * len(seeds)] for i, r in enumerate(rates)}
-    plain = {name: _losses(runs, changed(e, PI), 1) for name, e in PARAMETERS.items()}
-    causes = {name: _losses(runs, changed(RELAXING, change), 1) for name, change in CAUSES.items()}
+    plain = {name: _losses(runs, with_values(e, PI), 1) for name, e in PARAMETERS.items()}
+    causes = {name: _losses(runs, with_values(RELAXING, change), 1) for name, change in CAUSES.items()}
     held = runs.map(
         lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD),
         list(HELD.values()),
@@ -300,7 +300,7 @@ def _loss(runs: Runs, lost: float | None) -> Loss | None:
     """The last 0.4 s before the loss of the first seed, at the text's learning rate."""
     if lost is None:
         return None
-    record = runs.one(changed(RELAXING, {"run.press": lost, "run.duration": DURATION + 60.0}))
+    record = runs.one(with_values(RELAXING, {"run.press": lost, "run.duration": DURATION + 60.0}))
     t = since_contact(record) - lost
     last = (t >= -0.4) & (t < 0.0)
     columns = (record[name][last] for name in ("memory_fx", "vx_measured", "force"))

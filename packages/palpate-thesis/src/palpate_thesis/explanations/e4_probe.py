@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
 from palpate_thesis.least_squares import panels
@@ -168,8 +168,8 @@ def _draw_conditions(axis: Axes, data: Mapping[str, SurfaceResults]) -> None:
 LONG = 20.0
 """Seconds of contact for one of the toggles; everything else stops at the thesis' four [s]."""
 PARAMETERS = {
-    "foam": changed(network.FOAM, {"run.press": LONG}),
-    "rubber": changed(network.RUBBER, {"run.press": LONG}),
+    "foam": with_values(network.FOAM, {"run.press": LONG}),
+    "rubber": with_values(network.RUBBER, {"run.press": LONG}),
 }
 FEW = 2
 """Noise seeds for the toggles, with ten starts on each."""
@@ -254,7 +254,7 @@ def run(runs: Runs) -> Data:
 def _surface(runs: Runs, name: str) -> SurfaceResults:
     experiment = PARAMETERS[name]
     whole = network.presses(runs, experiment, name, list(runs.seeds)[:FEW])
-    some = network.presses(runs, changed(experiment, {"run.press": network.PRESS}), name)
+    some = network.presses(runs, with_values(experiment, {"run.press": network.PRESS}), name)
     cases = [(t, p, s) for t in TOGGLES.values() for p in whole for s in network.STARTS]
     looked = iter(runs.map(lambda case: look(*case), cases))
     x = NetworkChoice().probe(name, 0).values[0]

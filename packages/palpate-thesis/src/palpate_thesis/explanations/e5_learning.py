@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.conditions import RELAXING_FOAM
@@ -26,8 +26,12 @@ RATE = 5e-5
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
 SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
 SURFACES: Mapping[str, Experiment] = {
-    name: changed(e, {"run.press": 15.0, "controller.weights": "random"})
-    for name, e in (("foam", FOAM), ("rubber", RUBBER), ("foam that relaxes", changed(FOAM, RELAXING_FOAM)))
+    name: with_values(e, {"run.press": 15.0, "controller.weights": "random"})
+    for name, e in (
+        ("foam", FOAM),
+        ("rubber", RUBBER),
+        ("foam that relaxes", with_values(FOAM, RELAXING_FOAM)),
+    )
 }
 PARAMETERS = SURFACES
 JUDGED = (10.0, 15.0)
@@ -63,7 +67,7 @@ def run(runs: Runs) -> Data:
         cases = [(_from(e, seed, rate), seed) for rate in RATES for seed in runs.seeds[:PER_RATE]]
         found = runs.over(cases, measure)
         network[name] = {rate: found[i * PER_RATE : (i + 1) * PER_RATE] for i, rate in enumerate(RATES)}
-        plain = [(changed(e, _pi(rate)), runs.seeds[0]) for rate in RATES]
+        plain = [(with_values(e, _pi(rate)), runs.seeds[0]) for rate in RATES]
         pi[name] = dict(zip(RATES, runs.over(plain, measure), strict=True))
     sized = [(_with_layers(SURFACES["foam"], size, s), s) for size in SIZES for s in runs.seeds[:PER_SIZE]]
     errors = runs.over(sized, measure)
@@ -191,11 +195,11 @@ def _rates(axis: Axes, data: Data, name: str, color: str) -> None:
 
 
 def _from(experiment: Experiment, seed: int, rate: float) -> Experiment:
-    return changed(experiment, {"controller.learning_rate": rate, "controller.weights_seed": seed})
+    return with_values(experiment, {"controller.learning_rate": rate, "controller.weights_seed": seed})
 
 
 def _with_layers(experiment: Experiment, size: tuple[int, ...], seed: int) -> Experiment:
-    return changed(experiment, {"controller.layers": size, "controller.weights_seed": seed})
+    return with_values(experiment, {"controller.layers": size, "controller.weights_seed": seed})
 
 
 def _pi(rate: float) -> dict[str, object]:

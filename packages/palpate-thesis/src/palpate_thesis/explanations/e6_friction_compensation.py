@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate._vector import Vec3
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT, LOST
 from palpate.bench.summary import losses
 from palpate.instruments import Encoder
@@ -32,7 +32,7 @@ from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
-LOSS = changed(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
+LOSS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
 GONE, BACK, FOUND = 2.5, 0.005, 10.0
 """When the surface goes [s after contact], how far [m], and within what time it has to be felt again [s]."""
 AGAIN, PEAK = 3.0, 1.25
@@ -108,8 +108,8 @@ NUMBER = "friction-compensation"
 TITLE, CAPTION = texts(NUMBER)
 LEVEL = (3.0, 0.25, 0.03)
 """Compensated levels [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
-PLAIN = changed(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
-PARAMETERS = changed(PLAIN, {"compensation.level": LEVEL, "compensation.blend": (0.05, 0.05, 0.05)})
+PLAIN = with_values(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
+PARAMETERS = with_values(PLAIN, {"compensation.level": LEVEL, "compensation.blend": (0.05, 0.05, 0.05)})
 PRINTED_BLEND = 0.002
 """[rad/s]"""
 BLENDS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2)
@@ -264,7 +264,7 @@ def _quanta() -> list[float]:
 
 def with_blend(experiment: Experiment, blend: float) -> Experiment:
     """The experiment with another blend for all motors [rad/s]."""
-    return changed(experiment, {"compensation.blend": (blend, blend, blend)})
+    return with_values(experiment, {"compensation.blend": (blend, blend, blend)})
 
 
 def _worlds() -> dict[str, Mapping[str, Any]]:
@@ -278,8 +278,8 @@ def _worlds() -> dict[str, Mapping[str, Any]]:
 
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
     def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
-        without = held_in(runs.one(changed(PLAIN, world), seed))
-        compensated = runs.one(changed(PARAMETERS, world), seed)
+        without = held_in(runs.one(with_values(PLAIN, world), seed))
+        compensated = runs.one(with_values(PARAMETERS, world), seed)
         return Ratio(held_in(compensated).error / without.error, losses(compensated) > 0)
 
     return by_condition(runs, _worlds(), ratio, {"foam"})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
@@ -21,7 +21,7 @@ from palpate_thesis.runs import Runs
 NUMBER = "continuous-least-squares"
 TITLE, CAPTION = texts(NUMBER)
 SURFACES: Mapping[str, Experiment] = {
-    name: changed(e, {"run.press": press_runs.FIRST})
+    name: with_values(e, {"run.press": press_runs.FIRST})
     for name, e in (("foam", press_runs.PLAIN), ("rubber", press_runs.RUBBER))
 }
 PARAMETERS = SURFACES

@@ -12,7 +12,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, clip
 from palpate.arrays import Array
-from palpate.bench import Experiment, build, changed, load
+from palpate.bench import Experiment, build, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.controllers.controller import controller
 from palpate.controllers.decoupled_hybrid import decoupled_hybrid
@@ -35,7 +35,7 @@ TITLE, CAPTION = texts(NUMBER)
 PI = {"foam": {"kf": 1.0, "ki": 3.0}, "rubber": {"kf": 0.25, "ki": 1.5}}
 """The thesis' gains, under which the surface is identified."""
 PARAMETERS: Mapping[str, Experiment] = {
-    name: changed(
+    name: with_values(
         load("foam-decoupled"),
         {
             **SHORT,
@@ -183,7 +183,7 @@ def tune(experiment: Experiment, seed: int) -> Tuned:
     for name, one in found.items():
         for level, (first, second) in LEVELS.items():
             asked = {"force": {"first": first, "second": second, "period": 1.0}}
-            record = build(changed(experiment, asked)).with_controller(one).run(60.0, seed, press=10.0)
+            record = build(with_values(experiment, asked)).with_controller(one).run(60.0, seed, press=10.0)
             ends.append(record.meta["end"] != "done")
             responses.setdefault(name, {})[level] = response(record)
     return Tuned(forces, slopes, responses, any(ends))

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.arrays import Array, Mask
-from palpate.bench import changed, load
+from palpate.bench import load, with_values
 from palpate.bench.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
@@ -33,7 +33,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "2.1"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
+PARAMETERS = with_values(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
 DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam; the original: the same for the force, 400 and 80 inertias for its joints."""
 STEPS = (2.5, 5.0, 7.5)
@@ -86,11 +86,13 @@ class Data:
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
     surfaces = {"foam": {}, "rubber": RUBBER_SURFACE, "relaxing\nfoam": RELAXING_FOAM}
-    worlds = {n: changed(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
+    worlds = {n: with_values(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
     original = by_condition(runs, worlds, lambda e, s: _measure(runs.one(e, s)), {"foam"})
-    dynamic = by_condition(runs, worlds, lambda e, s: _measure(runs.one(changed(e, DYNAMIC), s)), {"foam"})
+    dynamic = by_condition(
+        runs, worlds, lambda e, s: _measure(runs.one(with_values(e, DYNAMIC), s)), {"foam"}
+    )
     varied = {n: [BothLaws(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
-    traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(changed(PARAMETERS, DYNAMIC)))}
+    traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(with_values(PARAMETERS, DYNAMIC)))}
     growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))

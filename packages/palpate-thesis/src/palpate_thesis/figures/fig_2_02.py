@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate._vector import Vec3
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.plant import Loop, LoopState
 from palpate.bench.summary import losses
 from palpate.controllers import Impedance
@@ -36,7 +36,7 @@ NUMBER = "2.2"
 TITLE, CAPTION = texts(NUMBER)
 DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
 """Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
-PARAMETERS = changed(
+PARAMETERS = with_values(
     load("foam-impedance"), {**SHORT, "run.press": float(len(DEPTHS)), "controller.beyond": DEPTHS[0]}
 )
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
@@ -135,10 +135,10 @@ _ALL = ("foam", "rubber")
 def _worlds() -> dict[str, Experiment]:
     return {
         "foam": PARAMETERS,
-        "rubber": changed(PARAMETERS, RUBBER_SURFACE),
-        "hardly any\nfriction": changed(PARAMETERS, FREE),
-        **{name: changed(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
-        "relaxing\nfoam": changed(PARAMETERS, RELAXING_FOAM),
+        "rubber": with_values(PARAMETERS, RUBBER_SURFACE),
+        "hardly any\nfriction": with_values(PARAMETERS, FREE),
+        **{name: with_values(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
+        "relaxing\nfoam": with_values(PARAMETERS, RELAXING_FOAM),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
@@ -31,7 +31,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "2.5"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(
+PARAMETERS = with_values(
     load("foam-self-tuning"),
     {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5},
 )
@@ -62,7 +62,7 @@ def run(runs: Runs) -> Data:
     measure = tracking(*JUDGED)
     full = {*_SURFACES, *_POSES}
     tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
-    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(changed(e, FIXED), seed)), full)
+    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(with_values(e, FIXED), seed)), full)
     turned = runs.map(lambda seed: measure(turned_into_rubber(seed)), list(runs.seeds))
     return Data(slot(turned_into_rubber(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
@@ -160,7 +160,7 @@ def _worlds() -> dict[str, Experiment]:
         "other\nweights": {"controller.weights_seed": 1},
         "rate ten\ntimes": {"controller.learning_rate": 1e-2},
     }
-    return {name: changed(PARAMETERS, changes) for name, changes in by.items()}
+    return {name: with_values(PARAMETERS, changes) for name, changes in by.items()}
 
 
 def turned_into_rubber(seed: int) -> Record:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.instruments import analog_filter_190
 from palpate.records import Record
@@ -21,7 +21,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "3.5"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(nearer(load("foam-hybrid")), {"run.press": 14.0})
+PARAMETERS = with_values(nearer(load("foam-hybrid")), {"run.press": 14.0})
 STEADY = 12.0
 """Seconds at the end of the press that are looked at [s]."""
 SEGMENT = 500
@@ -67,7 +67,9 @@ def run(runs: Runs) -> Data:
 def _pairs(runs: Runs, cases: list[tuple[Experiment, int]]) -> list[tuple[Array, Array]]:
     """Spectra without and with the filter of each case."""
     both = [
-        (changed(e, {"force_sensor.analog_filter": on}), seed) for e, seed in cases for on in (False, True)
+        (with_values(e, {"force_sensor.analog_filter": on}), seed)
+        for e, seed in cases
+        for on in (False, True)
     ]
     spectra = runs.over(both, _spectrum)
     return list(zip(spectra[::2], spectra[1::2], strict=True))

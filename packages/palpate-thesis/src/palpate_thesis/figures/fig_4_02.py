@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import changed, load
+from palpate.bench import load, with_values
 from palpate.bench.force_input import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
@@ -21,8 +21,8 @@ from palpate_thesis.runs import Runs
 NUMBER = "4.2"
 TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = {
-    "foam": press_runs.nearer(changed(load("foam-hybrid"), {"run.press": 4.0})),
-    "rubber": press_runs.nearer(changed(load("rubber-hybrid"), {"run.press": 4.0})),
+    "foam": press_runs.nearer(with_values(load("foam-hybrid"), {"run.press": 4.0})),
+    "rubber": press_runs.nearer(with_values(load("rubber-hybrid"), {"run.press": 4.0})),
 }
 THRESHOLDS = (0.8, 1.2, 1.6, 2.0, 3.0, 5.0)
 CHOSEN = 5.0
@@ -61,7 +61,8 @@ def run(runs: Runs) -> Data:
     few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
     foam = PARAMETERS["foam"]
     thresholds = {
-        f: changed(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0}) for f in THRESHOLDS
+        f: with_values(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0})
+        for f in THRESHOLDS
     }
     varied = {name: [(e, s) for s in few] for name, e in press_runs.conditions(foam).items()}
     return Data(

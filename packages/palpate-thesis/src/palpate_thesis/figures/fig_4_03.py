@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
@@ -128,7 +128,7 @@ def _exponential(A: Array) -> Array:
 
 NUMBER = "4.3"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
+PARAMETERS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
 """Effective mass of the arm along x at the wall, rotors included [kg]."""
 GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rubber)": (0.25, 0.0015)}
@@ -308,7 +308,7 @@ def press_of(case: tuple[float, float, float], stiffness: float, friction: float
     """A press with this damping and these gains on a surface of this stiffness [N/m], the friction times a share."""
     damping, kf, ki = case
     surface = {"surface.stiffness": stiffness, "surface.damping": damping, "surface.mass": 0.05}
-    return changed(
+    return with_values(
         PARAMETERS,
         {**rougher(PARAMETERS, friction), **surface, "controller.kf": kf, "controller.ki": ki},
     )
@@ -323,7 +323,7 @@ def stays_quiet(record: Record) -> bool:
 def _stable(runs: Runs, limits: dict[Case, float], share: float) -> dict[Case, list[bool]]:
     found = {}
     for case in _cases():
-        experiment = changed(press_of(case, share * limits[case[:2]], FREE), FREE_SIDE)
+        experiment = with_values(press_of(case, share * limits[case[:2]], FREE), FREE_SIDE)
         found[case[:2]] = runs.over_seeds(experiment, stays_quiet)
     return found
 

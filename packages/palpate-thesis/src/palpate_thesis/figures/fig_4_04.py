@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import changed, load
+from palpate.bench import load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate.report import style
@@ -18,7 +18,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "4.4"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(load("foam-hybrid"), {"run.press": 8.0})
+PARAMETERS = with_values(load("foam-hybrid"), {"run.press": 8.0})
 STEADY = 2.0
 """Seconds at the end of the press that are looked at [s]."""
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
@@ -75,7 +75,7 @@ def pair_of(case: tuple[Experiment, int, Mapping[str, Any]]) -> CoupledAndDecoup
     stiffness = identify_stiffness(world, seed)
     used = stiffness * law.get("wrong", 1.0)
     changes = {"controller.stiffness": used, **{k: v for k, v in law.items() if k != "wrong"}}
-    coupled, decoupled = changed(world, COUPLED), changed(world, changes)
+    coupled, decoupled = with_values(world, COUPLED), with_values(world, changes)
     return CoupledAndDecoupled(
         stray(press_with_jumps(coupled, seed)), stray(press_with_jumps(decoupled, seed)), stiffness
     )
@@ -85,12 +85,12 @@ def as_printed(case: tuple[CoupledAndDecoupled, Experiment, int]) -> CoupledAndD
     """A pair with the law as printed in place of the corrected one."""
     pair, world, seed = case
     law = {"controller.stiffness": pair.stiffness, **PRINTED}
-    return replace(pair, decoupled=stray(press_with_jumps(changed(world, law), seed)))
+    return replace(pair, decoupled=stray(press_with_jumps(with_values(world, law), seed)))
 
 
 def identify_stiffness(world: Experiment, seed: int) -> float:
     """K_e [N/m] by the matched estimator, after two seconds under the coupled law."""
-    record = run_with(changed(world, {**COUPLED, "run.press": 2.0}), seed, [])
+    record = run_with(with_values(world, {**COUPLED, "run.press": 2.0}), seed, [])
     return float(record["K_matched"][-1])
 
 
@@ -123,7 +123,7 @@ def furthest(t: Array, signal: Array, at: float) -> float:
 
 NUMBER = "4.19"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(
+PARAMETERS = with_values(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
 )
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
@@ -160,7 +160,7 @@ def run(runs: Runs) -> Data:
     for (name, _), pair in zip(named, runs.map(pair_of, [case for _, case in named]), strict=True):
         varied.setdefault(name, []).append(pair)
     k = nominal[0].stiffness
-    traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(changed(PARAMETERS, FREE), runs.seeds[0], k)]
+    traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(with_values(PARAMETERS, FREE), runs.seeds[0], k)]
     return Data(traces, nominal, printed, varied)
 
 
@@ -287,7 +287,7 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
         "relaxing\nfoam": RELAXING_FOAM,
     }
     found: dict[str, tuple[Experiment, Mapping[str, Any]]] = {
-        name: (changed(PARAMETERS, changes), {}) for name, changes in worlds.items()
+        name: (with_values(PARAMETERS, changes), {}) for name, changes in worlds.items()
     }
     for name, factor in (("K_e half\nas large", 0.5), ("K_e twice\nas large", 2.0)):
         found[name] = (PARAMETERS, {"wrong": factor})
@@ -296,5 +296,9 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
 
 def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Record]:
     known = {"controller.stiffness": stiffness}
-    experiments = (changed(world, COUPLED), changed(world, known), changed(world, {**known, **PRINTED}))
+    experiments = (
+        with_values(world, COUPLED),
+        with_values(world, known),
+        with_values(world, {**known, **PRINTED}),
+    )
     return {name: slot(press_with_jumps(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, texts
 from palpate_thesis.figures import fig_6_02_05 as later
@@ -25,11 +25,11 @@ NEAR = 0.06
 
 
 def _plain(damping: float) -> Experiment:
-    return changed(press_runs.PLAIN, {"surface.damping": damping, "surface.mass": 0.05})
+    return with_values(press_runs.PLAIN, {"surface.damping": damping, "surface.mass": 0.05})
 
 
 def _relaxing(branch: float, time: float, damping: float) -> Experiment:
-    return changed(
+    return with_values(
         press_runs.RELAXING,
         {"surface.branch_stiffness": branch, "surface.branch_time": time, "surface.damping": damping},
     )

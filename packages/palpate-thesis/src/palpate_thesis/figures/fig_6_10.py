@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.records import Record
 from palpate_studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often, texts
@@ -20,7 +20,7 @@ from palpate_thesis.runs import Runs
 NUMBER = "6.10"
 TITLE, CAPTION = texts(NUMBER)
 HYBRID = {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0}}
-PARAMETERS = changed(FOAM, {**HYBRID, "run.press": 15.0})
+PARAMETERS = with_values(FOAM, {**HYBRID, "run.press": 15.0})
 SHOWN, FROM = (5.0, 15.0), 5.0
 
 
@@ -46,7 +46,7 @@ def run(runs: Runs) -> Data:
     """Fifteen seconds of contact; the same on rubber and under the variations."""
     nominal = runs.over_seeds(PARAMETERS, ends_of)
     varied = robustness(runs, PARAMETERS, nominal, ends_of)
-    rubber = changed(RUBBER, {**HYBRID, "run.press": 15.0})
+    rubber = with_values(RUBBER, {**HYBRID, "run.press": 15.0})
     varied["rubber"] = runs.over_seeds(rubber, ends_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), nominal, varied, varied["rubber"])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed
+from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
@@ -125,7 +125,7 @@ def adapted_at(away: Array) -> float:
 
 
 def _pressing(experiment: Experiment, seconds: float, **changes: object) -> Experiment:
-    return changed(experiment, {**changes, "run.press": seconds})
+    return with_values(experiment, {**changes, "run.press": seconds})
 
 
 FIRST = (0.0, 10.0)

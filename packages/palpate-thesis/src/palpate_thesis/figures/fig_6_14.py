@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import changed
+from palpate.bench import with_values
 from palpate.bench.force_input import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
@@ -34,7 +34,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "6.14"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
+PARAMETERS = with_values(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
 SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "foam that relaxes": RELAXING_FOAM,
@@ -65,7 +65,7 @@ def run(runs: Runs) -> Data:
     courses = {"foam": [course for _, course in both]}
     seeds = runs.seeds[:2]
     for name, changes in OTHERS.items():
-        courses[name] = runs.over([(changed(PARAMETERS, changes), seed) for seed in seeds], course_of)
+        courses[name] = runs.over([(with_values(PARAMETERS, changes), seed) for seed in seeds], course_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.bench import changed, load
+from palpate.bench import load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
@@ -21,7 +21,7 @@ from palpate_thesis.runs import Runs
 
 NUMBER = "6.15"
 TITLE, CAPTION = texts(NUMBER)
-PARAMETERS = changed(load("foam-neural"), {"run.press": 15.0})
+PARAMETERS = with_values(load("foam-neural"), {"run.press": 15.0})
 SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
 VISIBLE = (0.5e-3, np.radians(0.2))
 """From where errors of y [m] and of the angle [rad] are not zero: some hundred times what an encoder resolves."""
@@ -66,7 +66,7 @@ def run(runs: Runs) -> Data:
     """The whole approach and fifteen seconds of contact; then with one cause changed at a time."""
     varied = {"as\nchosen": runs.over_seeds(PARAMETERS, errors_of)}
     for name, changes in CAUSES.items():
-        e = changed(PARAMETERS, changes)
+        e = with_values(PARAMETERS, changes)
         varied[name] = runs.over([(e, seed) for seed in runs.seeds[:VARIED_SEEDS]], errors_of)
     return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.bench.summary import losses
 from palpate.records import Record
@@ -30,8 +30,8 @@ FOLLOWING = (
 FOLLOWS = f"in 9 of 10 runs: {FOLLOWING}"
 SINE = {"force.amplitude": 4.0, "force.frequency": 0.5, "force.restart": 5.0}
 """4 sin(pi t), its clock started anew every 5 s as the listing does; that turns the sine's sign each time."""
-FOAM = changed(load("foam-neural"), SHORT)
-RUBBER = changed(load("rubber-neural"), SHORT)
+FOAM = with_values(load("foam-neural"), SHORT)
+RUBBER = with_values(load("rubber-neural"), SHORT)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
     if e.force.restart > 0.0:
         by["clock\nruns on"] = {"force.restart": 0.0}
         by["motor 2\nto 4 N m"] = {"robot.torque_limits": (16.0, 4.0, 0.6)}
-    return {name: changed(e, changes) for name, changes in by.items()}
+    return {name: with_values(e, changes) for name, changes in by.items()}
 
 
 def robustness(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall
@@ -32,16 +32,16 @@ def own_damping(surface: Mapping[str, Any]) -> float:
 def nearer(experiment: Experiment) -> Experiment:
     """The same press after a shorter way in the same steps: the way to the surface costs most of a run's time."""
     wall = experiment.wall.x
-    return changed(
+    return with_values(
         experiment,
         {"approach.hold": 0.5, "robot.start": (wall - 0.005, 0.0, 0.0), "approach.first": wall - 0.001},
     )
 
 
-PLAIN = nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5400.0}))
+PLAIN = nearer(with_values(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5400.0}))
 """Foam without memory. Its K is chosen so that f/x comes out at the thesis' 6.8 kN/m."""
-RELAXING = nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
-RUBBER = nearer(changed(load("rubber-rls"), {"run.press": PRESS}))
+RELAXING = nearer(with_values(load("foam-viscoelastic"), {"run.press": PRESS}))
+RUBBER = nearer(with_values(load("rubber-rls"), {"run.press": PRESS}))
 FOAMS = {"plain foam": PLAIN, "relaxing foam": RELAXING}
 COLUMNS = (
     *("t", "force", "force_sampled", "force_measured", "displacement", "x", "x_measured"),
@@ -117,7 +117,7 @@ def thesis_signals(press: Record) -> tuple[Array, Array]:
 def rubbing(experiment: Experiment, factor: float) -> Experiment:
     """Coulomb and static friction of all joints times a factor."""
     friction = experiment.friction
-    return changed(
+    return with_values(
         experiment,
         {
             "friction.coulomb": tuple(factor * v for v in friction.coulomb),
@@ -132,12 +132,12 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
     return {
         "friction halved": rubbing(experiment, 0.5),
         "friction doubled": rubbing(experiment, 2.0),
-        "wall at 0.40 m": changed(experiment, move_wall(experiment, 0.40)),
-        "wall at 0.49 m": changed(experiment, move_wall(experiment, 0.49)),
-        "B halved": changed(experiment, {"surface.damping": 0.5 * surface.damping}),
-        "B doubled": changed(experiment, {"surface.damping": 2.0 * surface.damping}),
-        "M = 0": changed(experiment, {"surface.mass": 0.0}),
-        "M = 0.5 kg": changed(experiment, {"surface.mass": 0.5}),
+        "wall at 0.40 m": with_values(experiment, move_wall(experiment, 0.40)),
+        "wall at 0.49 m": with_values(experiment, move_wall(experiment, 0.49)),
+        "B halved": with_values(experiment, {"surface.damping": 0.5 * surface.damping}),
+        "B doubled": with_values(experiment, {"surface.damping": 2.0 * surface.damping}),
+        "M = 0": with_values(experiment, {"surface.mass": 0.0}),
+        "M = 0.5 kg": with_values(experiment, {"surface.mass": 0.5}),
     }
 
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, changed, load
+from palpate.bench import Experiment, load, with_values
 from palpate.identifiers.neural_probe import SETTINGS, NeuralProbe
 from palpate.records import Record
 from palpate_thesis.least_squares import press_runs
@@ -19,11 +19,13 @@ PRESS = 4.0
 """Seconds of contact that the figures show [s]."""
 LATE = 0.5
 """Seconds at the end over which answers, force and displacement are averaged [s]."""
-FOAM = press_runs.nearer(changed(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5450.0}))
+FOAM = press_runs.nearer(with_values(load("foam-rls"), {"run.press": PRESS, "surface.stiffness": 5450.0}))
 """Its K is chosen so that f/x comes out near the thesis' 6.7 kN/m."""
-RUBBER = press_runs.nearer(changed(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 49200.0}))
+RUBBER = press_runs.nearer(
+    with_values(load("rubber-rls"), {"run.press": PRESS, "surface.stiffness": 49200.0})
+)
 """A rubber of its own: f/x is 62 kN/m in this run of the thesis and 44 in the one for least squares."""
-RELAXING = press_runs.nearer(changed(load("foam-viscoelastic"), {"run.press": PRESS}))
+RELAXING = press_runs.nearer(with_values(load("foam-viscoelastic"), {"run.press": PRESS}))
 STIFFENING = {
     "foam": {"kind": "hunt-crossley", "stiffness": 5.6e5, "damping": 1e7, "exponent": 2.0, "mass": 0.1},
     "rubber": {"kind": "hunt-crossley", "stiffness": 4.8e7, "damping": 1.9e9, "exponent": 2.0, "mass": 0.05},
@@ -222,7 +224,7 @@ def sweep(
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
     """Variations of one other unstated parameter at a time: friction, pose, and the surface's B, M and law."""
     cases = dict(press_runs.conditions(experiment))
-    cases["stiffening"] = changed(experiment, {"surface": STIFFENING[_kind(experiment)]})
+    cases["stiffening"] = with_values(experiment, {"surface": STIFFENING[_kind(experiment)]})
     if _kind(experiment) == "foam":
         cases["relaxing"] = RELAXING
     return cases
