@@ -177,18 +177,12 @@ def pointer(array: Array):
 
 
 @contextmanager
-def library(compiler: str) -> Iterator[ctypes.CDLL]:
-    """The C, as a compiler of the machine makes it."""
+def library(compiler: str, source: list[str] | None = None) -> Iterator[ctypes.CDLL]:
+    """The C, or another source with its flags, as a compiler of the machine makes it."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "tick.so"
-        command = [
-            compiler,
-            *shlex.split(FLAGS),
-            str(HERE / "tick.c"),
-            "-o",
-            str(target),
-            "-lm",
-        ]
+        source = [*shlex.split(FLAGS), str(HERE / "tick.c")] if source is None else source
+        command = [compiler, *source, "-o", str(target), "-lm"]
         try:
             subprocess.run(command, check=True)  # noqa: S603 - the machine's compiler on our own source
         except FileNotFoundError:

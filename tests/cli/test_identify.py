@@ -213,7 +213,9 @@ def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
 def test_a_lag_with_its_std(log, capsys, words):
     _, found = ask(capsys, log, *OWN, "--lag", words)
     assert found["lag_s"] == {"value": 0.0, "std": 0.0005, "bound": pytest.approx(0.00098), "kind": "told"}
-    assert found["parameters"]["B"]["std"] > 1.5  # K times a lag that the log itself tells little better
+    assert (
+        0.1 < found["parameters"]["B"]["budget"]["lag"] < 1.96 * 0.0005 * 5500
+    )  # the log tells the lag, too
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ from scipy.stats import t as student
 
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.budget import HIDDEN_SHARE, Spread
+from palpate.identification.estimators.budget import HIDDEN_SHARE
 from palpate.identification.estimators.octaves import System, estimate, solve
+from palpate.identification.uncertainty import Contribution, half_width, half_widths
 
 NOISE = 0.1
 
@@ -152,23 +153,21 @@ def test_parts_of_the_covariance_are_what_each_cause_adds():
 
 def test_half_widths_are_students_for_one_cause():
     for freedom in (1.0, 4.0, 30.0):
-        found = causes.half_widths({"one": Spread(np.array([4.0]), freedom)})
-        assert found[0] == pytest.approx(2 * student.ppf(0.975, freedom))
+        found = half_width({"one": Contribution(2.0, freedom)})
+        assert found == pytest.approx(2 * student.ppf(0.975, freedom))
 
 
 def test_of_two_causes_the_better_known_one_does_not_suffer():
     """Welch and Satterthwaite: two alike variances of n degrees have 2 n; a small one of few hardly counts."""
-    alike = {"one": Spread(np.array([2.0]), 5.0), "two": Spread(np.array([2.0]), 5.0)}
-    assert causes.half_widths(alike)[0] == pytest.approx(2 * student.ppf(0.975, 10))
-    small = {"sure": Spread(np.array([4.0])), "open": Spread(np.array([1e-4]), 1.0)}
-    assert causes.half_widths(small)[0] == pytest.approx(2 * 1.96, rel=1e-3)
+    alike = {"one": Contribution(2**0.5, 5.0), "two": Contribution(2**0.5, 5.0)}
+    assert half_width(alike) == pytest.approx(2 * student.ppf(0.975, 10))
+    small = {"sure": Contribution(2.0), "open": Contribution(1e-2, 1.0)}
+    assert half_width(small) == pytest.approx(2 * 1.96, rel=1e-3)
 
 
 @given(st.floats(-140, 140))
 def test_half_widths_have_the_unit_of_the_parameter(size):
-    variance = np.array([3.0, 0.0])
-    parts = {"one": Spread(variance, 3.0), "two": Spread(2 * variance)}
-    scaled = {name: Spread(10.0**size * part.variance, part.freedom) for name, part in parts.items()}
-    one, other = causes.half_widths(parts), causes.half_widths(scaled)
+    variance, freedom = np.array([[3.0, 0.0], [6.0, 0.0]]), [[3.0, 3.0], [np.inf, np.inf]]
+    one, other = half_widths(variance, freedom), half_widths(10.0**size * variance, freedom)
     np.testing.assert_allclose(other, 10 ** (size / 2) * one, rtol=1e-6)
     assert one[1] == 0.0

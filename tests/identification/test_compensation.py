@@ -1,12 +1,15 @@
 """Noise of the position makes least squares' columns uncertain: its pull is taken out, what is left is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.problems import problem
 from identification.sensor_logs import TRUTH, sensor_log
 from palpate.identification.estimators.fit import compensation, fit, resting
-from palpate.identification.models import KELVIN_VOIGT_MASS, without_noise
+from palpate.identification.filters.sensor_path import NOISELESS
+from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.options import Lag
 
 
@@ -103,7 +106,7 @@ def fits(log):
     asked = problem(log.record, log.lag, force_filter=log.low_pass)
     return [
         fit(KELVIN_VOIGT_MASS, motion, asked.force, Lag(log.lag))
-        for motion in (asked.motion, without_noise(asked.motion))
+        for motion in (asked.motion, replace(asked.motion, noise=NOISELESS))
     ]
 
 

@@ -184,12 +184,7 @@ def test_confidently_wrong_is_far_off_or_many_half_widths():
 @pytest.mark.parametrize(
     "cell",
     [
-        pytest.param(
-            "friction/held-steady",
-            marks=pytest.mark.xfail(
-                strict=True, reason="friction that holds as a spring counts as stiffness"
-            ),
-        ),
+        "friction/held-steady",  # friction that holds as a spring: the presses differ
         "kelvin-voigt/payload",  # air beside a tool's inertia
         "kelvin-voigt/encoder",  # a motion of a few counts
         # a force that drifts along a bent line, and a relaxation time to be found beside it

@@ -18,6 +18,7 @@ from palpate.identification.estimators.budget import Spread
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 from palpate.identification.selection import answer
+from palpate.identification.uncertainty import Measurement
 
 SERIES = 8000.0
 TRUTH = {"K": 5000.0, "B": 40.0, "M": 0.5}
@@ -60,6 +61,10 @@ def test_parameters_of_the_surface_come_back(k, damping_time, mass_share, stiffe
     assert values["M"] == pytest.approx(m, rel=1e-3)
 
 
+def parts_of(stiffness):
+    return Measurement.within(stiffness.real, 1.0), Measurement.within(stiffness.imag, 2.0)
+
+
 _KEPT = answer(problem(shaken(n=1500), bonded=True), KELVIN_VOIGT_MASS)
 
 
@@ -99,7 +104,7 @@ def test_the_calibration_of_the_series_stiffness_is_a_cause_of_its_own(seen):
 def test_dynamic_stiffness_of_two_in_series(storage, loss):
     z = complex(storage, loss)
     together = z * SERIES / (z + SERIES)
-    octave = DynamicStiffness(2.0, together.real, 1.0, together.imag, 2.0, 9, 0.5)
+    octave = DynamicStiffness(2.0, *parts_of(together), 9, 0.5)
     (found,) = in_series.spectrum_without_series((octave,), SERIES, 0.0)
     assert found.storage == pytest.approx(storage, rel=1e-6, abs=1e-6 * abs(z))
     assert found.loss == pytest.approx(loss, rel=1e-6, abs=1e-6 * abs(z))
@@ -112,7 +117,10 @@ def test_dynamic_stiffness_of_two_in_series(storage, loss):
 def test_a_slope_and_a_press_behind_a_spring():
     depth = np.linspace(0, 2e-3, 50)
     force = 5000 * depth
-    tangent = Tangent(5.0, 5000 * 8 / 13, 10.0), Tangent(9.0, SERIES, 1.0)
+    tangent = (
+        Tangent(5.0, Measurement.within(5000 * 8 / 13, 10.0)),
+        Tangent(9.0, Measurement.within(SERIES, 1.0)),
+    )
     press = Press(tangent, np.stack([depth + force / SERIES, force]), np.empty((2, 0)))
     found = in_series.press_without_series(press, SERIES, 0.0)
     np.testing.assert_allclose(found.loading, np.stack([depth, force]), atol=1e-12)
@@ -184,7 +192,7 @@ def test_a_mass_that_swings_on_the_spring_comes_off_to_the_second_order(seen):
 def test_dynamic_stiffness_behind_a_spring_and_a_mass(storage, loss, frequency):
     z, s = complex(storage, loss), 2j * np.pi * frequency
     together = z * SERIES / (z + SERIES + SWINGING * s**2)
-    octave = DynamicStiffness(frequency, together.real, 1.0, together.imag, 2.0, 9, 0.5)
+    octave = DynamicStiffness(frequency, *parts_of(together), 9, 0.5)
     (found,) = in_series.spectrum_without_swing(
         in_series.spectrum_without_series((octave,), SERIES, 0.0), SWINGING / SERIES, 0.0
     )

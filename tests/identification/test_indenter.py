@@ -7,7 +7,8 @@ from identification.synthetic_contacts import coloured, force_of, press_path, re
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.identification.result import Identification, Press, Tangent, Verdict
+from palpate.identification.result import Identification, Press, Tangent
+from palpate.identification.uncertainty import Measurement, Verdict
 
 MODULUS, NU = 2e5, 0.45
 REDUCED = MODULUS / (1 - NU**2)
@@ -18,6 +19,10 @@ SHAPES = {
 }
 
 
+GENTLE = Tangent(1.0, Measurement.within(100.0, 1.0))
+FALLING = Tangent(2.0, Measurement.within(-5.0, 3.0))
+
+
 def pressed(law, *, share=0.02, shift=0.0, deep=1e-3):
     """A press by its law, with slopes by the law's own differences, each known to a share."""
     depth = np.linspace(0, deep, 400)
@@ -26,7 +31,7 @@ def pressed(law, *, share=0.02, shift=0.0, deep=1e-3):
     for level in (0.3, 0.5, 0.7, 0.9):
         at = np.interp(level * force[-1], force, depth)
         slope = (law(at + 1e-9) - law(at - 1e-9)) / 2e-9
-        tangent.append(Tangent(level * force[-1], slope, share * slope))
+        tangent.append(Tangent(level * force[-1], Measurement.within(slope, share * slope)))
     press = Press(tuple(tangent), np.stack([depth + shift, force]), np.empty((2, 0)))
     return Identification("kelvin-voigt", {}, (), None, 0.99, 0.1, 100, (), press=press)
 
@@ -88,8 +93,12 @@ def test_a_deep_press_of_a_sphere_is_beyond_hertz():
     [
         None,
         Press((), np.empty((2, 0)), np.empty((2, 0))),
-        Press((Tangent(1.0, 100.0, 1.0),), np.ones((2, 3)), np.empty((2, 0))),
-        Press((Tangent(1.0, 100.0, 1.0), Tangent(2.0, -5.0, 3.0)), np.ones((2, 3)), np.empty((2, 0))),
+        Press((GENTLE,), np.ones((2, 3)), np.empty((2, 0))),
+        Press(
+            (GENTLE, FALLING),
+            np.ones((2, 3)),
+            np.empty((2, 0)),
+        ),
     ],
 )
 def test_a_press_that_shows_no_slope_gives_no_modulus(press):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from palpate.errors import InputError
 from palpate.identification.pooling import pool, random_effects
-from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
-from palpate.identification.uncertainty import student
+from palpate.identification.result import Identification, WorkingPoint
+from palpate.identification.uncertainty import Parameter, Verdict, student
 
 
 def parameter(value, half, unit="N/m", verdict=Verdict.IDENTIFIED):

@@ -10,7 +10,8 @@ from rich.console import Console
 
 from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
-from palpate.identification.result import Identification, Parameter, Traces, Verdict, WorkingPoint
+from palpate.identification.result import Identification, Traces, WorkingPoint
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification.words import Source
 from palpate.report.many.page import draw_logs as draw
 from palpate.report.many.page import page_of_logs as page

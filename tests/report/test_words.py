@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.identification.causes import Code, Warn, cause_of
-from palpate.identification.result import (
-    DynamicStiffness,
-    Identification,
-    Parameter,
-    Traces,
-    Verdict,
-    WorkingPoint,
-)
+from palpate.identification.result import DynamicStiffness, Identification, Traces, WorkingPoint
+from palpate.identification.uncertainty import Measurement, Parameter, Verdict
 from palpate.report.identification.words import limited_by, model_line, sentence
 from palpate.report.numbers import quantity, quantity_between
 
@@ -75,17 +69,15 @@ def test_a_model_that_knows_the_stiffness_better_is_heard_first():
 
 
 def test_a_damper_leaves_with_its_loss():
-    own = DynamicStiffness(1.1, 400.0, 2700.0, 15670.0, 330.0, 7, 0.9)
+    own = DynamicStiffness(1.1, Measurement.within(400.0, 2700.0), Measurement.within(15670.0, 330.0), 7, 0.9)
     found = made(parameter(None, 2700, Verdict.NOT_IDENTIFIABLE), frequency=1.1, octaves=(own,), depth=-1e-6)
     assert sentence(found).startswith("The log shows a loss of 15.67 ± 0.33 kN/m, but no stiffness at 13.3 N")
     assert "from the middle of the motion" in sentence(found)
 
 
-def test_a_depth_of_rounding_is_the_middle_of_the_motion():
-    found = made(parameter(1726, 58), depth=3e-19)
+def test_a_depth_of_zero_is_the_middle_of_the_motion():
+    found = made(parameter(1726, 58), depth=0.0)
     found = replace(found, working_point=replace(found.working_point, from_surface=False))
-    position = np.array([-0.07, 0.07])
-    found = replace(found, traces=replace(found.traces, fitted_position=position))
     assert "at 13.3 N, in the middle of the motion and at 0.57 Hz" in sentence(found)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from palpate.identification.causes import Code, Warn
 from palpate.identification.pipeline import identify
 from palpate.identification.pooling import Pooled, pool
-from palpate.identification.result import Comparison, Identification, Parameter, Verdict
+from palpate.identification.result import Comparison, Identification
+from palpate.identification.uncertainty import Parameter, Verdict
 
 __all__ = [
     "Code",

@@ -115,7 +115,9 @@ class Code(Enum):
     HELD_SAMPLES = (
         "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
     )
-    MISSING_SAMPLES = "Rows without a reading; short stretches are bridged, long ones are left out."
+    MISSING_SAMPLES = (
+        "Rows without a reading, or with a spike of one row; short stretches are bridged, long ones left out."
+    )
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = (
         "The force rests at its extreme value while the probe moves on: it is at the end of its range."

@@ -94,8 +94,8 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     if air is not None and air.drifts:
         drift = Drift(air.stays * channels.dt, air.levels)
         channels = _without_drift(channels, air)
-    contacts = replace(find_contacts(channels, chain, air, options, strokes), drift=drift)
-    contacts = _with_press(channels, contacts, strokes, options)
+    found = replace(find_contacts(channels, chain, air, options, strokes), drift=drift)
+    contacts = _with_press(channels, found, strokes, options)
     if strokes and contacts.press is None:
         strokes, contacts = (), replace(find_contacts(channels, chain, air, options), drift=drift)
     if not contacts.spans:
@@ -144,7 +144,7 @@ def _with_press(
     lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
     signs = seen.position_sign, seen.force_sign
     press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
-    return contacts if press is None or press.headline.stiffness <= 0 else replace(seen, press=press)
+    return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
 
 
 def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
@@ -188,25 +188,20 @@ def find_contacts(
     level = _resting(sign * force, sign * rest, top)
     threshold = _threshold(sign * force, level, top)
     spans = _spans(sign * force, level, top, threshold, chain)
-    whole = len(spans)
-    if air is not None and payload is None:
+    text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
+    if air is not None and payload is None and spans:
         spans = _long(_between_losses(channels, sign, (level, top), air, spans, chain), chain)
-    if whole and not spans:
         text = (
             "the probe leaves the surface again and again, and each contact is too short for the filter:"
             " press deeper, move slower or log faster"
         )
-        return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     if not spans:
-        text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
     way = air.way if air else 0.0
     found = replace(_orient(force, position, spans, (sign, way, level, threshold), options), clear=clear)
-    return found if payload is None else _with_payload(found, payload)
-
-
-def _with_payload(found: Contacts, payload: Payload) -> Contacts:
+    if payload is None:
+        return found
     own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
     return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
 
@@ -248,28 +243,25 @@ def _never_left(
     rows = [stroke.rows(channels) for stroke in strokes]
     rises = sum(float(np.cov(sign * channels.force[own], channels.position[own])[0, 1]) for own in rows)
     way = -1.0 if rises < 0 else 1.0
+    reversed_signs = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
     found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, (), clear=False)
     if options.bonded:
-        return found if not strokes else replace(found, warnings=_sign_warnings(sign, way, options))
-    along = _correlation(sign * force, way * position, channels.dt)
+        return found if not strokes else replace(found, warnings=reversed_signs)
+    along = _correlation(sign * force, way * position)
     text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
-    warnings = (Warn(Code.CONTACT_AT_START, text), *_sign_warnings(sign, way, options))
+    warnings = (Warn(Code.CONTACT_AT_START, text), *reversed_signs)
     return replace(found, warnings=warnings, signed=bool(strokes) or along > _SIGNED)
 
 
-def _sign_warnings(sign: float, way: float, options: Options) -> tuple[Warn, ...]:
-    """The channels of a press whose signs were reversed, though nobody told."""
-    warnings = []
-    if sign < 0 and options.force_sign is None:
-        text = "the force is farther below zero than above; its sign was reversed"
-        warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
-    if way < 0:
-        text = "the position falls as the force grows; its sign was reversed"
-        warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
-    return tuple(warnings)
+def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:
+    """Channels whose signs were reversed."""
+    text = "the force goes to negative values in contact; its sign was reversed"
+    warnings = (Warn(Code.FORCE_SIGN_REVERSED, text),) if force else ()
+    text = "the position falls as the force grows; its sign was reversed"
+    return (*warnings, Warn(Code.POSITION_SIGN_REVERSED, text)) if position else warnings
 
 
-def _correlation(force: Array, position: Array, dt: float) -> float:
+def _correlation(force: Array, position: Array) -> float:
     """Of block means over a hundredth of the log, without their slow trend."""
     width = max(len(force) // _BLOCKS, 1)
     f, x = (detrend(block_means(values, width)) for values in (force, position))
@@ -303,17 +295,14 @@ def _orient(
     """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
     sign, way, level, threshold = levels
     warnings = []
-    if sign < 0:
-        text = "the force goes to negative values in contact; its sign was reversed"
-        warnings.append(Warn(Code.FORCE_SIGN_REVERSED, text))
     signed = options.force_sign in (None, int(sign))
     if not signed:
         text = (
             "the sign of the force contradicts --force-sign: in contact it goes to the other side of its rest"
         )
         warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
-    inside = ~_outside(len(position), spans, 0)
     out = _outside(len(position), spans, 0)
+    inside = ~out
     reach = float(np.ptp(position[inside])) or 1.0
     deep = inside & (sign * force > np.median(sign * force[inside]))
     if not way:
@@ -321,13 +310,11 @@ def _orient(
         if abs(apart) < ONSET * reach:
             apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
         way = 1.0 if apart >= 0 else -1.0
-    if way < 0:
-        text = "the position falls as the probe goes in; its sign was reversed"
-        warnings.append(Warn(Code.POSITION_SIGN_REVERSED, text))
     if spans[0][0] == 0:
         text = "the log begins in contact: the depth of that contact is not known"
         warnings.append(Warn(Code.CONTACT_AT_START, text))
-    return Contacts(tuple(spans), False, sign, way, level, threshold, tuple(warnings), signed=signed)
+    told = (*_reversed_signs(sign < 0, way < 0), *warnings)
+    return Contacts(tuple(spans), False, sign, way, level, threshold, told, signed=signed)
 
 
 def _calm(force: Array, dt: float) -> Array:

@@ -17,8 +17,8 @@ from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
-from palpate.identification.uncertainty import Contribution, Contributions
-from palpate.signals.types import NORMAL
+from palpate.identification.tangents import Slopes
+from palpate.identification.uncertainty import Contribution, Measurement
 
 Linear = TypeVar("Linear", Answer, Fit)
 """Parameters with their covariance."""
@@ -117,14 +117,12 @@ def spectrum_without_series(
         own = seen * series / (series - seen)
         gain = abs(series / (series - seen)) ** 2
         by_series = Contribution(series_std * abs(own / series) ** 2)
+        storage, loss = octave.in_phase.through(own.real, gain), octave.in_quadrature.through(own.imag, gain)
         found.append(
             replace(
                 octave,
-                storage=own.real,
-                loss=own.imag,
-                storage_half=float(np.hypot(gain * octave.storage_half, by_series.half)),
-                loss_half=float(np.hypot(gain * octave.loss_half, by_series.half)),
-                contributions=_times(octave.contributions, gain) | {"series stiffness": by_series},
+                in_phase=storage.with_cause("series stiffness", by_series),
+                in_quadrature=loss.with_cause("series stiffness", by_series),
             )
         )
     return tuple(found)
@@ -138,52 +136,42 @@ def spectrum_without_swing(
     for octave in spectrum:
         squared = (2.0 * np.pi * octave.frequency) ** 2
         gain, more = 1.0 - squared * share, squared * share_std
-        storage, loss = (Contribution(more * abs(part)) for part in (octave.storage, octave.loss))
-        found.append(
-            replace(
-                octave,
-                storage=gain * octave.storage,
-                loss=gain * octave.loss,
-                storage_half=float(np.hypot(gain * octave.storage_half, storage.half)),
-                loss_half=float(np.hypot(gain * octave.loss_half, loss.half)),
-                contributions=_times(octave.contributions, gain) | {"tip's mass": storage},
+        storage, loss = (
+            part.through(gain * part.value, gain).with_cause(
+                "tip's mass", Contribution(more * abs(part.value))
             )
+            for part in (octave.in_phase, octave.in_quadrature)
         )
+        found.append(replace(octave, in_phase=storage, in_quadrature=loss))
     return tuple(found)
 
 
-def _times(contributions: Contributions, gain: float) -> dict[str, Contribution]:
-    return {cause: own.times(gain) for cause, own in contributions.items()}
-
-
-def slope_without_series(value: float, half: float, series: float, series_std: float) -> tuple[float, float]:
-    """A slope and its half-width."""
-    check(value, series)
-    gain = series / (series - value)
-    own = value * gain
-    return own, float(np.hypot(gain**2 * half, NORMAL * series_std * (own / series) ** 2))
-
-
-def slope_budget(
-    contributions: Contributions, value: float, series: float, series_std: float
-) -> dict[str, Contribution]:
-    """Contribution of each cause to the uncertainty of such a slope.
+def slope_without_series(own: Measurement, series: float, series_std: float) -> Measurement:
+    """The surface's slope from that of both.
 
     Args:
-        contributions: to that of the log's own slope.
-        value: of that [N/m].
+        own: slope that the log shows [N/m].
         series: stiffness in series [N/m].
         series_std: standard deviation of that [N/m].
     """
-    gain = series / (series - value)
-    by_series = Contribution(series_std * (gain * value / series) ** 2)
-    return _times(contributions, gain**2) | {"series stiffness": by_series}
+    check(own.value, series)
+    gain = series / (series - own.value)
+    value = gain * own.value
+    by_series = Contribution(series_std * (value / series) ** 2)
+    return own.through(value, gain**2).with_cause("series stiffness", by_series)
+
+
+def slopes_without_series(found: Slopes, series: float, series_std: float) -> Slopes:
+    """The same of the slopes of some loadings."""
+    own = slope_without_series(found.stiffness, series, series_std)
+    gain = (own.value / found.stiffness.value) ** 2
+    return replace(found, stiffness=own, again=None if found.again is None else gain * found.again)
 
 
 def press_without_series(press: Press, series: float, series_std: float) -> Press:
     """The press over the depth of the surface alone."""
     tangent = [
-        Tangent(t.force, *slope_without_series(t.stiffness, t.half, series, series_std))
+        Tangent(t.force, slope_without_series(t.slope, series, series_std))
         for t in press.tangent
         if t.stiffness < series
     ]

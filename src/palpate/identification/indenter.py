@@ -23,8 +23,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.result import Identification, Parameter, Press, Tangent, Verdict
-from palpate.identification.uncertainty import Contribution
+from palpate.identification.result import Identification, Press, Tangent
+from palpate.identification.uncertainty import Contribution, Parameter, Verdict, half_width
 from palpate.signals.types import NORMAL
 from palpate.units import unit
 
@@ -235,13 +235,13 @@ def _judge(
     depth: float,
     tolerance: float,
 ) -> Parameter:
-    half = float(np.hypot.reduce(list(parts.values())))
     main = max(parts, key=lambda cause: parts[cause])
     ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)
     terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
     bounds = {cause: Contribution.within(part) for cause, part in parts.items()}
-    found = Parameter.of(value, half, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
+    half = half_width(bounds)
+    found = Parameter.of(value, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
     if half >= value:
         reason = f"the press does not follow a {indenter}: 95 % 0 to {value + half:.3g} Pa, most of it {main}"
         return found.without_number(reason, ci95=found.ci95)

@@ -104,11 +104,6 @@ def from_surface(motion: Motion, inside: Mask, surface: float) -> Motion:
     return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={}, _turned={})
 
 
-def without_noise(motion: Motion) -> Motion:
-    """The same as if nothing disturbed the position: what a fit makes of its noise holds for no power of the depth."""
-    return replace(motion, noise=NOISELESS)
-
-
 @dataclass(frozen=True)
 class NonlinearParameter:
     """A parameter that a model is not linear in: its start values, its limits and how it is stepped."""

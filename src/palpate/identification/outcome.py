@@ -17,15 +17,13 @@ from palpate.identification.result import (
     DynamicStiffness,
     Identification,
     LagFound,
-    Parameter,
     Press,
     Traces,
-    Verdict,
     WorkingPoint,
 )
 from palpate.identification.sampling import Channels
 from palpate.identification.selection import Choice
-from palpate.identification.uncertainty import Input, correlations
+from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
 from palpate.identification.verdicts import Terms
 from palpate.signals import Estimate
 from palpate.signals.types import NORMAL

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.result import Identification, Parameter, Verdict
-from palpate.identification.uncertainty import Contribution, Contributions, student
+from palpate.identification.result import Identification
+from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict, student
 from palpate.records import Result
 from palpate.signals.types import NORMAL
 
@@ -343,37 +343,34 @@ def _pool(
         again = float(np.hypot(mean.next_half, alike))
         prediction = mean.value - again, mean.value + again
     of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
+    freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
-        "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), mean.freedom),
-        "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), mean.freedom),
+        "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), freedom),
+        "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
         "common to all logs": Contribution.within(alike),
     }
-    together = _judge(mean.value, float(np.hypot(mean.half, alike)), kind[0], parts, of, tolerance)
+    together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
     slopes = {}
     for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
         scaled = (
             alike * abs(slope / mean.value) if mean.value else 0.0
         )  # an error common to all logs is of the scale
-        half = float(np.hypot(student(mean.freedom) * std, scaled))
         parts = {
             "between logs": Contribution(std, mean.freedom),
             "common to all logs": Contribution.within(scaled),
         }
-        slopes[name] = _judge(slope, half, f"{kind[0]} per {name}", parts, of, tolerance)
+        slopes[name] = _judge(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
     at = dict(zip(beside.names, numbers.mean(axis=0).tolist(), strict=True))
     return PooledParameter(together, prediction, mean.between, tuple(used), slopes, at)
 
 
-def _judge(
-    value: float, half: float, unit: str, parts: Contributions, of: str, tolerance: float
-) -> Parameter:
-    """A verdict on a number and its 95 % half-width; `of` names the logs that it is from."""
-    share = half / abs(value) if value else np.inf
-    interval = (value - half, value + half)
-    found = Parameter.of(value, half, unit, Verdict.IDENTIFIED, "", parts)
+def _judge(own: Measurement, unit: str, of: str, tolerance: float) -> Parameter:
+    """A verdict on a number; `of` names the logs that it is from."""
+    share = own.half / abs(own.value) if own.value else np.inf
+    found = Parameter.of(own.value, unit, Verdict.IDENTIFIED, "", own.contributions)
     if share >= 1:
-        reason = f"95 %: {interval[0]:.3g} to {interval[1]:.3g}; zero is within it ({of})"
-        return found.without_number(reason, ci95=interval)
+        reason = f"95 %: {own.value - own.half:.3g} to {own.value + own.half:.3g}; zero is within it ({of})"
+        return found.without_number(reason, ci95=found.ci95)
     verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
     only = "" if verdict is Verdict.IDENTIFIED else " only"
     reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"

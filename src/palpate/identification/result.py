@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
-from enum import StrEnum
+from dataclasses import asdict, dataclass, field
 from math import isclose, pi, sqrt
 from typing import Any
 
@@ -11,128 +10,9 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.causes import Warn
-from palpate.identification.uncertainty import Contributions, Input, Uncertainty
+from palpate.identification.uncertainty import Input, Measurement, Parameter, Verdict
 from palpate.records import Compared, Readable, Result
 from palpate.signals import Estimate
-from palpate.signals.types import NORMAL
-
-
-class Verdict(StrEnum):
-    """How far to trust a parameter."""
-
-    IDENTIFIED = "identified"
-    NOT_IDENTIFIABLE = "not identifiable"
-    REJECTED = "rejected"
-
-
-_SMALL = 1e-3
-"""Share of a half-width below which a cause is not listed in the budget."""
-
-
-@dataclass(frozen=True)
-class Parameter(Readable):
-    """One parameter of the contact.
-
-    Args:
-        value, std: None where the log carries no number worth printing.
-        unit: in SI.
-        verdict: identified, not identifiable or rejected.
-        ci95: 95 % interval that holds whatever the model, also where `value` is None and the log bounds it; verdicts
-            rest on it.
-        reason: why.
-        ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
-        budget: half-width of `ci95` by cause, largest first; without what is under a thousandth of the whole.
-        contributions: to the combined standard uncertainty, by cause.
-    """
-
-    value: float | None
-    std: float | None
-    ci95: tuple[float, float] | None
-    unit: str
-    verdict: Verdict
-    reason: str
-    ci95_if_model_holds: tuple[float, float] | None = None
-    budget: dict[str, float] = field(default_factory=dict)
-    contributions: Contributions = field(default_factory=dict)
-
-    # More than seven arguments: the fields of a parameter, in their order.
-    @classmethod
-    def of(
-        cls,
-        value: float,
-        half: float,
-        unit: str,
-        verdict: Verdict,
-        reason: str,
-        contributions: Contributions,
-        *,
-        joint: bool = False,
-    ) -> Parameter:
-        """A parameter with its budget.
-
-        Args:
-            value: of it.
-            half: half-width of its 95 % interval.
-            unit: in SI.
-            verdict: on it.
-            reason: of that.
-            contributions: to its uncertainty, by cause.
-            joint: the coverage factor is of all causes together; else each has its own.
-        """
-        parts = {cause: part.half for cause, part in contributions.items()}
-        if joint:
-            coverage = half / (Uncertainty(contributions, half).combined or 1.0)
-            parts = {cause: coverage * part.std for cause, part in contributions.items()}
-        budget = sorted(
-            (item for item in parts.items() if item[1] > _SMALL * half), key=lambda item: -item[1]
-        )
-        ends = value - half, value + half
-        return cls(
-            value,
-            half / NORMAL,
-            ends,
-            unit,
-            verdict,
-            reason,
-            budget=dict(budget),
-            contributions=contributions,
-        )
-
-    def without_number(
-        self,
-        reason: str,
-        verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
-        ci95: tuple[float, float] | None = None,
-    ) -> Parameter:
-        """The same without a value, and at most with bounds: its budget says why.
-
-        Args:
-            reason: why there is none.
-            verdict: on it.
-            ci95: bounds that the log still shows.
-        """
-        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
-        return replace(bare, verdict=verdict, reason=reason)
-
-    @property
-    def uncertainty(self) -> Uncertainty | None:
-        """Combined and expanded uncertainty; None without a number, or where no cause is known."""
-        if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
-            return None
-        return Uncertainty(self.contributions, (self.ci95[1] - self.ci95[0]) / 2)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values that JSON can hold."""
-        return {
-            "value": self.value,
-            "std": self.std,
-            "ci95": list(self.ci95) if self.ci95 else None,
-            "ci95_if_model_holds": list(self.ci95_if_model_holds) if self.ci95_if_model_holds else None,
-            "budget": self.budget,
-            "unit": self.unit,
-            "verdict": str(self.verdict),
-            "reason": self.reason,
-        }
 
 
 @dataclass(frozen=True)
@@ -141,21 +21,36 @@ class DynamicStiffness(Readable):
 
     Args:
         frequency: middle of the octave [Hz].
-        storage, loss: [N/m].
-        storage_half, loss_half: 95 % half-widths [N/m], from the variance between blocks.
+        in_phase, in_quadrature: storage and loss [N/m].
         blocks: how many there are.
         share: of the position's variance in contact.
-        contributions: to the uncertainty of the storage, by cause [N/m].
     """
 
     frequency: float
-    storage: float
-    storage_half: float
-    loss: float
-    loss_half: float
+    in_phase: Measurement
+    in_quadrature: Measurement
     blocks: int
     share: float
-    contributions: Contributions = field(default_factory=dict)
+
+    @property
+    def storage(self) -> float:
+        """Value of the storage [N/m]."""
+        return self.in_phase.value
+
+    @property
+    def storage_half(self) -> float:
+        """Its 95 % half-width [N/m], from the variance between blocks."""
+        return self.in_phase.half
+
+    @property
+    def loss(self) -> float:
+        """Value of the loss [N/m]."""
+        return self.in_quadrature.value
+
+    @property
+    def loss_half(self) -> float:
+        """Its 95 % half-width [N/m]."""
+        return self.in_quadrature.half
 
     def to_json(self) -> dict[str, float]:
         """Plain values that JSON can hold."""
@@ -190,12 +85,21 @@ class Tangent:
 
     Args:
         force: [N].
-        stiffness, half: slope and its 95 % half-width [N/m].
+        slope: there [N/m].
     """
 
     force: float
-    stiffness: float
-    half: float
+    slope: Measurement
+
+    @property
+    def stiffness(self) -> float:
+        """Value of the slope [N/m]."""
+        return self.slope.value
+
+    @property
+    def half(self) -> float:
+        """Its 95 % half-width [N/m]."""
+        return self.slope.half
 
 
 @dataclass(frozen=True, eq=False)

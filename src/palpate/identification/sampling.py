@@ -87,6 +87,11 @@ class Channels:
         return time
 
 
+_BESIDE, _ALONE = 4, 5.0
+"""Readings on either side that one is held against, and how many times their range it lies beyond them to stand
+alone."""
+
+
 def channels_of(record: Record) -> Channels:
     """Check the time base of a record with `time`, `position` and `force`, and resample where it asks for it.
 
@@ -96,6 +101,8 @@ def channels_of(record: Record) -> Channels:
     time, position, force = record["time"], record["position"], record["force"]
     warnings = [Warn(from_word(note["code"]), note["text"]) for note in record.meta.get("notes", ())]
     _check(time, position, force)
+    rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
+    force = _without_spikes(force, rounding[1], warnings)
     step = np.diff(time)
     twice = int((step == 0).sum())
     if twice:
@@ -125,8 +132,34 @@ def channels_of(record: Record) -> Channels:
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])
     raw = Raw(float(time[0]), dt, own_x, _hold_lengths(grid + dt / 4, time, force), near_x & valid)
-    rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
     return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings), rounding)
+
+
+def _without_spikes(force: Array, rounding: float, warnings: list[Warn]) -> Array:
+    """The force, shape (n,), without readings that stand alone: far beyond all others beside them but one at each end.
+
+    No filtered sensor returns from such a force within a row.
+    """
+    rows = np.flatnonzero(np.isfinite(force))
+    own = force[rows]
+    bend = np.abs(own[1:-1] - (own[:-2] + own[2:]) / 2)
+    usual = max(float(np.median(bend)), rounding)
+    at = 1 + np.flatnonzero(bend > _ALONE * usual)
+    at = at[(at >= _BESIDE) & (at < len(own) - _BESIDE)]
+    beside = np.delete(np.arange(-_BESIDE, _BESIDE + 1), _BESIDE)
+    near = np.sort(own[at[:, None] + beside], axis=1)[:, 1:-1]
+    beyond = np.maximum(own[at] - near[:, -1], near[:, 0] - own[at])
+    spikes = rows[at[beyond > _ALONE * np.maximum(np.ptp(near, axis=1), 2 * usual)]]
+    if not len(spikes):
+        return force
+    text = (
+        f"{len(spikes)} readings of the force stand alone, far from those beside them (first: row"
+        f" {spikes[0] + 1}); they are bridged"
+    )
+    warnings.append(Warn(Code.MISSING_SAMPLES, text))
+    force = force.copy()
+    force[spikes] = np.nan
+    return force
 
 
 def last_digit(values: Array) -> float:

@@ -17,6 +17,7 @@ from palpate.arrays import Array
 from palpate.identification.filters.sensor_path import noise_within
 from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.sampling import Channels
+from palpate.signals.samples import runs
 
 _BLOCKS = 1 << 13
 """Of the whole log at most, in which strokes are looked for."""
@@ -99,7 +100,10 @@ def _turns(x: Array, least: float) -> list[int]:
 
 
 def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
-    """First and last row between two turns in which the probe goes at about one speed; None if it does not."""
+    """First and last row between two turns in which the probe goes at about one speed; None if it does not.
+
+    Where it rests on the way, those of the part without a rest that goes farthest.
+    """
     way = x[a : b + 1] - x[a]
     whole = float(way[-1])
     if abs(whole) <= _FINE * least:
@@ -111,7 +115,11 @@ def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
         return None
     speed = np.diff(np.interp(np.linspace(first, last, _PARTS + 1), np.arange(len(share)), share))
     fine = np.diff(np.interp(np.linspace(first, last, _FINE + 1), np.arange(len(share)), share))
+    moves = fine >= _STILL / _FINE
+    if not moves.all():
+        edges = np.linspace(first, last, _FINE + 1).astype(np.intp)
+        parts = [(int(edges[i]), int(edges[j])) for i, j in runs(moves)]
+        i, j = max(parts, key=lambda part: share[part[1]] - share[part[0]], default=(first, first))
+        return _steady(x, a + i, a + j, least)
     even = speed.min() >= _SLOWEST * speed.max() and speed[_PARTS // 2] <= _BULGE * (speed[0] + speed[-1]) / 2
-    if not even or (fine < _STILL / _FINE).any():
-        return None
-    return a + first, a + last
+    return (a + first, a + last) if even else None

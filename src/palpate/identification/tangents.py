@@ -21,7 +21,7 @@ from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.strokes import Stroke
-from palpate.identification.uncertainty import Contribution, Contributions
+from palpate.identification.uncertainty import Contribution, Measurement
 
 WINDOW = (0.35, 0.97)
 """Shares of a stroke's force about the tangent that is named: below, a surface is still being met."""
@@ -64,27 +64,24 @@ class Curve:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Tangent of the strokes at one force.
+    """Stiffness of some loadings, or of an octave, and where it is.
 
     Args:
         force, depth: where it is [N], [m].
-        stiffness, half: mean of the strokes and its 95 % half-width [N/m].
-        contributions: to its uncertainty, by cause [N/m].
-        each: slope of each stroke [N/m].
-        again: 95 % half-width for one more stroke; None for fewer than three [N/m].
-        rise: mean duration of a stroke [s].
+        stiffness: mean of the loadings [N/m].
+        each: slope of each [N/m].
+        again: 95 % half-width for one more; None for fewer than three [N/m].
+        rise: mean duration of one [s]; of an octave, a quarter of a period.
         explained: least share of a stroke's force that its curve follows.
     """
 
     force: float
     depth: float
-    stiffness: float
-    half: float
-    contributions: Contributions
+    stiffness: Measurement
     each: tuple[float, ...]
     again: float | None
     rise: float
-    explained: float
+    explained: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -126,11 +123,11 @@ def steady_press(
     curves = curves_of(channels, strokes, signs, drift)
     named = [own for own in curves if own.loads] or curves
     headline = slopes_at(named, WINDOW, lag, rest)
-    if headline is None or headline.explained < _FOLLOWED or headline.half >= abs(headline.stiffness):
+    if headline is None or headline.explained < _FOLLOWED or not headline.stiffness.known_to(1.0):
         return None
     windows = [(level - _WIDE, min(level + _WIDE, 1.0)) for level in LEVELS]
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
-    known = tuple(own for own in others if own.half < abs(own.stiffness))
+    known = tuple(own for own in others if own.stiffness.known_to(1.0))
     pairs = [[own for own in curves if own.loads is loads] for loads in (True, False)]
     return SteadyPress(headline, known, *(_draw(own) for own in pairs))
 
@@ -199,20 +196,11 @@ def slopes_at(
         "lag": Contribution(lag.std * abs(value * bend)),
         "other forces": Contribution.within(drift),
     }
-    half = float(np.sqrt(sum(own.half**2 for own in parts.values())))
     rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
-    each = tuple(values.tolist())
     return Slopes(
-        level - rest,
-        float(weight @ depths),
-        value,
-        half,
-        parts,
-        each,
-        mean.next_half,
-        rise,
-        float(follows.min()),
-    )
+        level - rest, float(weight @ depths), Measurement(value, parts), tuple(values.tolist()), mean.next_half,
+        rise, float(follows.min()),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ Welch's and Satterthwaite's (annex G.4), and the expanded uncertainty U = k u_c 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from itertools import combinations
 from math import hypot, isfinite
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.identification.causes import cause_of
+from palpate.records import Readable
 from palpate.signals.types import NORMAL
 
 _MOST_FREEDOM = 1e9
@@ -49,6 +51,21 @@ def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
     return found
 
 
+def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
+    """95 % half-widths of all causes together, shape (p,): Student's t times the root of the sum of the variances.
+
+    Args:
+        variance: by cause, shape (c, p).
+        freedom: degrees of freedom of each, shape (c, p).
+    """
+    from scipy.special import stdtrit
+
+    whole, together = np.asarray(variance, np.float64).sum(axis=0), effective_freedom(variance, freedom)
+    coverage = np.where(together < 0.99 * _MOST_FREEDOM, stdtrit(together, 0.975), NORMAL)
+    found: Array = coverage * np.sqrt(whole)
+    return found
+
+
 class Contribution(NamedTuple):
     """Contribution of one cause to the uncertainty of a result.
 
@@ -78,6 +95,49 @@ class Contribution(NamedTuple):
 Contributions = Mapping[str, Contribution]
 
 
+def half_width(contributions: Contributions) -> float:
+    """95 % half-width of one result: of a parameter, a working point or a slope."""
+    if not contributions:
+        return 0.0
+    std, freedom = np.array(list(contributions.values())).T
+    return float(half_widths(std**2, freedom))
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A value and the contributions to its uncertainty, by cause."""
+
+    value: float
+    contributions: Contributions
+
+    @classmethod
+    def within(cls, value: float, half: float, cause: str = "noise") -> Measurement:
+        """With one cause of a normal distribution, whose 95 % half-width is given."""
+        return cls(value, {cause: Contribution.within(half)})
+
+    @property
+    def half(self) -> float:
+        """95 % half-width of all causes together."""
+        return half_width(self.contributions)
+
+    @property
+    def relative_half(self) -> float:
+        """The same over the value."""
+        return self.half / abs(self.value or 1e-300)
+
+    def known_to(self, tolerance: float) -> bool:
+        """Whether its half-width is at most a share of its value."""
+        return self.half <= tolerance * abs(self.value)
+
+    def with_cause(self, cause: str, own: Contribution) -> Measurement:
+        """The same with one more cause of error."""
+        return replace(self, contributions={**self.contributions, cause: own})
+
+    def through(self, value: float, gain: float) -> Measurement:
+        """A function of it instead, by its value and its derivative."""
+        return Measurement(value, {cause: own.times(gain) for cause, own in self.contributions.items()})
+
+
 class Input(NamedTuple):
     """An input quantity that a cause stands for: estimate, standard uncertainty, and their unit."""
 
@@ -92,11 +152,14 @@ class Uncertainty:
 
     Args:
         contributions: by cause; independent of each other.
-        expanded: half-width of the 95 % interval.
     """
 
     contributions: Contributions
-    expanded: float
+
+    @property
+    def expanded_uncertainty(self) -> float:
+        """Half-width of the 95 % interval."""
+        return half_width(self.contributions)
 
     @property
     def combined(self) -> float:
@@ -113,7 +176,7 @@ class Uncertainty:
     @property
     def coverage(self) -> float:
         """Coverage factor k, the expanded over the combined uncertainty."""
-        return self.expanded / self.combined
+        return self.expanded_uncertainty / self.combined
 
     def to_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
         """Plain values that JSON can hold, largest contribution first; an infinite number is None.
@@ -127,7 +190,7 @@ class Uncertainty:
             "combined_standard_uncertainty": self.combined,
             "effective_degrees_of_freedom": _finite(self.freedom),
             "coverage_factor": self.coverage,
-            "expanded_uncertainty": self.expanded,
+            "expanded_uncertainty": self.expanded_uncertainty,
             "sources": [self._source(name, own, inputs.get(name)) for name, own in rows if own.std > 0],
         }
 
@@ -143,6 +206,111 @@ class Uncertainty:
             "standard_uncertainty": own.std,
             "degrees_of_freedom": _finite(own.freedom),
             "share": (own.std / self.combined) ** 2,
+        }
+
+
+class Verdict(StrEnum):
+    """How far to trust a parameter."""
+
+    IDENTIFIED = "identified"
+    NOT_IDENTIFIABLE = "not identifiable"
+    REJECTED = "rejected"
+
+
+_SMALL = 1e-3
+"""Share of a half-width below which a cause is not listed in the budget."""
+
+
+@dataclass(frozen=True)
+class Parameter(Readable):
+    """One parameter of the contact.
+
+    Args:
+        value, std: None where the log carries no number worth printing.
+        unit: in SI.
+        verdict: identified, not identifiable or rejected.
+        ci95: 95 % interval that holds whatever the model, also where `value` is None and the log bounds it; verdicts
+            rest on it.
+        reason: why.
+        ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
+        budget: half-width of `ci95` by cause, largest first; without what is under a thousandth of the whole.
+        contributions: to the combined standard uncertainty, by cause.
+    """
+
+    value: float | None
+    std: float | None
+    ci95: tuple[float, float] | None
+    unit: str
+    verdict: Verdict
+    reason: str
+    ci95_if_model_holds: tuple[float, float] | None = None
+    budget: dict[str, float] = field(default_factory=dict)
+    contributions: Contributions = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        value: float,
+        unit: str,
+        verdict: Verdict,
+        reason: str,
+        contributions: Contributions,
+    ) -> Parameter:
+        """A parameter with its interval and its budget.
+
+        Args:
+            value: of it.
+            unit: in SI.
+            verdict: on it.
+            reason: of that.
+            contributions: to its uncertainty, by cause.
+        """
+        whole = Uncertainty(contributions)
+        half = whole.expanded_uncertainty
+        share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
+        parts = {cause: share * part.std for cause, part in contributions.items()}
+        budget = {
+            cause: part for cause, part in sorted(parts.items(), key=lambda x: -x[1]) if part > _SMALL * half
+        }
+        ends = value - half, value + half
+        return cls(
+            value, half / NORMAL, ends, unit, verdict, reason, budget=budget, contributions=contributions
+        )
+
+    def without_number(
+        self,
+        reason: str,
+        verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
+        ci95: tuple[float, float] | None = None,
+    ) -> Parameter:
+        """The same without a value, and at most with bounds: its budget says why.
+
+        Args:
+            reason: why there is none.
+            verdict: on it.
+            ci95: bounds that the log still shows.
+        """
+        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
+        return replace(bare, verdict=verdict, reason=reason)
+
+    @property
+    def uncertainty(self) -> Uncertainty | None:
+        """Combined and expanded uncertainty; None without a number, or where no cause is known."""
+        if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
+            return None
+        return Uncertainty(self.contributions)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values that JSON can hold."""
+        return {
+            "value": self.value,
+            "std": self.std,
+            "ci95": list(self.ci95) if self.ci95 else None,
+            "ci95_if_model_holds": list(self.ci95_if_model_holds) if self.ci95_if_model_holds else None,
+            "budget": self.budget,
+            "unit": self.unit,
+            "verdict": str(self.verdict),
+            "reason": self.reason,
         }
 
 

@@ -9,12 +9,13 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.estimators.answer import Answer, Prediction
+from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag
-from palpate.identification.result import Parameter, Verdict, WorkingPoint
+from palpate.identification.result import WorkingPoint
 from palpate.identification.selection import Choice
-from palpate.identification.uncertainty import Contribution
+from palpate.identification.uncertainty import Parameter, Verdict, half_width
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
@@ -65,7 +66,10 @@ def verdicts(
         point: the working point, with which K must agree.
         terms: how.
     """
+    steady = point is not None and choice.problem.contacts.press is not None
     found = against_working_point(choice.answer, point)
+    if point is not None and steady and not found.fit.model.nonlinear:
+        found = replace(found, budget=_with_presses(found, point))
     scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
     found = found.with_cause("calibration", scales * found.theta)
     choice = replace(choice, answer=found)
@@ -78,7 +82,7 @@ def verdicts(
         parameters = {name: _refuse(p, _UNSIGNED) for name, p in parameters.items()}
     if found.fit.model.of_power and choice.problem.contacts.bonded:
         parameters = {name: _refuse(p, _UNTOUCHED) for name, p in parameters.items()}
-    if point is not None and choice.problem.contacts.press is not None and not found.fit.model.nonlinear:
+    if point is not None and steady and not found.fit.model.nonlinear:
         parameters = _of_press(parameters, point)
     return parameters, _warnings(parameters, found, lag, terms)
 
@@ -87,7 +91,7 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     found = choice.answer
     value, unit = found[name], unit_of(name, found.fit, terms)
     half, parts = found.half_of(name), found.contributions(name)
-    whole = Parameter.of(value, half, unit, Verdict.NOT_IDENTIFIABLE, "", parts, joint=True)
+    whole = Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, "", parts)
     low, high = interval = (value - half, value + half)
     if name in holds.names:
         reach = float(np.hypot(holds.t * holds.std(name), parts["calibration"].half))
@@ -140,13 +144,25 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     if shown is None or predicted is None:
         return found
     own, slope = predicted
-    scale = point.stiffness.contributions.get("calibration", Contribution(0.0)).half  # of the model's, too
-    shown_half = np.sqrt(max(((point.stiffness.ci95[1] - point.stiffness.ci95[0]) / 2) ** 2 - scale**2, 0.0))
+    parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause != "calibration"}
     along = found.cov @ slope
     power = float(slope @ along)
-    gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), shown_half)), 0.0)
+    gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(parts))), 0.0)
     moved = along * gap / power if power > 0 else np.zeros(len(slope))
     return found.with_cause("dynamic stiffness", moved)
+
+
+def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
+    """The budget of a linear answer, its stiffness no more certain than presses at constant speed agree on theirs.
+
+    At constant speed neither a damping nor a mass makes the slopes of two presses differ.
+    """
+    apart = point.stiffness.contributions["repetition"]
+    own, place = found.budget["repetition"], found.names.index("K")
+    variance, freedom = own.variance.copy(), np.broadcast_to(own.freedom, own.variance.shape).copy()
+    if apart.std**2 > variance[place]:
+        variance[place], freedom[place] = apart.std**2, apart.freedom
+    return found.budget | {"repetition": Spread(variance, freedom)}
 
 
 def _dynamic_stiffness(found: Answer, frequency: float) -> tuple[float, Array]:

@@ -25,6 +25,9 @@ _COUNTS = 20
 _FOLLOWS = 0.3
 """Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
+_COHERENT, _BLOCKS = 0.5, 16
+"""Share of the power of a column that is named a force, in so many blocks, above which it follows a filtered position:
+of two columns of noise it is under a tenth."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
 _JOINTS_ONLY = (
     "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
@@ -202,7 +205,12 @@ def _pair(
     by_name = bool(places and forces)
     if not (places or forces):
         pairs = [(a, b) for i, a in enumerate(moving[:40]) for b in moving[i + 1 : 40]]
-    pairs = [pair for pair in pairs[:800] if _together(*pair) > _FOLLOWS and not _one_reading(*pair)]
+    follow = [
+        pair
+        for pair in pairs[:800]
+        if _together(*pair) > _FOLLOWS or (by_name and _coherence(*pair) > _COHERENT)
+    ]
+    pairs = [pair for pair in follow if not _one_reading(*pair)]
     if not pairs:
         return None
     position, force = max(pairs, key=lambda pair: _together(*pair))
@@ -240,6 +248,22 @@ def _together(first: ColumnStatistics, second: ColumnStatistics) -> float:
     if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
         return 0.0
     return abs(float(spearmanr(a[rows], b[rows]).statistic))
+
+
+def _coherence(position: ColumnStatistics, force: ColumnStatistics) -> float:
+    """Share of the force's power that some filter of the position accounts for: its coherence (Welch), 0 to 1.
+
+    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
+    """
+    from scipy.signal import coherence, welch
+
+    a, b = position.readings, force.readings
+    there = np.isfinite(a) & np.isfinite(b)
+    rows = max(int(there.sum()) // _BLOCKS, 4)
+    if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
+        return 0.0
+    power = welch(b[there], nperseg=rows)[1]
+    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
 
 
 def _one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:

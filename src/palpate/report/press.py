@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.bench.force_input import CONTACT
 from palpate.files import write_text
-from palpate.identification.result import Verdict
+from palpate.identification.uncertainty import Verdict
 from palpate.press.setting import Place
 from palpate.press.summary import Asked
 from palpate.records import Record

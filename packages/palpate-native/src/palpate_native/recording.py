@@ -121,7 +121,7 @@ def _reading(gains: Gains, fault: int, left: int, reading: float) -> float:
 
 
 def of_sliding_loop(loop: SlidingLoop) -> Recording:
-    """Slides over spheres, bowls and planes, with friction from none to beyond mu_max, steps and lost contacts."""
+    """Slides over spheres, bowls and planes, with friction from none to beyond mu_max, and every fault of a press."""
     return Recording(11, 100, lambda _, ticks, rng: _slide(loop, ticks, rng))
 
 
@@ -130,11 +130,14 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
     K, mu = gains.cap * 10.0 ** rng.uniform(-2.5, 0.2), rng.uniform(0.0, 1.0)
     bend, wall, rate = rng.uniform(-30.0, 30.0), 0.1 * gains.approach * tick * ticks, rng.uniform(0.1, 5.0)
     n, noise = loop.normal + rng.normal(0.0, 0.1, 3), gains.arm.sensor.noise * rng.standard_normal((ticks, 3))
-    kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < RARE
+    kinds, begins = rng.integers(BLIND, UNASKED + 1, ticks), rng.random(ticks) < 2.0 * RARE
     x, v, fault, force, out = np.zeros(3), np.zeros(3), 0, np.zeros(3), np.zeros((ticks, 14))
+    changes, desired = rng.integers(0, 2), loop.desired
+    noise += rng.normal(0.0, 0.3 * gains.force, 3) * (rng.random() < _UNTARED)
     loop.reset()
     for k in range(ticks):
         fault = kinds[k] if begins[k] else fault * (k % 100 > 0)
+        loop._desired = desired * (1.0 + 0.5 * changes * (k // 500 % 2))
         across, along, axis = x - (x @ n) * n, v - (v @ n) * n, k % 3
         wall += {RECEDES: 2e-6, STEPPED: 1e-3 * (k % 100 == 50)}.get(fault, 0.0)
         if fault != STUCK:
@@ -143,12 +146,13 @@ def _slide(loop: SlidingLoop, ticks: int, rng: np.random.Generator) -> Array:
             force[axis] = _reading(gains, fault, k, force[axis])
         place = x + (np.nan if fault == LOST else 0.0)
         way = np.array([np.cos(rate * k * tick), np.sin(rate * k * tick), 0.0])
-        way *= np.nan if fault == UNASKED else float(k % 9 > 0)
+        way = n if fault == RECEDES else way * (np.nan if fault == UNASKED else float(k % 9 > 0))
         missed = {LATE: float(k % 40), LATER: np.nan}.get(fault, 0.0)
         v = loop.update(force, place, way, missed)
         state = digest_of(loop._state) if k % 100 == 99 else 0.0
         out[k] = [k == 0, loop.desired, *force, *place, *way, missed, digest_of(v), state]
         x = x + tick * v
+    loop.desired = desired
     return out
 
 

@@ -9,9 +9,12 @@ import subprocess
 import textwrap
 
 import pytest
+from msgspec.structs import replace
 
-from palpate.force import guard
-from palpate.force.gains import load_gains
+from palpate.force import SlidingLoop, guard, load_arm
+from palpate.force.gains import gains_for, load_gains
+from palpate.force.slide_table import Slide
+from palpate.force.sliding.sliding_loop import DOWN
 from palpate.identifiers import ContactIdentifier
 from palpate_native import laws, recording
 from palpate_native.module import sources_of
@@ -41,6 +44,21 @@ IN_SQUARES = {
     "!counts": "with a forgetting factor every sample counts; other policies have samples that do not",
     "squares <= 0.0": "residuals of exactly zero, which noise leaves none of",
 }
+IN_SLIDE = {
+    "!(total > 0.0)": "the variance of what is read is positive, by the noise in it",
+    "c->resolution == 0.0": "the sensor of this arm has steps below its noise",
+    "size > c->force_limit ? LIMITED : SATURATED": "a force between 99 and 100 % of the sensor's scale, the limit",
+    "state->numbers[112] == 6.0": "a blocked tip, which the recordings of the force loop have",
+    "length > 1e-12 ? Vec3_truediv(a, length) : otherwise": "a vector that has a length, but for rounding",
+    "lifted > 3.0 * needed && felt > c->level": "a sensor that drifts between two touches, which no recording has",
+    "way <= 0.0": "a tip that stands still to the last bit while the slide learns",
+    "s.at[TROUBLE] == LOST && guard->trouble == FINE": "a fault in the ticks after a lost contact, which are too few",
+    "lead_velocity": "a tip that a servo moves; the recorded slides are those of a position arm",
+    "c->lead > 0.0 && s.at[PHASE] != PRESS": "likewise",
+    "(s.at[SILENT] > lag || !(missed <= lag)) && s.at[TICKS] > 0.0": "a first tick of all that is late",
+    "force.x == last.x": "a first reading of all that is zero to the last bit",
+    "!(fast < 1000000000.0)": "a velocity that is no number, which finite readings do not give",
+}
 IN_IDENTIFIER = {
     **OPERATORS,
     "modulo_of_double": "as `modulo`",
@@ -59,6 +77,52 @@ IN_IDENTIFIER = {
     "queue.at[k] >= state.at[SETTLING]": "a force of touch of zero, of which no settling is asked",
 }
 """Branches that no recorded tick takes, by their function or a piece of their line, and why."""
+
+
+TESTED_ALONE = {*OPERATORS, "exp_", "log_"}
+"""Functions of C that have tests of their own."""
+LAW = re.compile(r"(palpate/\S+:\d+) \*/\nstatic .*?(\w+)\(")
+
+
+def slides(limit, **options):
+    """A sliding loop as a law in C, with its recording."""
+    gains = replace(
+        gains_for(load_arm("ur5e"), 15.0, cap=4e4, limit=limit),
+        slide=Slide(speed=0.03, mu_max=0.9, **options),
+    )
+    return laws.sliding_module(gains, DOWN), recording.of_sliding_loop(SlidingLoop(gains, DOWN))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("gcov")), reason="there is no gcc with gcov")
+def test_recorded_slides_take_every_branch_that_there_is_a_way_to(force, tmp_path):
+    """Laws of the press are those of the force loop, whose recording takes their branches."""
+    cases = [slides(60.0, step=0.002), slides(40.0, touches=0.01)]
+    of_press = {place for place, _ in LAW.findall(force.sources.source)}
+    shared = {name for place, name in LAW.findall(sources_of(cases[0][0]).source) if place in of_press}
+    taken = all_branches(cases, 300_000, tmp_path)
+    taken = {one: here for one, here in taken.items() if one[0] not in shared | TESTED_ALONE}
+    assert len(taken) > 220
+    check(taken, IN_SLIDE)
+
+
+def all_branches(cases, ticks, folder):
+    """Branches of laws, and whether any of their recordings took each."""
+    taken = {}
+    for module, recorded in cases:
+        text = report(module, recorded.inputs, recorded.presses(ticks, 1), folder)
+        for branch, here in branches_of(text):
+            taken[branch] = taken.get(branch, False) or here
+    return taken
+
+
+def check(taken, unreachable):
+    """Each branch is taken, or stands in a list with the reason why not; and only those stand there."""
+    left = {branch[:2] for branch, here in taken.items() if not here}
+    strange = [one for one in left if not any(why == one[0] or why in one[1] for why in unreachable)]
+    assert not strange, "\n".join(map(str, strange))
+    reasons = {why for why in unreachable for place, line in left if why == place or why in line}
+    assert reasons == set(unreachable), "a branch that ticks take is not called unreachable"
 
 
 def contacts(touch, **options):
@@ -85,18 +149,9 @@ def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(
     else:
         exported = request.getfixturevalue(law)
         cases = [(exported.module, exported.recording)]
-    taken = {}
-    for module, recorded in cases:
-        for branch, here in branches_of(
-            report(module, recorded.inputs, recorded.presses(ticks, 1), tmp_path)
-        ):
-            taken[branch] = taken.get(branch, False) or here
-    left = {branch[:2] for branch, here in taken.items() if not here}
-    reasons = {why for why in unreachable for place, line in left if why == place or why in line}
+    taken = all_branches(cases, ticks, tmp_path)
     assert len(taken) > least
-    strange = [one for one in left if not any(why == one[0] or why in one[1] for why in unreachable)]
-    assert not strange, "\n".join(map(str, strange))
-    assert reasons == set(unreachable), "a branch that ticks take is not called unreachable"
+    check(taken, unreachable)
 
 
 def report(module, inputs, presses, folder):

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.estimators import budget as causes
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.models import Model, Motion
 from palpate.identification.problem import Problem
-from palpate.identification.uncertainty import Contributions
+from palpate.identification.uncertainty import Contributions, half_widths
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,9 @@ class Answer:
     @property
     def half(self) -> Array:
         """95 % half-widths of all causes together, shape (p,)."""
-        return causes.half_widths(self.budget)
+        parts = self.budget.values()
+        freedom = [np.broadcast_to(part.freedom, part.variance.shape) for part in parts]
+        return half_widths([part.variance for part in parts], freedom)
 
     def half_of(self, name: str) -> float:
         """The same of one parameter."""

@@ -21,7 +21,7 @@ from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment, Solution, System, worth
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
-from palpate.identification.uncertainty import Contribution, effective_freedom
+from palpate.identification.uncertainty import Contribution
 from palpate.signals.samples import detrend, quadrature
 from palpate.signals.types import NORMAL
 
@@ -243,22 +243,6 @@ def white_level(level: Array, lines: Array) -> float:
         if last == 1 or apart / scale <= float(chdtri(last - 1, 0.05)):
             break
     return pooled
-
-
-def half_widths(budget: Budget) -> Array:
-    """95 % half-widths of all causes together, shape (p,).
-
-    Student's t with the degrees of freedom that Welch and Satterthwaite give a sum of variances.
-
-    Args:
-        budget: variances by cause.
-    """
-    from scipy.special import stdtrit
-
-    variance = np.array([part.variance for part in budget.values()])
-    freedom = np.array([np.broadcast_to(part.freedom, part.variance.shape) for part in budget.values()])
-    found: Array = stdtrit(effective_freedom(variance, freedom), 0.975) * np.sqrt(variance.sum(axis=0))
-    return found
 
 
 FRICTION = "Fc"

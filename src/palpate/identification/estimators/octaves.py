@@ -30,7 +30,7 @@ GROUPS = 8
 """Stretches of the log that are held against each other: enough for a variance, few enough to be quick."""
 PERIODS = 4
 """Periods in a block."""
-_LINES = (3.0, 4.0, 5.0)
+LINES = (3.0, 4.0, 5.0)
 _WHOLE_LINES = (1.0, 2.0, 3.0, 4.0, 5.0)
 OVERLAP = 0.75
 """Independent blocks for each of half-overlapping Hann blocks of a coherent motion: 1/(1 + 2/6) (Welch 1967)."""
@@ -135,7 +135,7 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
                 continue
             starts = np.arange(0, segment.length - length + 1, max(length // 2, 1))
             group = (begins[number] + starts + length // 2) * GROUPS // max(int(begins[-1]), 1)
-            for g, part in _sums(own, starts, group, length, _WHOLE_LINES if octave == 0 else _LINES):
+            for g, part in _sums(own, starts, group, length, _WHOLE_LINES if octave == 0 else LINES):
                 share = (OVERLAP if len(starts) > 1 else 1.0) / TIED
                 products[g, octave] += share * part[0]
                 lines[g, octave] += share * part[1]
@@ -162,7 +162,7 @@ def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: in
     found = np.empty(count)
     for o in range(count):
         length = longest if o == 0 else longest >> (o - 1)
-        window = _window(length, _WHOLE_LINES if o == 0 else _LINES)
+        window = _window(length, _WHOLE_LINES if o == 0 else LINES)
         found[o] = window @ power(np.asarray(np.fft.rfftfreq(2 * length, dt), np.float64))
     return found
 
@@ -170,7 +170,7 @@ def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: in
 @lru_cache(maxsize=64)
 def _window(length: int, numbers: tuple[float, ...]) -> Array:
     """Response of a spectral line to each frequency, the mean of all lines of a block, shape (length + 1,)."""
-    spectra = np.abs(np.fft.rfft(_seen_octaves(length, numbers), 2 * length, axis=0)) ** 2
+    spectra = np.abs(np.fft.rfft(transform_of(length, numbers), 2 * length, axis=0)) ** 2
     found: Array = spectra.mean(axis=1) / (2 * length)
     found[1:-1] *= 2
     return found
@@ -180,7 +180,7 @@ def _sums(
     own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: tuple[float, ...]
 ) -> list[tuple[int, tuple[Array, int]]]:
     """Products and lines of the blocks of each group."""
-    seen, width = _seen_octaves(length, numbers), own.shape[1]
+    seen, width = transform_of(length, numbers), own.shape[1]
     found: dict[int, tuple[Array, int]] = {}
     some = max(_AT_ONCE // (length * width), 1)
     views = np.lib.stride_tricks.sliding_window_view(own, length, axis=0)
@@ -196,7 +196,7 @@ def _sums(
 
 
 @lru_cache(maxsize=64)
-def _seen_octaves(length: int, numbers: tuple[float, ...]) -> Array:
+def transform_of(length: int, numbers: tuple[float, ...]) -> Array:
     """The transform of a block without its mean and slope, real parts and then imaginary ones, shape (length, 2 lines).
 
     The power of white noise stays what it is.

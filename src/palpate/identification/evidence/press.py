@@ -14,7 +14,6 @@ from palpate.identification.evidence.slope import (
     FEWEST,
     STILL,
     Loading,
-    Slope,
     apart,
     line,
     loadings_in,
@@ -23,19 +22,19 @@ from palpate.identification.evidence.slope import (
     slope_between,
     slope_of,
 )
-from palpate.identification.evidence.spectrum import dynamic_stiffness, steady_point, working_point
+from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
-from palpate.identification.tangents import SteadyPress
+from palpate.identification.tangents import Slopes, SteadyPress
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
-from palpate.signals.types import NORMAL
 
 
 def relaxation(
-    problem: Problem, lag: float, segments: list[Segment], slope: Slope | None
+    problem: Problem, lag: float, segments: list[Segment], slope: Slopes | None
 ) -> Relaxation | None:
     """Of the longest hold after a loading, what the position gives back by its slope left aside."""
     depth = problem.motion.moved(0, lag)
@@ -50,7 +49,8 @@ def relaxation(
         return None
     rows = slice(*best)
     moved = depth[rows] - depth[best[1] - 1]
-    given, doubt = (0.0 * moved, 0.0) if slope is None else (slope.stiffness * moved, slope.half)
+    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
+    given, doubt = stiffness.value * moved, stiffness.half
     return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
 
 
@@ -200,7 +200,7 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
         seen: the press by the filtered contact, if that shows one.
         origin: position of the surface [m].
     """
-    tangents = [Tangent(own.force, own.stiffness, own.half) for own in (*steady.others, steady.headline)]
+    tangents = [Tangent(own.force, own.stiffness) for own in (*steady.others, steady.headline)]
     surface = np.array([[origin], [0.0]])
     ordered = tuple(sorted(tangents, key=lambda own: own.force))
     curves = steady.loading - surface, steady.unloading - surface
@@ -220,8 +220,8 @@ def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tan
     found, other = _tangent_of(loadings, level), _tangent_of(later, level)
     if found is None or other is None:
         return None
-    by_lag = NORMAL * (other.stiffness - found.stiffness)
-    return replace(found, half=float(np.hypot(found.half, by_lag)))
+    by_lag = Contribution(abs(other.stiffness - found.stiffness))
+    return replace(found, slope=found.slope.with_cause("lag", by_lag))
 
 
 def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
@@ -244,10 +244,12 @@ def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    others = np.mean(by_speed), np.mean(by_filter) if by_filter else 0.0
-    return Tangent(
-        float(np.mean(forces)), mean.value, float(np.sqrt(mean.half**2 + sum(o**2 for o in others)))
-    )
+    causes = {
+        "repetition": Contribution(mean.std, mean.freedom),
+        "speed": Contribution.within(abs(float(np.mean(by_speed)))),
+        "filter": Contribution.within(float(np.mean(by_filter)) if by_filter else 0.0),
+    }
+    return Tangent(float(np.mean(forces)), Measurement(mean.value, causes))
 
 
 def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.intp]:
@@ -280,18 +282,21 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
+    headline = (
+        None if steady is None else replace(steady.headline, depth=steady.headline.depth - problem.origin)
+    )
     if steady is not None:
         press = at_constant_speed(steady, press, problem.origin)
     if options.series_stiffness is not None:
         series = options.series_stiffness, options.series_std
         spectrum = in_series.spectrum_without_series(spectrum, *series)
         press = None if press is None else in_series.press_without_series(press, *series)
+        headline = None if headline is None else in_series.slopes_without_series(headline, *series)
     if options.series_mass is not None:
         spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
-    if steady is not None:
-        return spectrum, press, steady_point(steady.headline, problem, options, unit)
-    point = working_point(whole, spectrum, options, unit, hidden)
-    return spectrum, press, point
+    if headline is not None:
+        return spectrum, press, point_of(headline, "press", problem, options, unit)
+    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
@@ -306,7 +311,7 @@ def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float |
     segments = segments_of(problem.motion.rows, problem.spans)
     if point.source == "press":
         slope = slope_of(loadings_in(problem, problem.lag.value, segments))
-        return None if slope is None else slope.stiffness
+        return None if slope is None else slope.stiffness.value
     spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
     near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]
     return near[0].storage if near else None

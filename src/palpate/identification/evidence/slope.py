@@ -13,7 +13,8 @@ from palpate.identification.filters.state_variable import ORDER, Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.uncertainty import Contribution, Contributions
+from palpate.identification.tangents import Slopes
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
 
@@ -152,28 +153,7 @@ _UPPER = 0.4
 """Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
 
 
-@dataclass(frozen=True)
-class Slope:
-    """Slope of the upper part of all loadings.
-
-    Args:
-        stiffness, half: [N/m].
-        rise: mean duration of a loading [s].
-        each: slope of each loading [N/m].
-        contributions: to its uncertainty, by cause [N/m].
-        force, depth: where it is, the means of the upper part [N], [m].
-    """
-
-    stiffness: float
-    half: float
-    rise: float
-    each: tuple[float, ...]
-    contributions: Contributions
-    force: float
-    depth: float
-
-
-def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
+def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
     """The slope of a log's loadings; with it what it moves by if the force is later than assumed.
 
     Args:
@@ -184,7 +164,7 @@ def slope_in(problem: Problem, segments: list[Segment]) -> Slope | None:
     return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
-def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None:
+def slope_between(loadings: list[Loading], later: list[Loading]) -> Slopes | None:
     """The slope of some loadings; its interval reaches that of the same with the force later.
 
     Args:
@@ -195,18 +175,17 @@ def slope_between(loadings: list[Loading], later: list[Loading]) -> Slope | None
     other = slope_of(later) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
-    by_lag = Contribution(abs(other.stiffness - found.stiffness))
-    half = float(np.hypot(found.half, by_lag.half))
-    return replace(found, half=half, contributions={**found.contributions, "lag": by_lag})
+    by_lag = Contribution(abs(other.stiffness.value - found.stiffness.value))
+    return replace(found, stiffness=found.stiffness.with_cause("lag", by_lag))
 
 
-def slope_of(loadings: list[Loading]) -> Slope | None:
+def slope_of(loadings: list[Loading]) -> Slopes | None:
     """Slope in the upper part of the force; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
-    the interval reaches both. Beyond them it has the scatter of each loading, the change of the slope over the range,
-    what it differs by from the slope of the channels as they were read, and the variance between loadings (a random
-    effect, Student's t).
+    the interval reaches both. It has the scatter of each loading, the change of the slope over the range, what it
+    differs by from the slope of the channels as they were read, and the variance between loadings (a random effect,
+    Student's t).
     """
     slopes, variances, rises, changes, speeds, filters, levels = [], [], [], [], [], [], []
     for loading in loadings:
@@ -225,16 +204,12 @@ def slope_of(loadings: list[Loading]) -> Slope | None:
     if not slopes:
         return None
     mean = random_effects(np.array(slopes), np.array(variances))
-    curvature, reach, by_filter = (float(np.mean(own)) for own in (changes, speeds, filters))
-    others = float(np.sqrt(mean.half**2 + curvature**2 + by_filter**2))
-    causes = {
-        "repetition" if len(slopes) > 1 else "noise": Contribution(mean.std, mean.freedom),
-        "curvature": Contribution.within(curvature),
-        "filter": Contribution.within(by_filter),
-        "speed": Contribution.within(float(np.sqrt((others + reach) ** 2 - others**2))),
-    }
-    where = (float(own) for own in np.mean(levels, axis=0))
-    return Slope(mean.value, others + reach, float(np.mean(rises)), tuple(slopes), causes, *where)
+    bounds = zip(("curvature", "filter", "speed"), (changes, filters, speeds), strict=True)
+    causes = {cause: Contribution.within(float(np.mean(own))) for cause, own in bounds}
+    causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
+    force, depth = (float(own) for own in np.mean(levels, axis=0))
+    own = Measurement(mean.value, causes)
+    return Slopes(force, depth, own, tuple(slopes), mean.next_half, float(np.mean(rises)))
 
 
 def _upper(force: Array) -> NDArray[np.intp]:

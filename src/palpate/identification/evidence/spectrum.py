@@ -17,28 +17,30 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.identification.estimators.budget import HIDDEN_SHARE
-from palpate.identification.estimators.octaves import Segment, segments_of
-from palpate.identification.evidence.slope import Slope, slope_in, unseen
-from palpate.identification.in_series import slope_budget, slope_without_series
+from palpate.identification.estimators.octaves import (
+    LINES,
+    OVERLAP,
+    PERIODS,
+    SHORTEST,
+    Segment,
+    longest_of,
+    segments_of,
+    transform_of,
+)
+from palpate.identification.evidence.slope import slope_in, unseen
+from palpate.identification.in_series import slopes_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
-from palpate.identification.result import DynamicStiffness, Parameter, Verdict, WorkingPoint
+from palpate.identification.result import DynamicStiffness, WorkingPoint
 from palpate.identification.tangents import Slopes
-from palpate.identification.uncertainty import Contribution, Contributions, student
+from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict
 from palpate.signals.types import NORMAL
 
 Complex = NDArray[np.complex128]
 
-PERIODS = 4
-"""Periods in a block: the lines 3, 4, 5 of its transform are then the octave."""
-_LINES = np.array([3.0, 4.0, 5.0])
 _LOWEST, _HIGHEST = 2.0, 6.0
 """Lines that Hann's window lets into these three; a motion elsewhere has only leaked into them."""
-_FEWEST = 16
-"""Rows in a block."""
 _MOST = 24
-_OVERLAP = 0.75
-"""Independent blocks for each of half-overlapping Hann blocks (Welch 1967)."""
 _TIED = np.array([[1, -2 / 3, 1 / 6], [-2 / 3, 1, -2 / 3], [1 / 6, -2 / 3, 1]])
 """Correlation of white noise between the lines of a Hann block: little of it is left across a sine's own lines."""
 _PHASES = 4
@@ -103,9 +105,9 @@ def dynamic_stiffness(
     channels = position, problem.motion.moved(1, lag), problem.force, *_round(problem, position, lag)
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
-    length = max(s.last - s.first for s in segments)
+    length = longest_of(segments)
     for _ in range(_MOST):
-        if length < _FEWEST:
+        if length < SHORTEST:
             break
         blocks = _blocks(problem, channels, segments, length)
         octave = _octave(blocks, length, dt, variance, lag_std)
@@ -136,28 +138,22 @@ def _round(problem: Problem, position: Array, lag: float) -> list[Array]:
 
 def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int) -> _Blocks:
     """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
-    window = np.hanning(length + 2)[1:-1]
-    ramp = np.arange(length) - (length - 1) / 2
-    phase = np.exp(-2j * np.pi * np.outer(np.arange(length), _LINES) / length) * window[:, None]
-    level = window[:, None] * np.column_stack([np.ones(length), ramp])
-    level_out = np.linalg.solve(level.T @ np.column_stack([np.ones(length), ramp]), level.T)
-    lines: list[list[Complex]] = [[] for _ in channels]
-    for s in segments:
-        if s.last - s.first < length:
-            continue
-        for channel, values in enumerate(channels):
-            views = np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)
-            own = views[:: max(length // 2, 1)]
-            fitted = own @ level_out.T
-            lines[channel].append(
-                own @ phase - fitted[:, :1] * phase.sum(axis=0) - fitted[:, 1:] * (ramp @ phase)
-            )
+    seen, count = transform_of(length, LINES), len(LINES)
+
+    def lines(values: Array) -> Complex:
+        views = [
+            np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)[:: max(length // 2, 1)]
+            for s in segments
+            if s.length >= length
+        ]
+        real = np.concatenate([own @ seen for own in views])
+        return np.asarray(real[:, :count] + 1j * real[:, count:])
+
     chain, dt = problem.motion.chain, float(np.median(np.diff(problem.time)))
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
-    power = float(line[0]) * chain.dt / dt * float(window @ window)
-    x, v, f, *rounded = (np.concatenate(channel) for channel in lines)
-    return _Blocks(x, v, f, tuple(rounded), power)
+    x, v, f, *rounded = (lines(values) for values in channels)
+    return _Blocks(x, v, f, tuple(rounded), 2 * float(line[0]) * chain.dt / dt)
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
@@ -166,21 +162,22 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
     omega, parts = line.omega, line.parts
     by_lag = NORMAL * omega * lag_std
     noise = min(3 * blocks.noise * len(blocks.position) / max(power, 1e-300), 1.0)
-    causes = {
-        "blocks": student(line.freedom) * np.sqrt(line.variance),
+    bounds = {
         "lag": np.array([abs(parts[1]) * by_lag + abs(parts[0]) * by_lag**2 / 2, abs(parts[0]) * by_lag]),
         "position noise": noise * np.abs(parts) + NORMAL * blocks.pull * np.hypot(*parts),
         "within the octave": np.abs(line.change),
     }
-    halves = np.sqrt(sum(half**2 for half in causes.values()))
-    bounds = {cause: Contribution.within(float(half[0])) for cause, half in causes.items()}
-    scatter = Contribution(float(np.sqrt(line.variance[0])), line.freedom)
-    window = float((np.hanning(length + 2) ** 2).sum())
-    share = power / len(blocks.position) * 2 / (length * window) / variance
-    return DynamicStiffness(
-        omega / (2 * np.pi), float(parts[0]), float(halves[0]), float(parts[1]), float(halves[1]),
-        len(blocks.position), float(min(share, 1.0)), bounds | {"blocks": scatter},
-    )  # fmt: skip
+    scatter = np.sqrt(line.variance)
+    storage, loss = (
+        Measurement(
+            float(parts[i]),
+            {"blocks": Contribution(float(scatter[i]), line.freedom)}
+            | {cause: Contribution.within(float(half[i])) for cause, half in bounds.items()},
+        )
+        for i in range(2)
+    )
+    share = power / len(blocks.position) / length / variance
+    return DynamicStiffness(omega / (2 * np.pi), storage, loss, len(blocks.position), float(min(share, 1.0)))
 
 
 def _fit(blocks: _Blocks) -> _Line:
@@ -189,7 +186,7 @@ def _fit(blocks: _Blocks) -> _Line:
     power = np.abs(x) ** 2
     total = float(power.sum()) or 1e-300
     omega = float(np.sqrt((np.abs(v) ** 2).sum() / total)) or 1e-300
-    u = _LINES - float((power @ _LINES).sum()) / total
+    u = np.array(LINES) - float((power @ LINES).sum()) / total
     spread = float((power @ u**2).sum()) / total
     slope = spread > _FLAT
     columns = np.stack([x, v / omega, u * x, u * v / omega] if slope else [x, v / omega], axis=-1)
@@ -197,18 +194,20 @@ def _fit(blocks: _Blocks) -> _Line:
     theta = bread @ np.einsum("blp,bl->p", columns.conj(), f).real
     left = f - columns @ theta
     own = power.sum(axis=1)
-    independent = max(_OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
+    independent = max(OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
     tied = bread @ np.einsum("blp,lm,bmq->pq", columns.conj(), _TIED, columns).real
     noise = float((np.abs(left) ** 2).sum()) / max(3 * len(x) - float(np.trace(tied)) / 2, 1e-3)
-    within = noise / 2 * np.diag(tied @ bread)[:2] / _OVERLAP
+    within = noise / 2 * np.diag(tied @ bread)[:2] / OVERLAP
     moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]
-    grown = independent / max(independent - 1, 0.5) / _OVERLAP
+    grown = independent / max(independent - 1, 0.5) / OVERLAP
     freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
     change = theta[2:] * np.sqrt(spread) if slope else np.zeros(2)
     variance = np.maximum((moved**2).sum(axis=0) * grown, within)
     return _Line(omega, theta[:2], change, variance, freedom)
 
 
+_ROUNDING = 1e-9
+"""Share of the motion that a depth may be by rounding alone."""
 _EXCITED = 0.05
 """Share of the position's variance that makes an octave worth a headline: one part in twenty of the motion."""
 
@@ -226,78 +225,69 @@ def working_point(
     surface (a probe that follows it, an inertia), and is passed over. A force that nothing explains, as where the probe
     bounces, is at every frequency at once: as much of it as is seen may be at the octave's own.
     """
-    lag, tolerance = problem.lag.value, options.tolerance
+    tolerance, bonded = options.tolerance, problem.contacts.bonded
     segments = segments_of(problem.motion.rows, problem.spans)
-    slope = slope_in(problem, segments)
-    if slope is not None and options.series_stiffness is not None:
-        series = options.series_stiffness, options.series_std
-        value, half = slope_without_series(slope.stiffness, slope.half, *series)
-        each = tuple(slope_without_series(own, 0.0, *series)[0] for own in slope.each)
-        parts = slope_budget(slope.contributions, slope.stiffness, *series)
-        slope = replace(slope, stiffness=value, half=half, each=each, contributions=parts)
-    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
-    depths = problem.motion.moved(0, lag)[inside]
-    octave = _octave_point(spectrum, tolerance)
-    if octave is None and slope is None:
-        return None
-    use_press = octave is None or (
-        slope is not None
-        and octave.storage_half > tolerance * abs(octave.storage)
-        and slope.half / abs(slope.stiffness or 1e-300) < octave.storage_half / abs(octave.storage or 1e-300)
-    )
-    if use_press and slope is not None:
-        value, half, frequency, again = slope.stiffness, slope.half, 0.25 / slope.rise, _again(slope)
-        parts, force, depth = dict(slope.contributions), slope.force, slope.depth
+    press, octave = slope_in(problem, segments), _octave_point(spectrum, tolerance)
+    if press is not None and options.series_stiffness is not None:
+        press = slopes_without_series(press, options.series_stiffness, options.series_std)
+    if press is not None and (
+        octave is None
+        or (
+            not octave.in_phase.known_to(tolerance)
+            and press.stiffness.relative_half < octave.in_phase.relative_half
+        )
+    ):
+        found, source = press, "press"
+    elif octave is not None:
+        found, source = _at_octave(octave, problem, segments, hidden), "octave"
     else:
-        assert octave is not None
-        value, half, frequency, again = octave.storage, octave.storage_half, octave.frequency, None
-        force, depth = float(problem.force[inside].mean()), float(depths.mean())
-        unseen_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
-        parts = {**octave.contributions, "unexplained": Contribution.within(unseen_force)}
-        half = float(np.hypot(half, unseen_force))
-    if problem.contacts.bonded and not options.bonded:  # nothing tells that the first reading is in contact
-        parts["unseen way"] = Contribution.within(abs(value) * unseen(problem))
-        half = float(np.hypot(half, parts["unseen way"].half))
+        return None
+    if bonded and not options.bonded:  # nothing tells that the first reading is in contact
+        reach = Contribution.within(abs(found.stiffness.value) * unseen(problem))
+        found = replace(found, stiffness=found.stiffness.with_cause("unseen way", reach))
     rest = 0.0 if problem.counted else problem.contacts.resting
-    contacts = problem.contacts
-    stiffness = _judge(value, half, parts, options, unit)
-    against = ""
-    if not contacts.signed or (contacts.bonded and value < 0 and not options.bonded):
+    point = point_of(replace(found, force=found.force - rest), source, problem, options, unit)
+    falls = found.stiffness.value < 0 and not options.bonded
+    if not problem.contacts.signed or (bonded and falls):
         against = "the signs of force and position are not known (give --force-sign)"
-    elif value < 0 and not options.bonded:
+    elif falls:
         against = (
             "the force falls as the probe goes in: either the surface yields, or it moves, and then this is the"
             " stiffness of what holds the probe"
         )
-    if against:
-        reason = f"{stiffness.reason}; {against}"
-        stiffness = replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
-    source = "press" if use_press else "octave"
-    return WorkingPoint(stiffness, force - rest, depth, float(frequency), source, again, not contacts.bonded)
+    else:
+        return point
+    reason = f"{point.stiffness.reason}; {against}"
+    return replace(point, stiffness=replace(point.stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason))
 
 
-def steady_point(own: Slopes, problem: Problem, options: Options, unit: str) -> WorkingPoint:
-    """The tangent of a press at constant speed, and the force and depth that it belongs to.
+def _at_octave(octave: DynamicStiffness, problem: Problem, segments: list[Segment], hidden: float) -> Slopes:
+    """The storage of an octave, where the contact is in the mean."""
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    depths = problem.motion.moved(0, problem.lag.value)[inside]
+    force, depth = float(problem.force[inside].mean()), float(depths.mean())
+    depth *= abs(depth) > _ROUNDING * float(np.abs(depths).max())  # of a depth that counts from its mean
+    hidden_force = HIDDEN_SHARE * hidden * float(np.hypot(octave.storage, octave.loss))
+    own = octave.in_phase.with_cause("unexplained", Contribution.within(hidden_force))
+    return Slopes(force, depth, own, (own.value,), None, 0.25 / octave.frequency)
+
+
+def point_of(found: Slopes, source: str, problem: Problem, options: Options, unit: str) -> WorkingPoint:
+    """The working point of a stiffness, with a verdict.
 
     Args:
-        own: at the force that is named.
+        found: at the force that is named.
+        source: octave or press.
         problem: of the log.
-        options: with the tolerance, and the stiffness in series with the surface.
+        options: with the tolerance and the calibration.
         unit: of a stiffness.
     """
-    value, half, again, parts = own.stiffness, own.half, own.again, own.contributions
-    if options.series_stiffness is not None:
-        series = options.series_stiffness, options.series_std
-        gain = slope_without_series(value, 0.0, *series)[0] / value
-        parts = slope_budget(parts, value, *series)
-        value, half = slope_without_series(value, half, *series)
-        again = None if again is None else gain**2 * again
-    stiffness = _judge(value, half, parts, options, unit)
+    value, again = found.stiffness.value, found.again
     interval = None if again is None else (value - again, value + again)
-    depth = own.depth - problem.origin
     return WorkingPoint(
-        stiffness, own.force, depth, 0.25 / own.rise, "press", interval, not problem.contacts.bonded
-    )
+        _judge(found.stiffness, options, unit), found.force, found.depth, 0.25 / found.rise, source, interval,
+        not problem.contacts.bonded,
+    )  # fmt: skip
 
 
 def _octave_point(spectrum: Sequence[DynamicStiffness], tolerance: float) -> DynamicStiffness | None:
@@ -311,31 +301,16 @@ def _octave_point(spectrum: Sequence[DynamicStiffness], tolerance: float) -> Dyn
         falls = any(own.storage + own.storage_half < o.storage - o.storage_half for o in lower)
         if own.share >= _EXCITED and not falls:
             kept.append(own)
-    told = [own for own in kept if own.storage_half <= tolerance * abs(own.storage)]
+    told = [own for own in kept if own.in_phase.known_to(tolerance)]
     return max(told or kept, key=lambda own: own.share, default=None)
 
 
-def _again(slope: Slope) -> tuple[float, float] | None:
-    """Where the slope of the next loading falls: t(n - 2) sqrt(between + own)."""
-    n = len(slope.each)
-    if n < 3:
-        return None
-    half = student(n - 2) * float(np.std(slope.each, ddof=1)) * float(np.sqrt(1 + 1 / n))
-    return slope.stiffness - half, slope.stiffness + half
-
-
-def _judge(value: float, half: float, parts: Contributions, options: Options, unit: str) -> Parameter:
+def _judge(own: Measurement, options: Options, unit: str) -> Parameter:
     """A verdict on a stiffness; the calibration of the scales is one more cause of its interval."""
-    by_scale = Contribution(options.calibration * abs(value))
-    half, parts = float(np.hypot(half, by_scale.half)), {**parts, "calibration": by_scale}
-    known = half <= options.tolerance * abs(value) and value != 0
-    reason = f"known to {100 * half / abs(value):.2g} % (95 %), whatever the model" if known else ""
-    return Parameter.of(
-        value,
-        half,
-        unit,
-        Verdict.IDENTIFIED if known else Verdict.NOT_IDENTIFIABLE,
-        reason
-        or f"95 %: {value - half:.3g} to {value + half:.3g} {unit}; wider than {options.tolerance:.0%}",
-        parts,
-    )
+    own = own.with_cause("calibration", Contribution(options.calibration * abs(own.value)))
+    value, half = own.value, own.half
+    if value and own.known_to(options.tolerance):
+        reason = f"known to {100 * half / abs(value):.2g} % (95 %), whatever the model"
+        return Parameter.of(value, unit, Verdict.IDENTIFIED, reason, own.contributions)
+    reason = f"95 %: {value - half:.3g} to {value + half:.3g} {unit}; wider than {options.tolerance:.0%}"
+    return Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, reason, own.contributions)

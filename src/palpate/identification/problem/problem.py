@@ -199,13 +199,6 @@ class Problem:
         return self.contacts.resting if self.counted else 0.0
 
     @property
-    def free_noise(self) -> float | None:
-        """Deviation of the force out of contact; None if too little of the log is."""
-        if not self.free:
-            return None
-        return float(1.4826 * np.median(np.abs(np.concatenate([f - np.median(f) for f in self.free]))))
-
-    @property
     def with_touches(self) -> Problem | None:
         """The same over the rows from before each touch, the force counted from where it rests; None if unknown."""
         return self._at(self.touch)

@@ -11,7 +11,8 @@ from rich.text import Text
 
 from palpate.errors import InputError
 from palpate.identification.causes import Code, cause_of
-from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.result import Identification
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.words import (

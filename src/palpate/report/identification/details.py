@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.result import Identification
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification.words import (
     CALLED,
     STYLES,

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from palpate.identification.result import Identification, Parameter, Traces, Verdict
+from palpate.identification.result import Identification, Traces
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import figure
 from palpate.report.identification.details import BUDGET_HEAD, BUDGET_WORDS, METHOD, budgets, correlation
 from palpate.report.identification.figure import Panel, both_parts, one, shown_by

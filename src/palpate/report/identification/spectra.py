@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import ORDER
-from palpate.identification.least_squares import whiteness
 from palpate.identification.result import Identification, Traces
 
 _SHORTEST = 16
@@ -23,6 +22,8 @@ _SEEN = 1.25
 """Where the filter chain has taken all but a hundredth of the power, as a share of its cut-off."""
 _FEWEST_TESTED = 30
 """Residuals for a test of whiteness: below, the sum of squares of the correlations is not yet chi-square."""
+_LAGS = 20
+"""Autocorrelations that the test sums, at most."""
 _PASSED = 0.5
 """Up to this share of its cut-off the chain passes more than half of the amplitude."""
 _HANN = 35 / 18
@@ -188,6 +189,20 @@ def band_of(found: Identification, traces: Traces) -> float:
     return np.inf if traces.matched else found.cutoff
 
 
+def _ljung_box(residuals: Array) -> float:
+    """Probability of first autocorrelations as large as those of evenly spaced residuals, if they are white (1978)."""
+    from scipy.special import chdtrc
+
+    n = len(residuals)
+    lags = max(min(_LAGS, n // 5), 1)
+    e = residuals - residuals.mean()
+    power = float(e @ e)
+    if power == 0:
+        return 1.0
+    r = np.array([e[k:] @ e[:-k] for k in range(1, lags + 1)]) / power
+    return float(chdtrc(lags, n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1)))))
+
+
 def whiteness_of(found: Identification, traces: Traces) -> float | None:
     """Probability of residuals as far from white as these if they were white; None for too few of them.
 
@@ -197,7 +212,7 @@ def whiteness_of(found: Identification, traces: Traces) -> float | None:
     left = traces.fitted_force - traces.predicted
     pieces = [left[piece] for piece in stretches(traces.fitted_time)]
     if traces.matched:
-        return whiteness(np.concatenate(pieces)).p if len(left) >= _FEWEST_TESTED else None
+        return _ljung_box(np.concatenate(pieces)) if len(left) >= _FEWEST_TESTED else None
     dt = float(np.median(np.diff(traces.fitted_time))) if pieces else 0.0
     bins = [_periodogram(piece, dt) for piece in pieces if len(piece) >= _SHORTEST]
     if not bins:

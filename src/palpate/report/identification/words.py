@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.files import RECORD
 from palpate.identification.causes import Cause, Code, cause_of
-from palpate.identification.result import Identification, Parameter, Verdict, WorkingPoint
+from palpate.identification.result import Identification, WorkingPoint
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.numbers import plain, quantity, quantity_between, with_half
 from palpate.text import printable
 
@@ -123,11 +123,10 @@ def _loss(found: Identification, point: WorkingPoint) -> str:
 
 
 def place_of(found: Identification, point: WorkingPoint) -> str:
-    """`at 13 N, 2.4 mm deep and 0.57 Hz`; a depth that is zero but for rounding is the middle of the motion."""
+    """`at 13 N, 2.4 mm deep and 0.57 Hz`; a depth of zero is the middle of the motion."""
     force, depth, frequency = facts_of(found, point)
     deep = " deep" if point.from_surface and point.depth_m > 0 else " from the middle of the motion"
-    reach = 0.0 if found.traces is None else float(abs(found.traces.fitted_position).max(initial=0.0))
-    if not point.from_surface and abs(point.depth_m) <= sys.float_info.epsilon * reach:
+    if not point.from_surface and point.depth_m == 0:
         return f"at {force}, in the middle of the motion and at {frequency}"
     return f"at {force}, {depth}{deep} and {frequency}"
 

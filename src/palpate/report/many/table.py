@@ -17,7 +17,8 @@ from rich.text import Text
 from palpate.files import write_text
 from palpate.identification.causes import cause_of
 from palpate.identification.pooling import Pooled, PooledParameter, PooledPoint
-from palpate.identification.result import Identification, Parameter, Verdict
+from palpate.identification.result import Identification
+from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification.details import note
 from palpate.report.identification.words import (
     STYLES,
