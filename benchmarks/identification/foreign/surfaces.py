@@ -286,7 +286,7 @@ def _hunt_crossley(name: str, k: float, b: float, rng: np.random.Generator) -> S
 def _stiffening(name: str, k: float, b: float, rng: np.random.Generator) -> Surface:
     own = Surface(name, {"K": k, "B": b})
     depth = own.depth_of(15.0)
-    return own.scaled_by(K3=k * rng.uniform(0.2, 1.0) / depth**2)
+    return own.scaled(K3=k * rng.uniform(0.2, 1.0) / depth**2)
 
 
 def _falling(name: str, k: float, b: float, rng: np.random.Generator) -> Surface:
@@ -297,7 +297,7 @@ def _falling(name: str, k: float, b: float, rng: np.random.Generator) -> Surface
 def _friction(name: str, k: float, b: float, rng: np.random.Generator) -> Surface:
     own = Surface(name, {"K": k, "B": b})
     depth = own.depth_of(15.0)
-    return own.scaled_by(Fc=k * depth * rng.uniform(0.03, 0.12), x_d=depth * rng.uniform(0.01, 0.04))
+    return own.scaled(Fc=k * depth * rng.uniform(0.03, 0.12), x_d=depth * rng.uniform(0.01, 0.04))
 
 
 def _plastic(name: str, k: float, b: float, rng: np.random.Generator) -> Surface:

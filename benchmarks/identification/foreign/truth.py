@@ -122,7 +122,7 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
         share = min(force / float(short.force.max() or 1.0), 1 - ABOUT)
         low, high = max(share - ABOUT, 0.0), max(share + ABOUT, 2 * ABOUT)
     v = np.gradient(short.depth, short.dt)
-    slow = surface.scaled_by(B=0.0, D=0.0, M=0.0, Fc=0.0)
+    slow = surface.scaled(B=0.0, D=0.0, M=0.0, Fc=0.0)
     calm = touch(slow, short.depth, v, np.gradient(v, short.dt), short.dt).force
     edges = np.flatnonzero(np.diff(np.concatenate([[0], short.contact.view(np.int8), [0]])))
     forces = short.force, calm
