@@ -142,6 +142,7 @@ def test_what_is_wrong_is_one_line_in_pythons_words(call, message, record):
         "palpate.networks.Perceptron.learn",
         "palpate.robots.Planar3R.jacobian_dot",
         "palpate.robots.SerialArm.from_urdf",
+        "palpate.robots.SerialArm.named",
     ],
 )
 def test_a_name_that_scripts_rely_on(name):

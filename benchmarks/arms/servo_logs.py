@@ -95,7 +95,7 @@ def log(rng, name: str, offset, gains, delay: float):
 
 def true_numbers(name: str, offset, kp, kd, delay: float, arm: Arm):
     """Lag [s], stiffness [N/m] and delay [s] of the tip, and theta [s] of the loop with the law for `arm`."""
-    robot = SerialArm.from_name(name)
+    robot = SerialArm.named(name)
     q = np.array(robot.home) + offset
     J, M = robot.jacobian(q), robot.mass_matrix(q)
     normal = robot.forward_kinematics(q)[:3, 2]

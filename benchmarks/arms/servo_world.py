@@ -26,7 +26,7 @@ RATE, STEPS = 500.0, 8
 
 def arm_of(name: str) -> Arm:
     """The tip of an arm at home, along its own z, as a servo of one direction: K_s and D of all joints in series."""
-    robot, (kp, kd) = SerialArm.from_name(name), SERVOS[name]
+    robot, (kp, kd) = SerialArm.named(name), SERVOS[name]
     q = np.array(robot.home)
     along = robot.forward_kinematics(q)[:3, 2] @ robot.jacobian(q)[:3]
     stiffness, damping = (1.0 / float(along**2 @ (1.0 / np.array(gain))) for gain in (kp, kd))

@@ -35,7 +35,7 @@ HEAD = (
 
 def own(name: str) -> Callable[[], float]:
     """Measures seconds a step, touching."""
-    arm = SerialArm.from_name(name)
+    arm = SerialArm.named(name)
     place = place_of(arm, None, None, gap=-1e-4)
     cell = cell_of(arm, place, KelvinVoigt(5000.0, 50.0, 0.0), loop_of(name, arm.title, "torque", place.mass))
     start = TouchState(touch(UNTOUCHED, 0.0), Reading(ZERO3, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
@@ -62,7 +62,7 @@ def mujoco_step() -> ctypes._CFuncPtr:
 
 def scene(name: str, touching: bool) -> "mujoco.MjModel":
     """The arm, with a ball at its tip a tenth of a millimetre in a plane if it shall touch."""
-    arm = SerialArm.from_name(name)
+    arm = SerialArm.named(name)
     if not touching:
         return scene_of(arm).model
     spec = mujoco.MjSpec.from_string(mjcf(arm))
@@ -78,7 +78,7 @@ def scene(name: str, touching: bool) -> "mujoco.MjModel":
 
 def theirs(name: str, touching: bool) -> Callable[[], float]:
     """Measures seconds a step of MuJoCo's."""
-    arm, model = SerialArm.from_name(name), scene(name, touching)
+    arm, model = SerialArm.named(name), scene(name, touching)
     model.opt.timestep = 5e-4
     step = mujoco_step()
 

@@ -12,7 +12,10 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "packages" / "palpate-studies" / "tests")]
+sys.path[:0] = [
+    str(ROOT / "tests"),
+    *(str(ROOT / "packages" / f"palpate-{name}" / "tests") for name in ("studies", "wires")),
+]
 
 N = 200
 TIME = np.arange(N) * 1e-3

@@ -20,7 +20,7 @@ The rooms, each `palpate.ROOM`:
     maps            a surface's stiffness from presses at places, and where to press next
     force           a force loop for any arm: tune, certify, ForceLoop
     wires           force loops on real arms: UR, Franka, ROS 2
-    robots          kinematics and dynamics: Planar3R, SerialArm.from_name("ur5e")
+    robots          kinematics and dynamics: Planar3R, SerialArm.named("ur5e")
     press           any serial arm presses on a surface, in simulation
     bench           the thesis' closed loop: arm, sensors, surface, controller, identifier
     controllers     of force and motion

@@ -17,7 +17,7 @@ NAMES = ("ur5e", "panda", "fr3", "iiwa14")
 
 def pressed(name, physics, mode="torque", resolution=0.0, nudge=0.0, stiffness=5000.0, seconds=0.25):
     """Half a second around the touch, the surface so near that it comes at once."""
-    arm = SerialArm.from_name(name)
+    arm = SerialArm.named(name)
     place = place_of(arm, None, None, gap=2e-4)
     loop = loop_of(name, arm.title, mode, place.mass)
     gains = gains_for(loop, 20.0)

@@ -325,7 +325,7 @@ def cell(damping=0.0):
     from palpate.robots import SerialArm
     from palpate.robots.serial.serial_arm import mjcf
 
-    arm = SerialArm.from_name("iiwa14")
+    arm = SerialArm.named("iiwa14")
     text = mjcf(arm).replace('armature="0.1"', f'armature="0.1" damping="{damping}"')
     text = re.sub(
         r"<site [^>]*>", '<body name="hand" pos="0 0 0.045"><geom size="0.02" mass="0.1"/>'

@@ -47,7 +47,7 @@ def test_the_arms_mass_is_that_of_both():
 
     from palpate.robots.serial.serial_arm import mjcf
 
-    arm = SerialArm.from_name("panda")
+    arm = SerialArm.named("panda")
     spec = mujoco.MjSpec.from_string(mjcf(arm))
     spec.compiler.balanceinertia = True
     tip = next(site for site in spec.sites if site.name == "tip")
@@ -163,6 +163,6 @@ def test_a_tool_that_is_too_heavy_and_a_model_that_is_mujocos_are_refused(tmp_pa
     from palpate.robots.serial.serial_arm import mjcf
 
     path = tmp_path / "cell.xml"
-    path.write_text(mjcf(SerialArm.from_name("iiwa14")))
+    path.write_text(mjcf(SerialArm.named("iiwa14")))
     with pytest.raises(InputError, match="give the tool a body there"):
         pressing(arm=str(path), site="tip", physics="mujoco")

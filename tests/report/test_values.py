@@ -51,7 +51,7 @@ def test_advice_in_python_names_the_keyword(found):
 
 
 VALUES = {
-    "arm": (lambda: SerialArm.from_name("ur5e"), "Universal Robots UR5e"),
+    "arm": (lambda: SerialArm.named("ur5e"), "Universal Robots UR5e"),
     "planar": (Planar3R, "0.2207 + 0.1603 + 0.1508 m"),
     "experiment": (
         lambda: load("foam-hybrid"),

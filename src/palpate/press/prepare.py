@@ -155,7 +155,7 @@ def arm_of(name: str, site: str | None) -> SerialArm:
     if name in names():
         if site is not None:
             raise InputError(f"--site is for files; {name} has its flange as tip")
-        return SerialArm.from_name(name)
+        return SerialArm.named(name)
     path, ending = Path(name), Path(name).suffix.lower()
     if ending == ".toml":
         return SerialArm.from_toml(path)

@@ -14,7 +14,7 @@ URDF = Path(__file__).with_name("gantry.urdf")
 def every_arm():
     """The four arms by name, and a user's URDF with prismatic joints."""
     return {
-        **{name: SerialArm.from_name(name) for name in NAMES},
+        **{name: SerialArm.named(name) for name in NAMES},
         "gantry": SerialArm.from_urdf(URDF, "probe"),
     }
 

@@ -160,7 +160,7 @@ def test_a_singular_pose_has_a_singular_value_of_zero():
         (lambda arm: arm.jacobian([np.nan] * 6), "must be finite"),
         (lambda arm: arm.bias_torque(arm.home, np.zeros((2, 6))), r"qd of .* got shape \(2, 6\)"),
         (lambda arm: arm.inverse_dynamics(*[arm.home] * 3, tip_wrench=[1.0]), "tip_wrench must have shape"),
-        (lambda arm: SerialArm.from_name("ur5"), "did you mean 'ur5e'"),
+        (lambda arm: SerialArm.named("ur5"), "did you mean 'ur5e'"),
     ],
 )
 def test_what_is_no_state(call, what):

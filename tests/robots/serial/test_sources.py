@@ -87,7 +87,7 @@ def test_what_its_own_laws_do_not_know_is_noted(write):
 
 
 def test_frankas_published_link_is_taken_as_published():
-    arm = SerialArm.from_name("panda")
+    arm = SerialArm.named("panda")
     (note,) = arm.notes
     assert "joint4" in note
     assert "triangle inequality" in note

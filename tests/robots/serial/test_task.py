@@ -89,7 +89,7 @@ def told(arm, axes, q, qd):
 @pytest.mark.parametrize("name", ["hybrid", "decoupled", "raibert-craig"])  # all others have their laws
 @pytest.mark.parametrize("arm", ["ur5e", "panda"])
 def test_plain_and_compiled_are_the_same(name, arm):
-    arm = SerialArm.from_name(arm)
+    arm = SerialArm.named(arm)
     given = inputs(arm)
     axes, sense, task = by_value(arm, *given)
     *_, q, qd = given
@@ -106,7 +106,7 @@ def test_plain_and_compiled_are_the_same(name, arm):
 @pytest.mark.parametrize("name", ["resolved acceleration", "decoupled", "impedance"])
 def test_the_tip_accelerates_as_it_was_told(name, arm):
     """These compensate all of the dynamics; the arm's own accelerations come from the joints, by arrays."""
-    arm = SerialArm.from_name(arm)
+    arm = SerialArm.named(arm)
     given = inputs(arm, 2)
     axes, sense, task, q, qd = given
     by = by_value(arm, *given)
@@ -129,14 +129,14 @@ def test_the_tip_accelerates_as_it_was_told(name, arm):
 @pytest.mark.long
 def test_one_compiled_version_serves_every_arm():
     for name in ("ur5e", "panda"):
-        arm = SerialArm.from_name(name)
+        arm = SerialArm.named(name)
         given = inputs(arm)
         compiled_arm_alone(arm.chain, given[3], given[4], room_for(arm.joints))
     assert len(compiled_arm_alone.compiled.signatures) == 1
 
 
 def test_joints_to_spare_slow_down_and_the_tip_does_not_notice():
-    arm = SerialArm.from_name("panda")
+    arm = SerialArm.named("panda")
     axes, sense, task, q, _ = inputs(arm, 3)
     J = arm.jacobian(q)
     spare = np.linalg.svd(J)[2][-1]  # moves the joints and not the tip

@@ -30,7 +30,7 @@ def arm_mjcf(folder: Path, name: str) -> Path:
     from palpate.robots import SerialArm
     from palpate.robots.serial.serial_arm import mjcf as arm_of
 
-    arm = SerialArm.from_name(name)
+    arm = SerialArm.named(name)
     place = arm.forward_kinematics(arm.home)
     spec = mujoco.MjSpec.from_string(arm_of(arm))
     spec.compiler.balanceinertia = True  # a published link of the Panda is no body

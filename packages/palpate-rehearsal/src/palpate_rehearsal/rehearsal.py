@@ -104,7 +104,7 @@ class Joints:
     """
 
     def __init__(self, name: str, place: Any):
-        self.arm = SerialArm.from_name(name)
+        self.arm = SerialArm.named(name)
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = _DOWN, place
         self.q = self.arm.inverse_kinematics(pose, near=self.arm.home)

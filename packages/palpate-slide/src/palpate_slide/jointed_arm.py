@@ -262,6 +262,6 @@ def jointed_arm(name: str) -> JointedArm:
         raise InputError(
             f"--physics mujoco needs an arm whose joints are known ({', '.join(names())}), got {name}"
         )
-    arm = SerialArm.from_name(name)
+    arm = SerialArm.named(name)
     place = place_of(arm, None, None)
     return JointedArm(arm, place, loop_of(name, arm.title, usual_mode(name), place.mass))

@@ -156,9 +156,7 @@ def test_a_client_by_the_guide_reads_what_it_asks_for(ur):
             np.diff(stamps), 1 / 125, atol=1e-9
         )  # as asked for, of 500 readings a second
         q, pose = np.array(numbers[:6]), np.array(numbers[6:12])
-        np.testing.assert_allclose(
-            SerialArm.from_name("ur5e").forward_kinematics(q)[:3, 3], pose[:3], atol=1e-6
-        )
+        np.testing.assert_allclose(SerialArm.named("ur5e").forward_kinematics(q)[:3, 3], pose[:3], atol=1e-6)
         assert numbers[12] == 0
         assert numbers[16:22] == [253] * 6  # each joint runs
         assert np.isnan(numbers[22:]).all()  # not simulated
@@ -239,7 +237,7 @@ def test_ur_rtde_reads_no_garbage_and_is_refused_by_name():
         receive = RTDEReceiveInterface(address)  # asks for all variables
         q, pose = receive.getActualQ(), receive.getActualTCPPose()
         np.testing.assert_allclose(
-            SerialArm.from_name("ur5e").forward_kinematics(np.array(q))[:3, 3], pose[:3], atol=1e-6
+            SerialArm.named("ur5e").forward_kinematics(np.array(q))[:3, 3], pose[:3], atol=1e-6
         )
         assert receive.getRobotMode() == 7
         assert receive.getSpeedScaling() == 1.0
@@ -296,7 +294,7 @@ def test_libfranka_is_refused_by_name_and_the_stand_in_lives():
         mode = library.ControllerMode.JointImpedance
         robot = connect()
         state = robot.read_once()
-        flange = SerialArm.from_name("fr3").forward_kinematics(np.array(state.q))
+        flange = SerialArm.named("fr3").forward_kinematics(np.array(state.q))
         np.testing.assert_allclose(np.reshape(state.O_T_EE, (4, 4)).T, flange, atol=1e-5)
         for start, words in (
             (robot.start_torque_control, ()),

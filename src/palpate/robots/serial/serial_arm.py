@@ -95,7 +95,7 @@ class SerialArm(Readable):
         _check_moves(self)
 
     @classmethod
-    def from_name(cls, name: str) -> SerialArm:
+    def named(cls, name: str) -> SerialArm:
         """An arm that comes with palpate: ur5e, panda, fr3, iiwa14.
 
         Raises:

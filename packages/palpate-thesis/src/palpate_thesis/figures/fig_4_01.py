@@ -129,7 +129,7 @@ class TiltedPress:
 def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> TiltedPress:
     """A six-joint arm presses a surface that is off its tool's axis; the seed is of tilt, noise and crosstalk."""
     rng = np.random.default_rng(seed)
-    arm = SerialArm.from_name("ur5e")
+    arm = SerialArm.named("ur5e")
     q, rates = np.array(arm.home), np.zeros(6)
     start = arm.forward_kinematics(q)
     tilt = rng.uniform(-TILT, TILT, 2)
