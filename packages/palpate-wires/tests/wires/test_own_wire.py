@@ -18,7 +18,7 @@ from palpate_wires import open_wire
 from palpate_wires.opening import name_of
 from wires.slow_cell import WORDS, cell
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "our_robot.py"
+EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "our_robot.py"
 
 
 class Resting:

@@ -28,7 +28,7 @@ from palpate_rehearsal.rtde_controller import SIMULATED, Controller
 from palpate_rehearsal.rtde_dictionary import INPUTS, OUTPUTS
 from wires.slow_cell import ADDRESSES, PATIENCE
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "wires.md"
+DOCS = Path(__file__).resolve().parents[4] / "docs" / "wires.md"
 
 
 @contextmanager
