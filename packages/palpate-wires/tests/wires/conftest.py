@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wires.slow_cell import ALONE
+from wires.slow_cell import ADDRESSES, ALONE
 
 
 @pytest.fixture
@@ -13,3 +13,9 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("CYCLONEDDS_URI", ALONE)
     return tmp_path
+
+
+@pytest.fixture
+def address():
+    """Of the loopback, of its own for each test."""
+    return next(ADDRESSES)

@@ -21,7 +21,7 @@ from palpate.wires import Command, LostError
 from palpate_wires import open_wire, realtime
 from palpate_wires.franka_driver import Driver, nearer
 from palpate_wires.orientation import from_matrix_by_columns
-from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
+from wires.slow_cell import PATIENCE, WORDS, child, slower_cell, wait_for_rows, while_it_presses
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
 pytest.importorskip("franky_sim", reason="franky-sim is not installed")
@@ -33,12 +33,6 @@ def folder(tmp_path_factory):
     # At its controller's 1 kHz; slower than the others', so that a loop at this rate may be late on a busy machine.
     slower_cell(made, 1000)
     return made
-
-
-@pytest.fixture
-def address():
-    """Of the loopback, of its own for each test."""
-    return next(ADDRESSES)
 
 
 @contextmanager

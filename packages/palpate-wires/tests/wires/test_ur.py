@@ -18,7 +18,7 @@ from palpate.logs import read_record
 from palpate.wires import Command
 from palpate_wires import open_wire
 from palpate_wires.orientation import from_rotation_vector, turn_vector
-from wires.slow_cell import ADDRESSES, WORDS, cell, child, wait_for_rows, while_it_presses
+from wires.slow_cell import WORDS, cell, child, wait_for_rows, while_it_presses
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
 
@@ -28,12 +28,6 @@ def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("ur")
     cell(made)
     return made
-
-
-@pytest.fixture
-def address():
-    """Of the loopback, of its own for each test."""
-    return next(ADDRESSES)
 
 
 @contextmanager
