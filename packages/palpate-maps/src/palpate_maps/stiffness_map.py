@@ -17,6 +17,8 @@ from palpate_maps.surface import Grid, Surface
 
 CANDIDATES = 600
 """Places among which the next press is chosen: in a plane 25 by 25, as fine as hundreds of presses are apart."""
+LARGEST = 1e12
+"""Bound of coordinates [m] and of values in SI units, above those that anything has; its inverse bounds from below."""
 MOST_PRESSES = 1000
 """Presses that `presses_until` foretells at most."""
 
@@ -31,7 +33,8 @@ class Prediction:
         next_std: of the value that a next press would state, alike (n,).
         common: standard deviation of the error that all presses share, alike.
         logarithmic: whether the four are of the logarithm.
-        z95: half-width of the 95 % intervals over the standard deviation.
+        z95: half-width of the surface's 95 % interval over its standard deviation.
+        next_z95: that of a next press.
     """
 
     mean: Array
@@ -40,6 +43,7 @@ class Prediction:
     common: float
     logarithmic: bool = True
     z95: float = Z95
+    next_z95: float = Z95
 
     @property
     def value(self) -> Array:
@@ -59,20 +63,20 @@ class Prediction:
     @property
     def ci95(self) -> Array:
         """95 % interval of the surface's own value (n, 2)."""
-        return self._interval(np.hypot(self.std, self.common))
+        return self._interval(self.z95 * np.hypot(self.std, self.common))
 
     @property
     def next95(self) -> Array:
         """95 % interval of what a next press states (n, 2) [N/m]; it shares the error common to all."""
-        return self._interval(self.next_std)
+        return self._interval(self.next_z95 * self.next_std)
 
     def exceeds(self, threshold: float) -> Array:
         """Probability that the field is above a threshold (n,)."""
         level = np.log(threshold) if self.logarithmic else threshold
         return np.asarray(norm.sf(level, self.mean, np.hypot(self.std, self.common)))
 
-    def _interval(self, std: Array) -> Array:
-        ends = self.mean[:, None] + self.z95 * np.outer(std, [-1.0, 1.0])
+    def _interval(self, half: Array) -> Array:
+        ends = self.mean[:, None] + np.outer(half, [-1.0, 1.0])
         return np.exp(ends) if self.logarithmic else ends
 
 
@@ -158,11 +162,11 @@ class FieldMap:
             (self.name, value, self.logarithmic),
             ("half", width, half is not None),
         ):
-            bad = ~np.isfinite(each) | (positive & (each <= 0.0))
+            bad = ~(np.abs(each) < LARGEST) | (positive & (each < 1.0 / LARGEST))
             if bad.any():
                 raise InputError(
-                    f"{name} must be finite{' and above 0' if positive else ''}, got {each[bad][0]:g} at press "
-                    f"{int(np.argwhere(bad)[0][0]) + 1}"
+                    f"{name} must be finite{' and above 0' if positive else ''}, of a size that is measured (below "
+                    f"{LARGEST:g}), got {each[bad][0]:g} at press {int(np.argwhere(bad)[0][0]) + 1}"
                 )
         together = [np.concatenate(pair) for pair in (
             (self._places.reshape(-1, where.shape[1]), where), (self._values, value), (self._half, width),
@@ -192,8 +196,8 @@ class FieldMap:
             )
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
-        z95 = self.process.z95
-        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, z95)
+        z95 = (self.process.z95, self.process.next_z95)
+        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, *z95)
 
     def next(
         self,
@@ -259,7 +263,8 @@ class FieldMap:
     def disagreeing(self) -> list[int]:
         """Presses that their neighbours contradict: of such a deviation n presses have one in 20 maps by chance."""
         bound = norm.ppf(1.0 - 0.025 / len(self))
-        return [int(i) for i in np.flatnonzero(np.abs(self.process.likeliest.leave_one_out()) > bound)]
+        errors, variance = self.process.likeliest.leave_one_out()
+        return [int(i) for i in np.flatnonzero(np.abs(errors) > bound * np.sqrt(variance))]
 
     def grid(self, count: int = 10_000) -> Grid:
         """A grid of some `count` places over the hull of the presses."""

@@ -167,6 +167,8 @@ def test_a_field_without_intervals_has_the_scatter_of_its_presses():
         ([[0.0, np.nan]], [1.0], [0.1], "places must be finite"),
         ([[0.0, 0.0]], [-1.0], [0.1], "stiffness must be finite and above 0"),
         ([[0.0, 0.0]], [1.0], [0.0], "half must be finite and above 0"),
+        ([[0.0, 0.0]], [1e300], [10.0], "of a size that is measured"),
+        ([[1e300, 0.0]], [1.0], [0.1], "places must be finite"),
         (
             [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0], [0.0, 0.1]],
             [500.0, 510.0, 5000.0, 530.0],
