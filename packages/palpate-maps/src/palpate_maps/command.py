@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from palpate_maps.result import MapRequest, MapResult
 
 MAP = Group("The map", sort_key=2)
+ENDINGS = {"figure": (".png", ".svg", ".pdf"), "csv": (".csv",), "ply": (".ply",), "mcap": (".mcap",)}
+"""Of the files of a map, by option."""
 POLL = 0.5
 """Time between two looks for presses [s]."""
 
@@ -114,18 +116,19 @@ class OutputOptions(ReportOption, JsonOption):
     mcap: Path | None = None
     "Where to write the map as it grew, for Foxglove, Lichtblick and Rerun."
 
+    @property
+    def files(self) -> dict[str, Path]:
+        """Paths that are written, by option."""
+        paths = {name: getattr(self, name) for name in ("report", *ENDINGS)}
+        return {name: path for name, path in paths.items() if path is not None}
+
     def check(self) -> None:
         """Check every path before any work is done."""
         self.page()
-        for path, option, endings in (
-            (self.figure, "--figure", (".png", ".svg", ".pdf")),
-            (self.csv, "--csv", (".csv",)),
-            (self.ply, "--ply", (".ply",)),
-            (self.mcap, "--mcap", (".mcap",)),
-        ):  # fmt: skip
-            if path is not None:
+        for name, endings in ENDINGS.items():
+            if (path := self.files.get(name)) is not None:
                 ending = path.suffix.lower()
-                check_place(path, option, ending=ending if ending in endings else endings[0])
+                check_place(path, f"--{name}", ending=ending if ending in endings else endings[0])
 
 
 def map(  # noqa: A001 - the command's name
@@ -266,12 +269,10 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
         from palpate.report.style import save
 
         save(page.draw_map(result), output.figure)
-    if output.csv is not None:
-        result.write_csv(output.csv)
-    if output.ply is not None:
-        result.write_ply(output.ply)
-    if output.mcap is not None:
-        result.write_mcap(output.mcap)
+    writers = {"csv": result.write_csv, "ply": result.write_ply, "mcap": result.write_mcap}
+    for kind, path in output.files.items():
+        if kind in writers:
+            writers[kind](path)
     if output.report is not None:
         write_text(output.report, page.page(result, f"Stiffness map of {name}", command(), live=live))
 
@@ -279,14 +280,7 @@ def _write(result: MapResult, output: OutputOptions, name: str, live: bool = Fal
 def _show(result: MapResult, output: OutputOptions) -> None:
     from palpate_maps.report import answer_of
 
-    written = (
-        ("report:", output.report),
-        ("figure:", output.figure),
-        ("table:", output.csv),
-        ("points:", output.ply),
-        ("film:", output.mcap),
-    )
-    files = [(kind, path) for kind, path in written if path is not None]
+    files = [(f"{kind}:", path) for kind, path in output.files.items()]
     print_result(answer_of(result), json=output.json, files=files)
 
 

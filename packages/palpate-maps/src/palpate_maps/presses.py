@@ -288,16 +288,10 @@ def _named_place(log: Path, identifier: LogIdentifier, columns: Sequence[str]) -
     if len(columns) not in (2, 3):
         raise InputError(f"--place needs the columns x,y or x,y,z, got {len(columns)}")
     signals = _completed_signals(log, identifier)
-    options: dict[str, Any] = {
-        "start": signals.start,
-        "end": signals.end,
-        "missing": signals.missing,
-        "limits": signals.limits,
-    }
-    if signals.time is not None:
-        options["time"] = signals.time
+    kept = ("start", "end", "missing", "limits", "rate", "delimiter", *(["time"] if signals.time else []))
+    options: dict[str, Any] = {name: getattr(signals, name) for name in kept}
     named: dict[str, Any] = dict(zip(POSE, columns, strict=False))
-    record = read_log(log, rate=signals.rate, delimiter=signals.delimiter, **options, **named)
+    record = read_log(log, **options, **named)
     return np.array([np.nanmedian(record[role]) for role in named])
 
 

@@ -69,6 +69,12 @@ def warnings(result: MapResult) -> list[str]:
     if result.disagreeing:
         named = ", ".join(result.presses.names[i] for i in result.disagreeing[:5])
         lines.append(f"their neighbours contradict {named}: press there again")
+    unequal = len(np.unique(result.map.places, axis=0)) == len(result.map)
+    if unequal and result.repeat > np.median(result.map.half / result.map.stiffness):
+        lines.append(
+            f"no place was pressed twice: roughness finer than the presses' spacing counts as their scatter, "
+            f"± {_short(100.0 * result.repeat)} %, and not as the surface's; press a few places again to part them"
+        )
     lines += [f"no map of {name}: {why}" for name, why in result.unmapped.items()]
     return lines
 
@@ -81,10 +87,7 @@ def further(result: MapResult) -> tuple[str, str] | None:
     more = result.map.presses_until(half)
     asked = f"± {plain(100 * half, 2)} % on 95 % of the surface"
     if more is None:
-        return (
-            "none",
-            f"no number of presses brings {asked}: their common error is larger, or it needs more than 1000",
-        )
+        return "none", f"no number to 1000 brings {asked}: it needs more, or their common error is larger"
     return str(more), f"more presses bring {asked}"
 
 
@@ -94,12 +97,12 @@ def tables(result: MapResult) -> list[Table]:
     if result.lumps:
         rows = [
             (
-                place(lump.place),
-                quantity_between(lump.ci95[0], lump.ci95[1], "N/m"),
-                _area(lump),
-                "yes" if lump.is_sure else "perhaps",
+                place(at.place),
+                quantity_between(*at.ci95, "N/m"),
+                _area(at),
+                "yes" if at.is_sure else "perhaps",
             )
-            for lump in result.lumps
+            for at in result.lumps
         ]
         parts.append(Table("", ("lump", "stiffness, 95 %", "area, 95 %", "surely stiffer"), rows))
     if result.request.next:
@@ -117,15 +120,10 @@ def answer_of(result: MapResult) -> CommandAnswer:
 
 def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
     """Each next press: its place, the interval now and what it becomes."""
-    now = result.map.predict(result.next.places)
-    return [
-        (
-            place(where),
-            quantity_between(float(ends[0]), float(ends[1]), "N/m"),
-            f"± {quantity(float(half), 'N/m')}",
-        )
-        for where, ends, half in zip(result.next.places, now.ci95, result.next.expected_half, strict=True)
-    ][: result.request.next]
+    count, now = result.request.next, result.map.predict(result.next.places)
+    then = (f"± {quantity(float(half), 'N/m')}" for half in result.next.expected_half)
+    ends = (quantity_between(float(low), float(high), "N/m") for low, high in now.ci95)
+    return list(zip(map(place, result.next.places), ends, then, strict=True))[:count]
 
 
 def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:

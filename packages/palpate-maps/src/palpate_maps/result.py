@@ -23,7 +23,6 @@ from palpate_maps.surface import Grid
 
 SHOWN = 2500
 """Places of the grid that is shown and printed: finer than presses lie, and a page of 200 kB."""
-
 FRAMES = 16
 """Of the map as it grew."""
 TOPIC, COLUMNS = "/palpate/map", ("x", "y", "z", "stiffness", "low", "high")
@@ -66,24 +65,14 @@ def lumps_of(grid: Grid, prediction: Prediction, threshold: float) -> list[Lump]
     for k in range(1, count + 1):
         part = (parts == k).ravel()
         top = int(np.argmax(np.where(part, prediction.stiffness, 0.0)))
-        halo = around.ravel() == around.ravel()[top]
-        area = (
-            np.sum(part & (probability > 0.975)),
-            np.sum(halo & ((parts.ravel() == k) | (parts.ravel() == 0))),
+        halo = (around.ravel() == around.ravel()[top]) & (part | (parts.ravel() == 0))
+        low, area, high = (
+            float(np.sum(each) * grid.cell) for each in (part & (probability > 0.975), part, halo)
         )
-        result.append(
-            Lump(
-                tuple(float(c) for c in grid.places[top]), float(prediction.stiffness[top]),
-                _pair(prediction.ci95[top]),
-                float(part.sum() * grid.cell), (float(area[0] * grid.cell), float(area[1] * grid.cell)),
-                bool(probability[top] > 0.975),
-            )
-        )  # fmt: skip
+        where, (left, right) = tuple(map(float, grid.places[top])), map(float, prediction.ci95[top])
+        sure = bool(probability[top] > 0.975)
+        result.append(Lump(where, float(prediction.stiffness[top]), (left, right), area, (low, high), sure))
     return sorted(result, key=lambda lump: -lump.stiffness)
-
-
-def _pair(ends: Array) -> tuple[float, float]:
-    return float(ends[0]), float(ends[1])
 
 
 @dataclass(frozen=True)
@@ -171,7 +160,7 @@ class MapResult:
         values = self.presses.fields[name]
         known = np.isfinite(values)
         if known.sum() < LEAST:
-            return f"{known.sum()} presses show it, a map needs {LEAST}"
+            return f"presses that show it: {known.sum()}; a map needs {LEAST}"
         if np.ptp(values[known]) <= 1e-9 * np.abs(values[known]).max():
             return "it is the same at every press"
         field = FieldMap(name=name)
@@ -244,40 +233,29 @@ class MapResult:
     def write_csv(self, path: Path) -> None:
         """The map as a table: a row a place, in m and N/m."""
         rows = self.to_json()["map"]
-        lines = [",".join(["map (palpate)", *rows[0]])]
-        lines += [
-            ",".join([str(i + 1), *(f"{value:.6g}" for value in row.values())]) for i, row in enumerate(rows)
-        ]
-        write_text(path, "\n".join(lines) + "\n")
+        _write_table(path, list(rows[0]), [list(row.values()) for row in rows], 6)
 
     def write_presses(self, path: Path) -> None:
         """The presses as a table that `palpate map --table` reads, in m and N/m."""
-        rows = zip(self.presses.places, self.presses.stiffness, self.presses.half, strict=True)
-        lines = [",".join(["map (palpate)", *AXES[: self.presses.places.shape[1]], "stiffness", "half"])]
-        lines += [",".join(f"{v:.9g}" for v in (i + 1, *at, k, half)) for i, (at, k, half) in enumerate(rows)]
-        write_text(path, "\n".join(lines) + "\n")
+        p = self.presses
+        names = [*AXES[: p.places.shape[1]], "stiffness", "half"]
+        _write_table(path, names, np.column_stack([p.places, p.stiffness, p.half]), 9)
 
     def write_ply(self, path: Path) -> None:
         """The map as points in the PLY format, coloured from soft (dark) to stiff (light), with the stiffness."""
-        inside = self.grid.inside
-        places = self.grid.places[inside]
-        spread = self.prediction.mean[inside]
+        inside, seen = self.grid.inside, self.prediction
+        places, spread = self.grid.places[inside], seen.mean[inside]
+        places = np.column_stack([places, np.zeros(len(places))])[:, :3]
         light = (255 * (spread - spread.min()) / max(float(np.ptp(spread)), 1e-12)).astype(int)
-        z = places[:, 2] if places.shape[1] == 3 else np.zeros(len(places))
-        head = [
-            "ply",
-            "format ascii 1.0",
-            "comment Made by palpate, m and N/m",
-            f"element vertex {len(places)}",
-        ]
-        head += [f"property float {name}" for name in (*AXES, "stiffness", "low", "high")]
-        head += [f"property uchar {name}" for name in ("red", "green", "blue")] + ["end_header"]
-        stiffness, ci95 = self.prediction.stiffness[inside], self.prediction.ci95[inside]
-        body = [
-            f"{x:.6g} {y:.6g} {h:.6g} {k:.6g} {low:.6g} {high:.6g} {level // 3} {level} {155 + level // 3}"
-            for (x, y), h, k, (low, high), level in zip(places[:, :2], z, stiffness, ci95, light, strict=True)
-        ]
-        write_text(path, "\n".join([*head, *body]) + "\n")
+        numbers = np.column_stack([places, seen.stiffness[inside], seen.ci95[inside]])
+        kinds = dict.fromkeys(COLUMNS, "float") | dict.fromkeys(("red", "green", "blue"), "uchar")
+        lines = ["ply", "format ascii 1.0", "comment Made by palpate, m and N/m"]
+        lines += [f"element vertex {len(places)}", *(f"property {k} {name}" for name, k in kinds.items())]
+        lines += ["end_header"]
+        for row, level in zip(numbers, light, strict=True):
+            colour = (level // 3, level, 155 + level // 3)
+            lines.append(" ".join([*(f"{value:.6g}" for value in row), *map(str, colour)]))
+        write_text(path, "\n".join(lines) + "\n")
 
     def write_mcap(self, path: Path) -> None:
         """The map as it grew, a second for each press, as point clouds [m, N/m] for Foxglove and Lichtblick.
@@ -327,6 +305,12 @@ def map_of(presses: Presses, request: MapRequest) -> MapResult:
     result.update(presses.places, presses.stiffness, presses.half, presses.line)
     result.surface.grid(1)
     return MapResult(presses, request, result)
+
+
+def _write_table(path: Path, names: Sequence[str], rows: Any, digits: int) -> None:
+    lines = [",".join(["map (palpate)", *names])]
+    lines += [",".join(f"{v:.{digits}g}" for v in (i + 1, *row)) for i, row in enumerate(rows)]
+    write_text(path, "\n".join(lines) + "\n")
 
 
 def _rows(places: Array, columns: dict[str, Array], names: Sequence[str] = ()) -> list[dict[str, Any]]:

@@ -157,11 +157,12 @@ class FieldMap:
                 f"the map has places of {self._places.shape[1]} coordinates, these have {where.shape[1]}; a map has "
                 "one frame"
             )
-        for name, each, positive in (
+        numbers = (
             ("places", where, False),
             (self.name, value, self.logarithmic),
             ("half", width, half is not None),
-        ):
+        )
+        for name, each, positive in numbers:
             bad = ~(np.abs(each) < LARGEST) | (positive & (each < 1.0 / LARGEST))
             if bad.any():
                 raise InputError(
