@@ -6,9 +6,7 @@ Equations are those of Rasmussen and Williams, Gaussian Processes for Machine Le
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +16,7 @@ from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangula
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
-from scipy.stats import norm
+from scipy.stats import invgamma, norm
 
 from palpate.arrays import Array, Mask
 
@@ -329,46 +327,41 @@ class GaussianProcess:
             mean = self.weights @ means
             return np.array([mean, self.weights @ (variances + (means - mean) ** 2)])
 
-        self._reduction  # noqa: B018 - of all parts
         n = len(self.likeliest.values)
         size = max(min(CHUNK // n, PRODUCT // n**2), 16)
         parts = [places[first : first + size] for first in range(0, len(places), size)]
-        with ThreadPoolExecutor(min(os.cpu_count() or 1, 4)) as pool:
-            mean, variance = np.concatenate([np.empty((2, 0)), *pool.map(moments, parts)], axis=1)
+        mean, variance = np.concatenate([np.empty((2, 0)), *map(moments, parts)], axis=1)
         return mean, variance
 
 
 def student95(errors: Array, field: Array, noise: Array) -> float:
     """Half-width of a field's central 95 % over its standard deviation, if its deviations are Student's.
 
-    A deviation has the variance s field + t noise, where s and t are of inverse gamma distributions, those of two
-    Student distributions. Scale and degrees of freedom of s are averaged over their posterior, those of t, whose mean
-    is 1, alike. The degrees of freedom have the same prior at each of `FREEDOMS`, the logarithm of the scale a normal
-    one of standard deviation .5.
+    A deviation has the variance s field + t noise, where s and t are of the inverse gamma distributions of two Student
+    distributions. Their degrees of freedom, of prior alike at `FREEDOMS`, and the scale of s, whose logarithm has a
+    normal prior of standard deviation .5, are averaged over their posterior; the mean of t is 1.
 
     Args:
         errors: deviations of values left out (n,).
         field: variance of the field in each (n,).
         noise: variance of the noise in each (n,).
     """
-    s = np.exp(np.linspace(-4.0, 6.0, 31))
-    scales = np.exp(np.linspace(-1.5, 1.5, 13))
-    of_field = np.array([_inverse_gamma(s, freedom, scale) for scale in scales for freedom in FREEDOMS])
-    of_noise = np.array([_inverse_gamma(s, freedom, 1.0 - 2.0 / freedom) for freedom in FREEDOMS[1:]])
+    s, scales = np.exp(np.linspace(-4.0, 6.0, 31)), np.exp(np.linspace(-1.5, 1.5, 13))[:, None]
+    shape = np.array(FREEDOMS)[:, None, None] / 2.0
+    of_field, of_noise = (
+        each.reshape(-1, len(s)) / each.sum(axis=-1).reshape(-1, 1)
+        for each in (
+            s * invgamma.pdf(s, shape, scale=shape * scales),
+            s * invgamma.pdf(s, shape[1:], scale=shape[1:] - 1.0),
+        )
+    )
     variance = field[:, None, None] * s[:, None] + noise[:, None, None] * s
     density = np.exp(-0.5 * errors[:, None, None] ** 2 / variance) / np.sqrt(variance)
     evidence = np.log(of_field @ density @ of_noise.T + 1e-300).sum(axis=0)
-    evidence -= 0.5 * np.repeat(np.log(scales) / 0.5, len(FREEDOMS))[:, None] ** 2
+    evidence -= 0.5 * np.tile(np.log(scales) / 0.5, (len(FREEDOMS), 1)) ** 2
     posterior = np.exp(evidence - evidence.max()).sum(axis=1)
     mixture = posterior / posterior.sum() @ of_field
     return float(brentq(lambda z: 2.0 * mixture @ norm.sf(z / np.sqrt(s)) - LEVEL, 0.0, 100.0))
-
-
-def _inverse_gamma(s: Array, freedom: float, scale: float) -> Array:
-    """Shares of an inverse gamma distribution on a grid of equal steps of log s."""
-    logarithm = -0.5 * freedom * (np.log(s / scale) + scale / s)
-    share = np.exp(logarithm - logarithm.max())
-    return np.asarray(share / share.sum())
 
 
 def fit(places: Array, values: Array, noise: Array, line: Array | None = None) -> GaussianProcess:

@@ -68,7 +68,15 @@ class Presses:
 
 
 def merge_presses(parts: Sequence[Presses]) -> Presses:
-    """The presses of several readings; a quantity that one lacks is NaN there."""
+    """The presses of several readings; a quantity that one lacks is NaN there.
+
+    Raises:
+        InputError: the places have two and three coordinates, or are in two frames.
+    """
+    if len({part.places.shape[1] for part in parts}) > 1:
+        raise InputError(
+            "some places have two coordinates and some three: a map has one frame; map them apart"
+        )
     fields = {name: unit for part in parts for name, unit in part.units.items()}
     columns = {
         name: np.concatenate([p.fields.get(name, np.full(len(p.stiffness), np.nan)) for p in parts])

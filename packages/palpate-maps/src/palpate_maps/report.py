@@ -66,8 +66,8 @@ def warnings(result: MapResult) -> list[str]:
     if result.presses.refused:
         name, why = next(iter(result.presses.refused.items()))
         lines.append(f"{len(result.presses.refused)} logs give no press; {name}: {why}")
-    if result.disagreeing:
-        named = ", ".join(result.presses.names[i] for i in result.disagreeing[:5])
+    if wrong := result.map.disagreeing():
+        named = ", ".join(result.presses.names[i] for i in wrong[:5])
         lines.append(f"their neighbours contradict {named}: press there again")
     unequal = len(np.unique(result.map.places, axis=0)) == len(result.map)
     if unequal and result.repeat > np.median(result.map.half / result.map.stiffness):
@@ -128,33 +128,23 @@ def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
 
 def page(result: MapResult, title: str, command: str, *, live: bool = False) -> str:
     """The page as HTML; a live one loads itself again."""
-    field, interval = draw_map(result), draw_interval(result)
+    now = f"Half-width of the 95 % interval. Numbers: where to press next, for {_GOALS[result.request.goal]}."
+    field = draw_map(result)
+    pictures = [(field, _map_caption(result)), (draw_interval(result), now)]
+    pictures += [(draw_field(result, name), _field_caption(result, name)) for name in result.fields]
     answer = PageAnswer(
         title=title,
         sentence=sentence(result),
-        about=f"{len(result.map)} presses. Interpolated by a Gaussian process on the logarithm of the stiffness; "
-        "outside the presses nothing is said.",
+        about=f"{len(result.map)} presses, {len(result.presses.refused)} refused. Interpolated by a Gaussian process "
+        "on the logarithm of the stiffness; outside the presses nothing is said.",
         alerts=[
             {"tone": "warn", "title": "", "text": f"{note[0].upper()}{note[1:]}."}
             for note in warnings(result)
         ],
         cards={"": _cards(result)},
         pairs=[
-            {"source": data_address(svg(field), "image/svg+xml"), "caption": _map_caption(result)},
-            {
-                "source": data_address(svg(interval), "image/svg+xml"),
-                "caption": "Half-width of the 95 % interval. Numbers: where to press next, for "
-                f"{_GOALS[result.request.goal]}.",
-            },
-            *(
-                {
-                    "source": data_address(svg(draw_field(result, name)), "image/svg+xml"),
-                    "caption": f"{_title(name)}. Half-width of its 95 % interval at the median place: "
-                    f"{plain(_display_unit(result, name)[0] * float(np.median(np.diff(field.ci95)) / 2.0), 2)} "
-                    f"{_display_unit(result, name)[1]}.",
-                }
-                for name, field in result.fields.items()
-            ),
+            {"source": data_address(svg(figure), "image/svg+xml"), "caption": caption}
+            for figure, caption in pictures
         ],
         figures=[
             {
@@ -196,7 +186,6 @@ def _cards(result: MapResult) -> list[Card]:
             "Press to press", _short(100.0 * result.repeat), "%",
             why="at one place, 95 %, beyond their own intervals",
         ),
-        Card("Presses", str(len(result.map)), why=f"{len(result.presses.refused)} refused"),
     ]  # fmt: skip
 
 
@@ -223,8 +212,11 @@ def _press_rows(result: MapResult) -> list[tuple[str, str, str]]:
     return [(name, place(where), f"{quantity(k, 'N/m')} ± {plain(half, 2)}") for name, where, k, half in told]
 
 
-def _title(name: str) -> str:
-    return name.replace("_", " ").capitalize()
+def _field_caption(result: MapResult, name: str) -> str:
+    factor, symbol = _display_unit(result, name)
+    half = plain(factor * float(np.median(np.diff(result.fields[name].ci95)) / 2.0), 2)
+    title = name.replace("_", " ").capitalize()
+    return f"{title}. Half-width of its 95 % interval at the median place: {half} {symbol}."
 
 
 def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
@@ -236,14 +228,16 @@ def _display_unit(result: MapResult, name: str) -> tuple[float, str]:
 def draw_map(result: MapResult) -> Figure:
     """The stiffness over the surface, the presses, the contour of the threshold and its band."""
     from matplotlib.colors import LogNorm
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+    from matplotlib.ticker import MaxNLocator, NullFormatter
 
     seen, grid, threshold = result.prediction, result.grid, result.request.stiffer_than
     with style.ink(9.0):
         figure, axis, bar = _picture(result, seen.stiffness, "stiffness [N/m]", "Blues_r", norm=LogNorm())
         low, high = bar.ax.get_xlim()
-        steps = MaxNLocator(5, steps=(1, 2, 5, 10)) if high < 8.0 * low else LogLocator(subs=(1.0, 2.0, 5.0))
-        bar.ax.xaxis.set_major_locator(steps)
+        if high < 8.0 * low:
+            bar.ax.xaxis.set_major_locator(MaxNLocator(5, steps=(1, 2, 5, 10)))
+        else:
+            style.logarithmic(bar.ax, "x")
         bar.ax.xaxis.set_minor_formatter(NullFormatter())
         if threshold is not None:
             probability = np.where(grid.inside, seen.exceeds(threshold), np.nan).reshape(grid.shape)
@@ -272,7 +266,7 @@ def draw_field(result: MapResult, name: str) -> Figure:
     """A further field over the surface, and the presses that show it."""
     (factor, symbol), known = _display_unit(result, name), np.isfinite(result.presses.fields[name])
     with style.ink(9.0):
-        label = f"{_title(name).lower()} [{symbol}]"
+        label = f"{name.lower()} [{symbol}]".replace("_", " ")
         figure, axis, _ = _picture(result, factor * result.fields[name].value, label, "Blues_r")
         at = 1e3 * result.map.surface.coordinates(result.map.places[known])
         axis.plot(*at.T, "o", mfc="white", mec="black", markersize=4, mew=0.9, clip_on=False)
@@ -299,18 +293,15 @@ def _picture(
 def _cut_ends(result: MapResult) -> tuple[Any, Any]:
     """A line through the two stiffest lumps or, where there are none, through the stiffest place and the middle."""
     surface, grid = result.map.surface, result.grid
-    coordinates = surface.coordinates(grid.places)
+    inside = surface.coordinates(grid.places[grid.inside])
     tops = [surface.coordinates(np.array([lump.place]))[0] for lump in result.lumps[:2]]
-    if not tops:
-        tops = [coordinates[int(np.argmax(np.where(grid.inside, result.prediction.mean, -np.inf)))]]
-    middle = coordinates[grid.inside].mean(axis=0)
-    second = tops[1] if len(tops) > 1 else middle
-    way = second - tops[0]
-    size = float(np.linalg.norm(way))
-    way = way / size if size > 1e-9 else np.array([1.0, 0.0])
-    along = (coordinates[grid.inside] - tops[0]) @ way
-    near = np.abs((coordinates[grid.inside] - tops[0]) @ np.array([-way[1], way[0]])) < np.sqrt(grid.cell)
-    ends = (tops[0] + way * along[near].min(), tops[0] + way * along[near].max())
+    tops = tops or [inside[int(np.argmax(result.prediction.mean[grid.inside]))]]
+    first, second, *_ = (*tops, inside.mean(axis=0))
+    size = float(np.linalg.norm(second - first))
+    way = (second - first) / size if size > 1e-9 else np.array([1.0, 0.0])
+    along, beside = (inside - first) @ way, (inside - first) @ [-way[1], way[0]]
+    near = along[np.abs(beside) < np.sqrt(grid.cell)]
+    ends = (first + way * near.min(), first + way * near.max())
     return ends if way[0] >= 0.0 else ends[::-1]
 
 
@@ -378,7 +369,7 @@ def _film(result: MapResult) -> dict[str, Any]:
     means, stds = (np.array([getattr(frame, name) for _, frame in result.film]) for name in ("mean", "std"))
     scaled = [
         (levels - 1) * (each - low) / max(float(each[:, grid.inside].max()) - low, 1e-12)
-        for each in (means, stds) for low in (float(each[:, grid.inside].min()),)
+        for each in (means, np.log(stds)) for low in (float(each[:, grid.inside].min()),)
     ]  # fmt: skip
     shown = [
         [[int(v) if i else None for v, i in zip(frame, grid.inside, strict=True)] for frame in each]

@@ -141,11 +141,6 @@ class MapResult:
         )
 
     @cached_property
-    def disagreeing(self) -> list[int]:
-        """Presses that their neighbours contradict."""
-        return self.map.disagreeing()
-
-    @cached_property
     def fields(self) -> dict[str, Prediction]:
         """Further fields at the grid, by name: those that vary, over presses that span a surface."""
         found = {name: self._field(name) for name in self.presses.fields}
@@ -215,7 +210,7 @@ class MapResult:
             "next": _rows(self.next.places, {"expected_half": self.next.expected_half})[: self.request.next],
             "repeat_half": self.repeat,
             "line_half": float(np.expm1(Z95 * self.map.process.shared)),
-            "disagreeing": [self.presses.names[i] for i in self.disagreeing],
+            "disagreeing": [self.presses.names[i] for i in self.map.disagreeing()],
             "refused": self.presses.refused,
         }
         if self.request.stiffer_than is not None:
@@ -251,11 +246,9 @@ class MapResult:
         kinds = dict.fromkeys(COLUMNS, "float") | dict.fromkeys(("red", "green", "blue"), "uchar")
         lines = ["ply", "format ascii 1.0", "comment Made by palpate, m and N/m"]
         lines += [f"element vertex {len(places)}", *(f"property {k} {name}" for name, k in kinds.items())]
-        lines += ["end_header"]
-        for row, level in zip(numbers, light, strict=True):
-            colour = (level // 3, level, 155 + level // 3)
-            lines.append(" ".join([*(f"{value:.6g}" for value in row), *map(str, colour)]))
-        write_text(path, "\n".join(lines) + "\n")
+        rows = np.column_stack([numbers, light // 3, light, 155 + light // 3])
+        body = (" ".join(f"{value:.6g}" for value in row) for row in rows)
+        write_text(path, "\n".join([*lines, "end_header", *body]) + "\n")
 
     def write_mcap(self, path: Path) -> None:
         """The map as it grew, a second for each press, as point clouds [m, N/m] for Foxglove and Lichtblick.
@@ -276,10 +269,6 @@ class MapResult:
         fields = [
             messages.PackedElementField(name=n, offset=4 * i, type=number) for i, n in enumerate(COLUMNS)
         ]
-        origin = messages.Pose(
-            position=messages.Vector3(x=0.0, y=0.0, z=0.0),
-            orientation=messages.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-        )
         with whole(path) as draft, draft.open("wb") as file:
             writer = foxglove.open_mcap(
                 file, context=context, writer_options=MCAPWriteOptions(profile="palpate")
@@ -289,7 +278,7 @@ class MapResult:
                 for count, seen in self.film:
                     points = np.column_stack([places, seen.stiffness, seen.ci95])[grid.inside].astype("<f4")
                     cloud = messages.PointCloud(
-                        timestamp=messages.Timestamp(sec=count, nsec=0), frame_id="surface", pose=origin,
+                        timestamp=messages.Timestamp(sec=count, nsec=0), frame_id="surface",
                         point_stride=4 * len(COLUMNS), fields=fields, data=points.tobytes(),
                     )  # fmt: skip
                     channel.log(cloud, log_time=count * 1_000_000_000)

@@ -7,11 +7,12 @@ from itertools import chain, islice, pairwise
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate_maps.gaussian_process import Z95, GaussianProcess, fit
+from palpate_maps.gaussian_process import LEVEL, Z95, GaussianProcess, fit
 from palpate_maps.next_press import Goal, NextPresses, choose, importance, travel
 from palpate_maps.surface import Grid, Surface
 
@@ -100,9 +101,6 @@ class FieldMap:
         self._line = np.empty(0)
         self._process: GaussianProcess | None = None
         self._surface: Surface | None = None
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self)} presses)"
 
     def __len__(self) -> int:
         return len(self._values)
@@ -273,9 +271,11 @@ class FieldMap:
 
     @property
     def _noise(self) -> float:
-        """Variance of a next press, on a line of its own, of the logarithm if logarithmic."""
-        own = np.median(self._scaled(self._values, self._half)[1])
-        return float(own**2 + self.process.repeat**2 + self.process.shared**2)
+        """Variance of a normal next press, on its own line, whose 95 % are those of one that errs as any before."""
+        _, own = self._scaled(self._values, self._half)
+        std = np.sqrt(own**2 + self.process.repeat**2 + self.process.shared**2)
+        outside = lambda half: 2.0 * np.mean(norm.sf(half / std)) - LEVEL  # noqa: E731
+        return float(brentq(outside, Z95 * std.min() / 2.0, 2.0 * Z95 * std.max()) / Z95) ** 2
 
     def _candidates(self) -> Array:
         grid = self.grid(CANDIDATES)
