@@ -14,9 +14,9 @@ from palpate._jit import sources_stamp
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis import look
 from palpate_thesis.claims import Done, ThesisClaim, rows_of
+from palpate_thesis.drawn_panels import panels_of
 from palpate_thesis.figure import FigureModule
 from palpate_thesis.page import index_page
 from palpate_thesis.runs import Runs

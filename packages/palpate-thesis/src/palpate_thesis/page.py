@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from palpate.report.figure_panels.panels import panel_scripts
+from palpate.report.chart import panel_scripts
 from palpate.report.look.assets import data, text_of
 from palpate.report.page import render
 from palpate_thesis.claims import Done, count_in_words, count_verdicts, tables
@@ -27,7 +27,7 @@ def index_page(
 
     Args:
         done: studies that are measured.
-        panels: of each by its number, as `report.figure_panels` makes them.
+        panels: of each by its number, as `drawn_panels` makes them.
         missing: numbers of those still to come.
         command: that measures them.
     """
