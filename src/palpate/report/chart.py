@@ -119,7 +119,8 @@ class Chart:
     def ends(self) -> tuple[float, float]:
         """Ends of the x axis."""
         places = np.concatenate([one.x for one in self.series])
-        return self.xlim or (float(np.min(places)), float(np.max(places)))
+        low, high = self.xlim or (np.min(places), np.max(places))
+        return float(low), float(high)
 
     @property
     def range(self) -> tuple[float, float]:
@@ -222,17 +223,17 @@ def _panel(chart: Chart, x: str) -> dict[str, Any]:
         ends = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
         own = look(band) if is_line else {"kind": "band", "colour": band.colour, "label": band.label}
         series.append(own | {key: f"{key}{len(series)}" for key in ends})
-        columns |= {series[-1][key]: [value] * len(places) for key, value in ends.items()}
+        columns |= {series[-1][key]: [float(value)] * len(places) for key, value in ends.items()}
     labels = [one["label"] for one in series]
     for i, (label, line) in enumerate(zip(labels, series, strict=True)):
         line["silent"] = not label or label in labels[:i]
     if not any(labels):
         series[0] |= {"label": chart.y.split(" [")[0], "silent": False}
-    spans = [(one.colour, low, high) for one in chart.marks for low, high in one.spans]
+    spans = [(one.colour, float(low), float(high)) for one in chart.marks for low, high in one.spans]
     unit = _UNIT.search(x)
     spec = {
         "title": chart.title, "y": chart.y, "x": x, "unit": unit[1] if unit else " ", "log": chart.log,
-        "height": round(min(300.0, max(150.0, _PIXELS * chart.height))), "range": list(chart.range),
+        "height": round(min(300.0, max(150.0, _PIXELS * chart.height))), "range": [float(end) for end in chart.range],
         "series": series,
         "marks": [{"x": low, "colour": colour} for colour, low, high in spans if low == high],
         "shades": [[low, high, colour] for colour, low, high in spans if low < high],
