@@ -90,7 +90,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Chart:
-    """What is drawn over one axis, and its axes.
+    """Lines, levels and marks over one axis, and its axes.
 
     Args:
         y: label of the values.
