@@ -17,9 +17,8 @@ from palpate.logs.from_bag import from_bag
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.roles import Loaded, check_range, implausible_times
-from palpate.logs.store import read_record
 from palpate.logs.tables import open_table
-from palpate.logs.tables.parquet import stored_about
+from palpate.logs.tables.parquet import read_record, stored_about
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 from palpate.units import split_spec

@@ -10,8 +10,7 @@ import numpy as np
 from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, sentence
-from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.steps import BAND
+from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
