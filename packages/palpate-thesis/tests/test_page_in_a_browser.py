@@ -6,8 +6,8 @@ import pytest
 from opened_pages import open_page
 from palpate.cli import main
 from palpate.report import style
-from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis.claims import Done
+from palpate_thesis.drawn_panels import panels_of
 from palpate_thesis.measure import index_page
 
 

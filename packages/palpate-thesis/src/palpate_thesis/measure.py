@@ -14,11 +14,12 @@ from palpate._jit import sources_stamp
 from palpate.errors import InputError
 from palpate.files import check_place, kept_folder, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.figure_panels.panels import panel_scripts, panels_of
+from palpate.report.chart import panel_scripts
 from palpate.report.look.assets import data, text_of
 from palpate.report.page import render
 from palpate_thesis import look
 from palpate_thesis.claims import Done, ThesisClaim, count_in_words, count_verdicts, rows_of, tables
+from palpate_thesis.drawn_panels import panels_of
 from palpate_thesis.figure import FigureModule
 from palpate_thesis.runs import Runs
 
@@ -170,7 +171,7 @@ def index_page(
 
     Args:
         done: studies that are measured.
-        panels: of each by its number, as `report.figure_panels` makes them.
+        panels: of each by its number, as `drawn_panels` makes them.
         missing: numbers of those still to come.
         command: that measures them.
     """
