@@ -42,6 +42,8 @@ LARGEST = {
 out as much."""
 PARTICIPLES, SHORT_DOCSTRINGS = 63, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
+UNTESTED = 268
+"""Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""
 TWICE = frozenset({"Curve", "Data", "Fit", "Limits", "Payload", "Prediction", "Sense", "Surface", "Table"})
 """Class names that stand for two things. None is added; whoever renames one takes it off."""
 
@@ -183,6 +185,15 @@ def test_no_docstring_more_needs_its_neighbour(sources):
 def test_a_class_name_stands_for_one_thing(sources):
     twice = {name for name, count in classes(tree for *_, tree in sources).items() if count > 1}
     assert not twice - TWICE, f"also the name of another class: {sorted(twice - TWICE)}"
+
+
+def test_no_module_more_is_without_a_test_of_its_name(root, sources):
+    tests = {
+        path.stem for folder in (root / "tests", root / "packages") for path in folder.rglob("test_*.py")
+    }
+    modules = [path for path, *_ in sources if not path.stem.startswith("__")]
+    missing = [path for path in modules if f"test_{path.stem.lstrip('_')}" not in tests]
+    assert len(missing) <= ROOM * UNTESTED, "\n".join(map(str, missing))
 
 
 def test_what_is_counted_is_found():
