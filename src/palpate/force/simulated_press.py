@@ -1,7 +1,5 @@
 """An arm's world for the simulator, and one run in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
