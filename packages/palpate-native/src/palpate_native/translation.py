@@ -63,7 +63,7 @@ class Translation:
             except KeyError as error:
                 fault, remedy = f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays"
                 refuse(function, body.tree, fault, remedy)
-            says = [*_docstring(function), place_of(function)]
+            says = [*_docstring(function), place_of(function, function.__code__.co_firstlineno)]
             comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
             self.definitions.append(f"/* {comment} */\n{text}")
         return self._functions[key]
