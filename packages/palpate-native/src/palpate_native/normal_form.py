@@ -86,6 +86,8 @@ def _may_read(node: ast.expr, stored: ast.expr) -> bool:
     names = {one.id for one in stores if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)}
     elements = any(isinstance(one, ast.Subscript) for one in stores)
     return any(
-        one.id in names if isinstance(one, ast.Name) else elements and isinstance(one, ast.Subscript | ast.Call)
+        one.id in names
+        if isinstance(one, ast.Name)
+        else elements and isinstance(one, ast.Subscript | ast.Call)
         for one in reads
     )

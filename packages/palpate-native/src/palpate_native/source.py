@@ -53,7 +53,9 @@ def syntax_of(function: Callable[..., Any]) -> ast.FunctionDef | ast.Lambda:
             found += [node] if first.lineno == code.co_firstlineno else []
     if len(found) != 1:
         place = place_of(function, code.co_firstlineno)
-        raise OutsideSubset(f"{place}: no source of {function.__name__} alone; keep the law in a file, in lines of its own")
+        raise OutsideSubset(
+            f"{place}: no source of {function.__name__} alone; keep the law in a file, in lines of its own"
+        )
     return found[0]
 
 

@@ -56,7 +56,7 @@ class FunctionBody(Expressions):
         for argument, kind in zip(self._given, self.kinds, strict=True):
             own, of = c_name(argument), self.whole.structs.name(kind)
             given = f"const {of} *{own}" if by_pointer(kind) else f"{of} {own}"
-            value = _behind(own, kind) if by_pointer(kind) else Value(own, kind, place=True)
+            value = _behind(own, kind) if by_pointer(kind) else Value(own, kind)
             if by_pointer(kind) and self._stores[argument] > 1:
                 self._first.append(f"{of} {own}_;")
             if not self._uses[argument]:
@@ -90,10 +90,8 @@ class FunctionBody(Expressions):
         comment = isinstance(node.value, ast.Constant)
         return [] if comment else [f"{self.expression(node.value, alone=True).text};"]
 
-    def _break(self, node: ast.Break | ast.Continue) -> list[str]:
-        return [f"{type(node).__name__.lower()};"]
-
-    _continue = _break
+    def _break(self, _node: ast.Break) -> list[str]:
+        return ["break;"]
 
     def _while(self, node: ast.While) -> list[str]:
         self.need(not node.orelse, node)
@@ -114,7 +112,7 @@ class FunctionBody(Expressions):
         values = [self.cast(self.expression(one), self.whole.integer, one) for one in call.args]
         at, down, own = int(len(values) > 1), len(values) == 3, c_name(target)
         self.need(not down or values[2].text == "-1", node)
-        self.variables[target] = Value(own, self.whole.integer, place=True)
+        self.variables[target] = Value(own, self.whole.integer)
         first, end = f"int64_t {own} = {values[0].text if at else '0'}", values[at].at(SUM)
         if re.search(r"[^-\w]", end) or changes[getattr(call.args[at], "id", "")]:
             first, end = f"{first}, {own}_end = {values[at].text}", f"{own}_end"
@@ -157,7 +155,6 @@ class FunctionBody(Expressions):
         value = self.expression(node.value, alone=True)
         if isinstance(target, ast.Name):
             return self._store(target.id, value, node)
-        self.need(isinstance(target, ast.Subscript), node)
         place = self.expression(target)
         self.need(".at[" in place.text, node)
         self.writes |= self.expression(_root(target)).text not in self.scratch
@@ -177,13 +174,13 @@ class FunctionBody(Expressions):
             self._first.append(f"{of} *{c_name(name)} = {home.address};")
             self._standing.add((f"*{c_name(name)}", home.text))
             return self._fill(self.variables[name], value)
-        place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type, place=True)
+        place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type)
         self.variables[name], self._blocks[name] = place, block
         if not known and _names(block)[name] != self._uses[name]:
             zero = "{0}" if is_struct(value.type) or hasattr(value.type, "ndim") else "0"
             self._first.append(f"{of} {place.text} = {zero};")
             return self._fill(place, value)
-        if large and value.place and not value.call and self._stays(name, node.value):
+        if large and not (value.call or value.fields) and self._stays(name, node.value):
             self.variables[name] = _behind(place.text, value.type)
             return [f"const {of} *{place.text} = {value.address};"]
         if large and (value.call or value.fields):
@@ -196,7 +193,7 @@ class FunctionBody(Expressions):
         if value.text == known.text:
             return []
         own, given = known.text.removeprefix("*"), name in self._given and by_pointer(known.type)
-        place = Value(f"{own}_", known.type, place=True) if given else known
+        place = Value(f"{own}_", known.type) if given else known
         reads = re.search(rf"(?<![\w>.]){re.escape(own)}\b", value.text)
         lines = [f"{place.text} = {value.text};"] if reads else self._fill(place, value)
         return [*lines, f"{own} = &{place.text};"] if given else lines
@@ -215,7 +212,7 @@ class FunctionBody(Expressions):
         self.need(all(type(n) is int for n in lengths), node)
         self.need(_names(self._block_now)[name] == self._uses[name] > 0, node)
         kind, own = types.Array(types.float64, len(lengths), "C"), c_name(name)
-        self.variables[name] = Value(own, kind, place=True)
+        self.variables[name] = Value(own, kind)
         self.scratch.add(own)
         return [
             f"double {own}_numbers[{math.prod(lengths)}] = {{0}};",
@@ -225,7 +222,7 @@ class FunctionBody(Expressions):
 
 def _behind(name: str, kind: Any) -> Value:
     """The struct behind a pointer."""
-    return Value(f"*{name}", kind, UNARY, place=True)
+    return Value(f"*{name}", kind, UNARY)
 
 
 def _root(node: Any) -> Any:
