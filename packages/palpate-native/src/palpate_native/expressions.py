@@ -46,9 +46,11 @@ REMEDIES = {
     "unaryop": "use - of numbers and not of truths",
     "boolop": "join truths; write a if b else c for another value",
     "ifexp": "give both values one type",
-    "call": "call a law, or abs, max, sqrt, or palpate's log; in a statement of its own if it writes to an array",
+    "call": "call a law, or abs, max, sqrt, or palpate's log, with all its arguments in order; and alone in a "
+    "statement if it writes to an array",
     "for": "count with range by 1 or by -1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
+    "other": "use numbers, parts, arrays, operators and laws",
 }
 """Remedies of refused syntax, by its kind."""
 
@@ -106,9 +108,8 @@ class Expressions:
             OutsideSubset: it is not good.
         """
         if not good:
-            refuse(
-                self.function, node, ast.unparse(node).split("\n")[0], REMEDIES[type(node).__name__.lower()]
-            )
+            remedy = REMEDIES.get(type(node).__name__.lower(), REMEDIES["other"])
+            refuse(self.function, node, ast.unparse(node).split("\n")[0], remedy)
 
     def expression(self, node: Any, alone: bool = False) -> Any:
         """The C of an expression, or the lines of a statement; a call `alone` there may write to an array."""

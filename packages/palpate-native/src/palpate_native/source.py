@@ -94,9 +94,14 @@ def home_of(name: str, value: Any, function: Callable[..., Any]) -> tuple[str, s
     return function.__module__, ""
 
 
+def comment_text(text: str) -> str:
+    """A text as a C comment can have it."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
 def first_sentence(text: str) -> str:
-    """The first paragraph of a docstring in one line, safe inside a C comment."""
-    return " ".join(text.strip().split("\n\n")[0].split()).replace("*/", "* /").replace("/*", "/ *")
+    """The first paragraph of a docstring in one line of a C comment."""
+    return comment_text(" ".join(text.strip().split("\n\n")[0].split()))
 
 
 def field_notes(cls: type) -> dict[str, str]:

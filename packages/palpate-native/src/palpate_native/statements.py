@@ -15,7 +15,7 @@ from palpate._jit.registry import parts
 from palpate_native.expressions import SUM, UNARY, Expressions, Value
 from palpate_native.normal_form import normal_form
 from palpate_native.source import comments_of, syntax_of
-from palpate_native.structs import by_pointer, c_name, is_struct, members
+from palpate_native.structs import by_pointer, c_name, is_struct, leaves, members
 
 STEP = "    "
 
@@ -54,15 +54,12 @@ class FunctionBody(Expressions):
         """The function in C."""
         parameters = []
         for argument, kind in zip(self._given, self.kinds, strict=True):
-            own, of = c_name(argument), self.whole.structs.name(kind)
-            given = f"const {of} *{own}" if by_pointer(kind) else f"{of} {own}"
-            value = _behind(own, kind) if by_pointer(kind) else Value(own, kind)
-            if by_pointer(kind) and self._stores[argument] > 1:
-                self._first.append(f"{of} {own}_;")
-            if not self._uses[argument]:
-                self._first.append(f"(void){own};")
-            parameters.append(given)
-            self.variables[argument], self._blocks[argument] = value, self.tree.body
+            own, of, large = c_name(argument), self.whole.structs.name(kind), by_pointer(kind)
+            parameters.append(f"const {of} *{own}" if large else f"{of} {own}")
+            self.variables[argument] = _behind(own, kind) if large else Value(own, kind)
+            self._blocks[argument] = self.tree.body
+            self._first += [f"{of} {own}_;"] if large and self._stores[argument] > 1 else []
+            self._first += [] if self._uses[argument] else [f"(void){own};"]
         returns = [one.value for one in ast.walk(self.tree) if isinstance(one, ast.Return) and one.value]
         if len(returns) == 1:
             once = {name for name, times in _names(returns).items() if times == 1 and name not in self._given}
@@ -76,21 +73,20 @@ class FunctionBody(Expressions):
         return "\n".join([head, *(STEP + line for line in self._first), *lines, "}"])
 
     def _block(self, block: list[ast.stmt]) -> list[str]:
-        lines, before = [], self._block_now
+        lines = []
         for statement in block:
             self._block_now = block
             new = self.expression(statement)
             if new and statement.lineno in self._comments:
                 new[0] += f" /* {self._comments.pop(statement.lineno)} */"
             lines += [STEP + line for line in new]
-        self._block_now = before
         return lines
 
     def _expr(self, node: ast.Expr) -> list[str]:
         comment = isinstance(node.value, ast.Constant)
         return [] if comment else [f"{self.expression(node.value, alone=True).text};"]
 
-    def _break(self, _node: ast.Break) -> list[str]:
+    def _break(self, _: ast.Break) -> list[str]:
         return ["break;"]
 
     def _while(self, node: ast.While) -> list[str]:
@@ -167,26 +163,25 @@ class FunctionBody(Expressions):
         if known and known.type == value.type:
             return self._store_again(name, known, value)
         self.need(not known or self._blocks[name] is self._block_now, node)
-        of, large, block = self.whole.structs.name(value.type), by_pointer(value.type), self._block_now
-        home = self._homes.pop(name, None)
-        if home and home.type == value.type and not known:
-            self.variables[name], self._blocks[name] = _behind(c_name(name), value.type), block
-            self._first.append(f"{of} *{c_name(name)} = {home.address};")
-            self._standing.add((f"*{c_name(name)}", home.text))
-            return self._fill(self.variables[name], value)
-        place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type)
-        self.variables[name], self._blocks[name] = place, block
-        if not known and _names(block)[name] != self._uses[name]:
-            zero = "{0}" if is_struct(value.type) or hasattr(value.type, "ndim") else "0"
-            self._first.append(f"{of} {place.text} = {zero};")
-            return self._fill(place, value)
-        if large and not (value.call or value.fields) and self._stays(name, node.value):
+        of, own = self.whole.structs.name(value.type), c_name(name)
+        large, built = by_pointer(value.type), value.call or value.fields
+        place, home = Value(f"{own}_{of}" if known else own, value.type), self._homes.pop(name, None)
+        self.variables[name], self._blocks[name] = place, self._block_now
+        if home:
+            place = self.variables[name] = _behind(own, value.type)
+            self._first.append(f"{of} *{own} = {home.address};")
+            self._standing.add((place.text, home.text))
+        elif not known and _names(self._block_now)[name] != self._uses[name]:
+            self._first.append(f"{of} {own} = {'{0}' if leaves(value.type) > 1 else '0'};")
+        elif large and built:
+            return [f"{of} {place.text};", *self._fill(place, value)]
+        elif large and self._stays(name, node.value):
             self.variables[name] = _behind(place.text, value.type)
             return [f"const {of} *{place.text} = {value.address};"]
-        if large and (value.call or value.fields):
-            return [f"{of} {place.text};", *self._fill(place, value)]
-        text = value.text.removeprefix(f"({of})") if is_struct(value.type) else value.text
-        return [f"{of} {place.text} = {text};"]
+        else:
+            text = value.text.removeprefix(f"({of})") if is_struct(value.type) else value.text
+            return [f"{of} {place.text} = {text};"]
+        return self._fill(place, value)
 
     def _store_again(self, name: str, known: Value, value: Value) -> list[str]:
         """Assigns to a variable; an argument by pointer then points to a struct of the function's own."""
@@ -209,8 +204,8 @@ class FunctionBody(Expressions):
 
         size, name = node.value.args[0], getattr(target, "id", "")
         lengths: Any = [getattr(one, "value", None) for one in getattr(size, "elts", [size])]
-        self.need(all(type(n) is int for n in lengths), node)
-        self.need(_names(self._block_now)[name] == self._uses[name] > 0, node)
+        inside = _names(self._block_now)[name] == self._uses[name] > 0
+        self.need(inside and all(type(n) is int for n in lengths), node)
         kind, own = types.Array(types.float64, len(lengths), "C"), c_name(name)
         self.variables[name] = Value(own, kind)
         self.scratch.add(own)
