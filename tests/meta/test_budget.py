@@ -24,7 +24,7 @@ LARGEST = {
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=58, lines=10079, tokens=80707),
     "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2459, tokens=16242),
-    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2430, tokens=18568),
+    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17978),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=768, tokens=6210),
     "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1409, tokens=11954),
     "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=768, tokens=5579),

@@ -199,7 +199,7 @@ class Expressions:
             place = Value(text, integer, SUM)
         return Value(f"{name}.at[{place.text}]", self.whole.real)
 
-    def _index(self, index: ast.expr, node: ast.Subscript) -> Value:
+    def _index(self, index: Any, node: ast.Subscript) -> Value:
         value: Value = self.expression(index)
         self.need(value.type == self.whole.integer and not value.text.startswith("-"), node)
         return value
@@ -271,7 +271,7 @@ class Expressions:
         own = callee is None and isinstance(node.func, ast.Attribute)
         if own:
             part = [self.expression(node.func.value)]  # type: ignore[attr-defined]
-            callee = _method(*part, node.func)
+            callee = _method(part[0], node.func)  # type: ignore[arg-type]
             self.need(inspect.isfunction(callee), node)
         values = [*part, *map(self.expression, node.args)]
         if callee in stored:
