@@ -25,7 +25,7 @@ LARGEST = {
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1933, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=10248, tokens=82640),
     "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2445, tokens=16229),
-    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2430, tokens=18568),
+    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17978),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=761, tokens=6210),
     "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1429, tokens=12138),
     "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=760, tokens=5555),

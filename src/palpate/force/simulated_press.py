@@ -1,5 +1,7 @@
 """An arm's world for the simulator, and one run in it."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,5 +1,7 @@
 """The numbers of a slide in a gains file."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 from msgspec import Meta
