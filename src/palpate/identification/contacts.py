@@ -9,13 +9,11 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn
-from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
-from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
 from palpate.identification.free_motion import FLAT, Drift, FreeMotion, Payload, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
-from palpate.identification.strokes import Stroke, strokes_of
-from palpate.identification.tangents import SteadyPress, steady_press
+from palpate.identification.steady_press import SteadyPress, Stroke, steady_press, strokes_of
 from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05

@@ -294,7 +294,7 @@ def _remedy(name: str, terms: Terms) -> str:
     return NOISE.remedy
 
 
-def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
     """The unit of one parameter of a model."""
     units = impedance_units(terms.force_unit, terms.position_unit)
     plain = units["K"] == "1"

@@ -139,28 +139,18 @@ class Fit:
     """A model fitted to a log.
 
     Args:
-        model: which.
         names: of the parameters: the linear ones, then the nonlinear ones, then the lag.
         theta: their values, shape (p,).
         cov: their covariance, coloured noise and the lag's uncertainty included, shape (p, p).
-        predicted, residuals: of the filtered force, shape (n,).
-        r2, rmse: of the fit.
+        r2: share of the force's variance that it explains.
         noise: colour of the residuals.
-        lag: the lag used [s].
-        jacobian: of the predicted force by all of them, shape (n, p).
     """
 
-    model: Model
     names: tuple[str, ...]
     theta: Array
     cov: Array
-    predicted: Array
-    residuals: Array
     r2: float
-    rmse: float
     noise: Noise
-    lag: float
-    jacobian: Array
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -205,20 +195,7 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | Non
             of every interval.
         start: where that search begins [s]; the prior's value if not given.
     """
-    asked = lag if lag.std > 0 else None
-    descent = Descent(model, motion, force)
-    best = descent.best_start(lag.value if start is None else start)
-    for _ in range(2 if asked or lag.mass else 1):
-        best = descent.from_point(best, asked)
-        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
-        descent = replace(descent, known=prior_of(lag, noise, asked is not None))
-    if descent.known.known:
-        best = descent.from_point(best, asked)
-    return _finish(descent, best, lag)
-
-
-def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
-    model, motion, force = descent.model, descent.motion, descent.force
+    descent, point = _search(model, motion, force, lag, start)
     jacobian = descent.jacobian(point)
     names = names_of(model)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
@@ -243,17 +220,30 @@ def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
     )
     residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.nonlinear.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
-    rmse = float(np.sqrt(np.mean(residuals**2)))
-    return Fit(
-        model=model,
-        names=names,
-        theta=theta,
-        cov=cov,
-        predicted=force - residuals,
-        residuals=residuals,
-        r2=1 - rmse**2 / spread if spread else 0.0,
-        rmse=rmse,
-        noise=noise,
-        lag=float(theta[-1]),
-        jacobian=jacobian,
-    )
+    return Fit(names, theta, cov, 1 - float(np.mean(residuals**2)) / spread if spread else 0.0, noise)
+
+
+def nonlinear_fit(model: Model, motion: Motion, force: Array, lag: Lag) -> dict[str, float]:
+    """The nonlinear parameters of a model by least squares, by name.
+
+    Args:
+        model: which.
+        motion: the position.
+        force: filtered, at the motion's rows, shape (n,).
+        lag: what is known about it.
+    """
+    return _search(model, motion, force, lag)[1].nonlinear
+
+
+def _search(
+    model: Model, motion: Motion, force: Array, lag: Lag, start: float | None = None
+) -> tuple[Descent, Point]:
+    """The least cost, and the search with what is known beside the log against its noise."""
+    asked = lag if lag.std > 0 else None
+    descent = Descent(model, motion, force)
+    best = descent.best_start(lag.value if start is None else start)
+    for _ in range(2 if asked or lag.mass else 1):
+        best = descent.from_point(best, asked)
+        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
+        descent = replace(descent, known=prior_of(lag, noise, asked is not None))
+    return descent, descent.from_point(best, asked) if descent.known.known else best

@@ -28,7 +28,7 @@ from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
-from palpate.identification.tangents import Slopes, SteadyPress
+from palpate.identification.steady_press import Slopes, SteadyPress
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
