@@ -12,8 +12,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files.limits import Limits
-from palpate.logs.bags import Bag
-from palpate.logs.from_bag import from_bag
+from palpate.logs.bags import bag_reader
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.roles import Loaded, check_range, implausible_times
@@ -79,8 +78,8 @@ def read_log(
     if kind.is_bag and rate is not None:
         raise InputError(f"the messages of {path} have their own times; leave out --rate")
     if kind.is_bag:
-        with Bag(path, kind, limits) as bag:
-            loaded = from_bag(bag, columns, missing, held)
+        with bag_reader().Bag(path, kind, limits) as bag:
+            loaded = bag_reader().from_bag(bag, columns, missing, held)
     else:
         loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
     check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
