@@ -250,8 +250,12 @@ def _draw(curves: Sequence[Curve]) -> Array:
     if not curves:
         return np.empty((2, 0))
     curve = max(curves, key=lambda own: own.reach[1] - own.reach[0])
-    step = max(len(curve.depth) // _SHOWN, 1)
-    return np.stack([curve.depth, curve.force])[:, ::step]
+    return few_points(np.stack([curve.depth, curve.force]))
+
+
+def few_points(curve: Array) -> Array:
+    """A curve, shape (2, n), with so few points that it is drawn."""
+    return curve[:, :: max(curve.shape[1] // _SHOWN, 1)]
 
 
 def curves_of(

@@ -96,16 +96,6 @@ def resting(jacobian: Array, position: Array, count: float, stiffness: float) ->
     return found
 
 
-def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
-    """How noise of the position's derivatives 0 to 3 stands in the columns, (p, 4), and in the force, (4,)."""
-    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)
-    for name, d in model.derivatives.items():
-        place = model.linear.index(name)
-        noisy[place, d] = 1.0
-        force[d] = theta[place]
-    return noisy, force
-
-
 def bias_corrected(
     model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
 ) -> Compensation:
@@ -114,7 +104,10 @@ def bias_corrected(
     Where no sensor's way and no encoder's counts are known, the noise is only known to be no larger: nothing is taken
     out then, and all that it may have done is open.
     """
-    noisy, force = of_derivatives(model, theta)
+    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)  # of the position's derivatives 0 to 3
+    for name, d in model.derivatives.items():
+        place = model.linear.index(name)
+        noisy[place, d], force[d] = 1.0, theta[place]
     noisy[-1, 1:] = -force[:3]
     weight = np.zeros(len(theta)) if std is None else (level / std) ** 2
     asked = lag.std > 0
@@ -126,12 +119,6 @@ def bias_corrected(
     if free.all():
         return part
     return Compensation(np.append(part.step, 0.0), np.pad(part.less, (0, 1)), np.pad(part.doubt, (0, 1)))
-
-
-def hidden(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:
-    """Covariance of Phi' e for what the position's encoder hides, as `resting` has it, shape (p, p)."""
-    stiffness = float(theta[model.linear.index("K")]) if "K" in model.linear else 0.0
-    return resting(jacobian, motion.moved(0, float(theta[-1])), motion.noise.count, stiffness)
 
 
 @dataclass(frozen=True)
@@ -206,7 +193,8 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | Non
     if model.of_position:
         by_noise = bias_corrected(model, motion, jacobian, theta, level, lag, std)
         theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
-        more = hidden(model, motion, jacobian, theta)
+        stiffness = float(theta[names.index("K")]) if "K" in names else 0.0
+        more = resting(jacobian, motion.moved(0, float(theta[-1])), motion.noise.count, stiffness)
     prior = np.full(len(names), np.inf) if std is None else std
     prior[-1] = lag.std
     cov, own = np.zeros_like(pulled), slice(None if lag.std > 0 else -1)
