@@ -13,7 +13,7 @@ from palpate.errors import InputError
 from palpate.identification.causes import Code, cause_of
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification import figure
+from palpate.report.identification import details, figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.words import (
     ADVICE,
@@ -23,6 +23,7 @@ from palpate.report.identification.words import (
     UNIT_WARNINGS,
     UNTOUCHED,
     Source,
+    as_json,
     behind_the_arm,
     by_the_model,
     first_reason,
@@ -35,6 +36,7 @@ from palpate.report.identification.words import (
     unit_warnings,
 )
 from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import print_hanging
 from palpate.signals.types import NORMAL
 from palpate.text import printable
@@ -111,6 +113,34 @@ def show(
     if len(printed) > MOST:
         printed = [line for line in printed if line.plain]
     print_hanging(printed, console)
+
+
+def answer_of(
+    found: Identification, source: Source, places: Sequence[str], more: str, *, verbose: bool, budget: bool
+) -> CommandAnswer:
+    """The answer of `palpate identify` for one log.
+
+    Args:
+        found: what the log gives.
+        source: the log.
+        places: of the written files.
+        more: options by which all evidence is shown.
+        verbose: whether all evidence is printed.
+        budget: whether the uncertainty budgets are.
+    """
+
+    def printed(console: Console) -> None:
+        if not verbose:
+            show(found, source.title, console, source.notes, "   ".join([*places, f"all evidence: {more}"]))
+        else:
+            details.show(found, source.title, console)
+            for line in (*source.notes, *places):
+                console.print(line, soft_wrap=True)
+        if budget:
+            details.show_budgets(found, console)
+
+    file = {"file": source.file, "sha256": source.sha256}
+    return CommandAnswer({"files": [file], **as_json(found, source)}, show=printed)
 
 
 def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:

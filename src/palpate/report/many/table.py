@@ -29,9 +29,11 @@ from palpate.report.identification.words import (
     interval,
     number,
     unit,
+    unit_warnings,
     units_of,
 )
 from palpate.report.numbers import NONE, plain, quantity, si_prefix, with_half
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import bare_table
 
 POINT = "working point"
@@ -141,6 +143,21 @@ def failures(rows: Sequence[LogRow]) -> str:
 
 _WIDE = 110
 """Letters of a terminal that has room for force, depth and frequency of each log."""
+
+
+def answer_of(rows: Sequence[LogRow], pooled: Pooled, places: Sequence[str]) -> CommandAnswer:
+    """The answer of `palpate identify` for many logs, with the places of the written files."""
+
+    def printed(console: Console) -> None:
+        for row in rows:
+            for text in unit_warnings(row.found) if row.found else ():
+                console.print(f"! {row.source.title}: {text}", style="yellow", soft_wrap=True)
+        show(rows, pooled, console)
+        for place in places:
+            console.print(place, soft_wrap=True)
+
+    files = [{"file": row.source.file, "sha256": row.source.sha256} for row in rows]
+    return CommandAnswer({"files": files, **json_of(rows, pooled)}, show=printed)
 
 
 def show(rows: Sequence[LogRow], pooled: Pooled, console: Console) -> None:
