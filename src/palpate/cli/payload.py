@@ -111,7 +111,11 @@ def _wrench_and_pose(log: Path, source: LogOptions) -> Record:
 
 
 def _write(
-    found: Weighed, name: str, files: tuple[Path | None, Path | None], ending: str, start: tuple[float, ...]
+    found: Weighed,
+    name: str,
+    files: tuple[Path | None, Path | None],
+    ending: str,
+    start: tuple[float, float, float],
 ) -> list[Path]:
     """Write the payload and the page; returns the written files."""
     from palpate.contact_frame import load_text

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs.bags import Bag
 from palpate.logs.from_bag import from_bag
 from palpate.logs.from_table import from_table
@@ -34,7 +34,7 @@ def read_log(
     missing: Sequence[str | float] = (),
     delimiter: str | None = None,
     held: str | None = None,
-    limits: Limits | None = None,
+    limits: ReadingLimits | None = None,
     **columns: str,
 ) -> Record:
     """Read columns of a log into a record.

@@ -95,7 +95,7 @@ def answer_of(
         json |= {"slide": slide_json(told.gains)}
         slide = f"Slide: {slide_sentence(told.gains)}."
 
-    def printed(console: Console) -> None:
+    def display(console: Console) -> None:
         if verbose:
             show_all(told, console)
         else:
@@ -103,7 +103,7 @@ def answer_of(
         for line in (*filter(None, [slide]), *(f"written: {path}" for path in written if verbose)):
             console.print(line, soft_wrap=True)
 
-    return CommandAnswer(json, show=printed)
+    return CommandAnswer(json, show=display)
 
 
 def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:

@@ -253,13 +253,13 @@ def _print(
     from palpate.report.terminal import print_hanging
     from palpate_certify.report import proof_lines
 
-    def printed(console: Console) -> None:
+    def display(console: Console) -> None:
         if output.verbose:
             print_lines(*lines(certificate, verdict))
         else:
             print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console)
 
-    print_result(CommandAnswer(as_json(certificate, verdict), show=printed), json=output.json)
+    print_result(CommandAnswer(as_json(certificate, verdict), show=display), json=output.json)
 
 
 def check_header(certificate: Certificate, path: Path) -> None:

@@ -27,7 +27,7 @@ from palpate.report.identification.words import (
     behind_the_arm,
     by_the_model,
     first_reason,
-    formatted,
+    full_number,
     interval,
     limited_by,
     place_of,
@@ -129,7 +129,7 @@ def answer_of(
         budget: whether the uncertainty budgets are.
     """
 
-    def printed(console: Console) -> None:
+    def display(console: Console) -> None:
         if not verbose:
             show(found, source.title, console, source.notes, "   ".join([*places, f"all evidence: {more}"]))
         else:
@@ -140,7 +140,7 @@ def answer_of(
             details.show_budgets(found, console)
 
     file = {"file": source.file, "sha256": source.sha256}
-    return CommandAnswer({"files": [file], **as_json(found, source)}, show=printed)
+    return CommandAnswer({"files": [file], **as_json(found, source)}, show=display)
 
 
 def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
@@ -198,7 +198,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
 
 def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
     """The value, what it is and its verdict; below, what it belongs to."""
-    value = "no number" if p.value is None else formatted(p)
+    value = "no number" if p.value is None else full_number(p)
     line = Text(value, style="bold").append(f"   {what}   ").append(mark)
     yield line.append(printable(f"        {name}") if name else "")
     yield Text(printable(f"{' ' * (len(value) + 3)}{detail}"))
@@ -263,7 +263,7 @@ def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
 
 def _interval(p: Parameter, bound: bool) -> str:
     if p.value is not None and (bound or p.verdict is Verdict.IDENTIFIED):
-        return formatted(p)
+        return full_number(p)
     if p.ci95 is None or p.verdict is Verdict.REJECTED:
         return NONE
     low, high = p.ci95
@@ -346,7 +346,7 @@ def _row(name: str, own: Parameter) -> tuple[str, ...]:
 
 
 def _value(own: Parameter) -> str:
-    return "-" if own.value is None else formatted(own)
+    return "-" if own.value is None else full_number(own)
 
 
 def draw(found: Identification) -> Figure:
