@@ -1,7 +1,5 @@
 """How much of the machine a stranger's file may take: unpacked size and time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from pathlib import Path

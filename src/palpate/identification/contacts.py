@@ -11,14 +11,7 @@ from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn
 from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.free_motion import (
-    FLAT,
-    Drift,
-    FreeMotion,
-    FreeMotionMass,
-    free_motion_of,
-    payload_of,
-)
+from palpate.identification.free_motion import FLAT, Drift, FreeMotion, Payload, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.strokes import Stroke, strokes_of
@@ -76,7 +69,7 @@ class Contacts:
     warnings: tuple[Warn, ...]
     clear: bool = True
     signed: bool = True
-    payload: FreeMotionMass | None = None
+    payload: Payload | None = None
     drift: Drift | None = None
     press: SteadyPress | None = None
 

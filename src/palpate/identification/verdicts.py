@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
-from palpate.identification.estimators.answer import Answer, ForcePrediction
+from palpate.identification.estimators.answer import Answer, Prediction
 from palpate.identification.estimators.budget import Budget, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
@@ -184,7 +184,7 @@ def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] 
             continue
         step = 1e-4 * (abs(found.fit.theta[name]) or 1.0)
         theta = found.fit.theta | {name: found.fit.theta[name] + step}
-        moved = ForcePrediction.of(found.fit.model, problem.motion, problem.force, theta, found.fit.lag)
+        moved = Prediction.of(found.fit.model, problem.motion, problem.force, theta, found.fit.lag)
         other = stiffness_of(problem, moved.force, point)
         slope[i] = 0.0 if other is None else (other - own) / step
     return own, slope
@@ -294,7 +294,7 @@ def _remedy(name: str, terms: Terms) -> str:
     return NOISE.remedy
 
 
-def unit_of(name: str, fitted: Fit | ForcePrediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
     """The unit of one parameter of a model."""
     units = impedance_units(terms.force_unit, terms.position_unit)
     plain = units["K"] == "1"

@@ -1,7 +1,5 @@
 """Contents of a log: topics, variables or columns, and their names on the command line."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Many logs: the files of folders and the sheets of books that paths name, and covariates, such as a temperature."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

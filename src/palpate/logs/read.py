@@ -1,7 +1,5 @@
 """From a log file to a record in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any

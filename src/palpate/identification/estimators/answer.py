@@ -14,7 +14,7 @@ from palpate.identification.uncertainty import Contributions, half_widths
 
 
 @dataclass(frozen=True)
-class ForcePrediction:
+class Prediction:
     """The force that a model predicts for a log.
 
     Args:
@@ -36,7 +36,7 @@ class ForcePrediction:
     @classmethod
     def of(
         cls, model: Model, motion: Motion, force: Array, theta: dict[str, float], lag: float
-    ) -> ForcePrediction:
+    ) -> Prediction:
         """By a model; an offset that is not among the parameters is that of the mean.
 
         Args:
@@ -58,7 +58,7 @@ class ForcePrediction:
         spread = float(np.mean((force - force.mean()) ** 2))
         return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
 
-    def in_time(self, motion: Motion, force: Array) -> ForcePrediction:
+    def in_time(self, motion: Motion, force: Array) -> Prediction:
         """The same model, its linear parameters by least squares in time, which see a motion that no octave has.
 
         Args:
@@ -69,7 +69,7 @@ class ForcePrediction:
         size = np.abs(columns).max(axis=0)
         scaled, *_ = np.linalg.lstsq(columns / np.where(size > 0, size, 1.0), force, rcond=1e-9)
         theta = dict(zip(self.model.linear, (scaled / np.where(size > 0, size, 1.0)).tolist(), strict=True))
-        return ForcePrediction.of(self.model, motion, force, self.theta | theta, self.lag)
+        return Prediction.of(self.model, motion, force, self.theta | theta, self.lag)
 
     def __getitem__(self, name: str) -> float:
         return self.theta[name]
@@ -96,7 +96,7 @@ class Answer:
     theta: Array
     cov: Array
     budget: Budget
-    fit: ForcePrediction
+    fit: Prediction
     explained: float
     unexplained: float
     hidden: float

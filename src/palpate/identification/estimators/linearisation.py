@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.answer import Answer, ForcePrediction
+from palpate.identification.estimators.answer import Answer, Prediction
 from palpate.identification.estimators.averaging import (
     Member,
     averaged,
@@ -186,7 +186,7 @@ class Linearisation:
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
         values = self.at or dict(zip(self.names, solution.theta.tolist(), strict=True))
-        predicted = ForcePrediction.of(self.model, self.problem.motion, self.problem.force, values, self.lag)
+        predicted = Prediction.of(self.model, self.problem.motion, self.problem.force, values, self.lag)
         noise = float(both @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(

@@ -1,7 +1,5 @@
 """Logs of columns: text, Parquet, MATLAB, spreadsheets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from palpate.files.limits import ReadingBudget, ReadingLimits

@@ -1,7 +1,5 @@
 """Spreadsheets: each sheet is a table with the lines above its rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
