@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=280, lines=50973, tokens=343888),
+    "src/palpate": Weight(files=276, lines=50894, tokens=343395),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1933, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=10248, tokens=82640),
@@ -40,7 +40,7 @@ LARGEST = {
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 63, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 56, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 UNTESTED = 268
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""
@@ -184,7 +184,7 @@ def test_no_docstring_more_needs_its_neighbour(sources):
 
 def test_a_class_name_stands_for_one_thing(sources):
     twice = {name for name, count in classes(tree for *_, tree in sources).items() if count > 1}
-    assert not twice - TWICE, f"also the name of another class: {sorted(twice - TWICE)}"
+    assert not twice - {*TWICE}, f"also the name of another class: {sorted(twice - {*TWICE})}"
 
 
 def test_no_module_more_is_without_a_test_of_its_name(root, sources):
