@@ -230,6 +230,7 @@ def working_truth(log: Log, source: str, frequency: float | None, force: float) 
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
     """
     dense, surface, arm = log.dense, log.plan.surface, _untold_arm(log)
+    beside = log.plan.recording.world.spring
     if source == "octave" and frequency:
         own = octave_stiffness(dense, frequency)
         if surface.linear:
@@ -237,9 +238,9 @@ def working_truth(log: Log, source: str, frequency: float | None, force: float) 
         if own is not None:
             inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
             ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
-            return min(ends), max(ends)
+            return min(ends), max(ends) + beside
     slope = press_stiffness(surface, dense, force)
-    return None if slope is None else (slope[0] / (1 + slope[0] / arm), slope[1])
+    return None if slope is None else (slope[0] / (1 + slope[0] / arm), slope[1] + beside)
 
 
 def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:
