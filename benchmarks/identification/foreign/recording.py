@@ -60,7 +60,7 @@ class Recording:
     stamp_noise: float = 0.0
     stamp_count: float = 0.0
     position_rate: float = 0.0
-    world: World = field(default_factory=World)
+    world: World = field(default_factory=World, repr=False)
 
     @property
     def whole_lag(self) -> float:

@@ -230,7 +230,8 @@ def working_truth(log: Log, source: str, frequency: float | None, force: float) 
     An arm in series that is not told may be in it or not, and so may the inertia of a payload.
     """
     dense, surface, arm = log.dense, log.plan.surface, _untold_arm(log)
-    beside = log.plan.recording.world.spring
+    world = log.plan.recording.world
+    beside = world.spring
     if source == "octave" and frequency:
         own = octave_stiffness(dense, frequency)
         if surface.linear:
