@@ -169,7 +169,7 @@ def log_of_plan(plan: Plan, rng: Rng, cell: Cell, seed: int) -> Log:
     still = way.by_force or not plan.moving
     height = np.zeros_like(x) if still else drifting(t, plan.moving * deep, rng)
     touched = replace(touched, force=touched.force * _repeats(t, plan.repeats, rng))
-    touched = replace(touched, force=plan.recording.world.felt(x, touched.force, dt))
+    touched = replace(touched, force=plan.recording.world.felt(x, touched.force))
     height = height + float(rng.uniform(-0.05, 0.3))
     if plan.breathing:
         height = height + plan.breathing * deep * np.sin(2 * np.pi * float(rng.uniform(0.15, 0.4)) * t)
@@ -469,7 +469,9 @@ def _short(plan: Plan, rng: Rng) -> Plan:
 
 
 def _sticky(plan: Plan, rng: Rng) -> Plan:
-    return _world(plan, worlds.sticky(plan.largest * _share(0.02, 0.2, rng), _deep(plan) * _share(0.02, 0.3, rng)))
+    return _world(
+        plan, worlds.sticky(plan.largest * _share(0.02, 0.2, rng), _deep(plan) * _share(0.02, 0.3, rng))
+    )
 
 
 def _cabled(plan: Plan, rng: Rng) -> Plan:

@@ -129,6 +129,8 @@ def recorded(
         seen_at = first + np.round((times - first) * r.position_rate) / r.position_rate
     metre = at_times(position, seen_at - r.world.late(seen_at)[1], dt)
     metre = metre + _held_values(r.position_noise * rng.normal(size=rows), seen_at)
+    if r.world.end < 1:
+        metre = np.minimum(metre, metre.min() + r.world.end * np.ptp(metre))
     stamps = times - times[0] + r.stamp_noise * rng.uniform(-0.5, 0.5, rows) / r.rate
     return _rounded(stamps, r.stamp_count), _rounded(metre, r.position_count), newton
 

@@ -115,7 +115,7 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
 
     A loading is a contact's first advance to its peak force; a log without one has the slope of its unloading. Two
     slopes are as true as each other: of the force as it was, and of the force without what is no spring (damper, mass,
-    friction), on the same way.
+    friction), on the same way. Of a surface that yields so are those of each contact alone: its second is stiffer.
     """
     short, low, high = dense.thinned(1000.0), 0.4, 0.95
     if force is not None:
@@ -132,6 +132,9 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
         told = [
             s for f in forces if (s := _slope_in(short.depth[::-1], f[::-1], back, low, high)) is not None
         ]
+    if told and surface["Kp"]:
+        alone = [_slope_in(short.depth, f, own, low, high) for f in forces for own in edges.reshape(-1, 2)]
+        told += [s for s in alone if s is not None]
     return (min(told), max(told)) if told else None
 
 

@@ -18,17 +18,21 @@ class World:
     """A cause of error.
 
     Args:
-        felt: force at the tip [N] from the depth of the probe [m] and that of the contact [N], a step [s] apart.
-        seen: what position [m] and force [N] the sensors have, from the true ones.
+        felt: force at the tip [N] from the depth of the probe [m] and that of the contact [N].
+        seen: what position [m] and force [N] the sensors have, from the true ones, a step [s] apart.
+        end: share of the way beyond which the position stands still.
         late: delays of the force and of the position [s] at instants [s], shape (n,).
         lag: lowest and highest of what it adds to the force's lag [s].
+        friction: share of the load by which a slope in loading and in unloading differ from the surface's.
         spring: stiffness beside the surface, which may be counted with it or not [N/m].
     """
 
-    felt: Callable[[Array, Array, float], Array] = lambda x, force, dt: force
-    seen: Callable[[Array, Array, float], tuple[Array, Array]] = lambda x, force, dt: (x, force)
+    felt: Callable[[Array, Array], Array] = lambda _, force: force
+    seen: Callable[[Array, Array, float], tuple[Array, Array]] = lambda x, force, _: (x, force)
     late: Callable[[Array], tuple[Array, Array]] = lambda times: (0 * times, 0 * times)
+    end: float = 1.0
     lag: tuple[float, float] = (0.0, 0.0)
+    friction: float = 0.0
     spring: float = 0.0
 
 
@@ -49,7 +53,7 @@ def moving_average(width: float) -> World:
 
 def at_end(share: float) -> World:
     """The position sensor reads no further than a share of the way."""
-    return World(seen=lambda x, force, dt: (np.minimum(x, x.min() + share * np.ptp(x)), force))
+    return World(end=share)
 
 
 def decaying(tau: float) -> World:
@@ -64,17 +68,17 @@ def creeping(share: float, tau: float) -> World:
 
 def guided(mu: float, way: float) -> World:
     """Friction in the guide in proportion to the load, which turns within a way [m] (Dahl, 1968)."""
-    return World(felt=lambda x, force, dt: force * (1 + mu * _dahl(x, way)))
+    return World(felt=lambda x, force: force * (1 + mu * _dahl(x, way)), friction=mu)
 
 
 def sticky(pull: float, way: float) -> World:
     """A drop between probe and surface: it pulls [N] from the touch until they are a way [m] apart."""
-    return World(felt=lambda x, force, dt: force - pull * _bridged(x, force, way))
+    return World(felt=lambda x, force: force - pull * _bridged(x, force, way))
 
 
 def cabled(stiffness: float) -> World:
     """A cable pulls in proportion to the way [N/m]."""
-    return World(felt=lambda x, force, dt: force + stiffness * (x - x[0]), spring=stiffness)
+    return World(felt=lambda x, force: force + stiffness * (x - x[0]), spring=stiffness)
 
 
 def humming(size: float, frequency: float, phase: float) -> World:
@@ -88,7 +92,7 @@ def humming(size: float, frequency: float, phase: float) -> World:
 
 def playing(width: float) -> World:
     """The position is read behind a gear with play [m]."""
-    return World(seen=lambda x, force, dt: (_play(x, width / 2), force))
+    return World(seen=lambda x, force, _: (_play(x, width / 2), force))
 
 
 def late_position(delay: float) -> World:
