@@ -232,14 +232,14 @@ def working_truth(log: Log, source: str, frequency: float | None, force: float) 
     """
     dense, surface, arm = log.dense, log.plan.surface, _untold_arm(log)
     world = log.plan.recording.world
-    own, inertia = None, 0.0
+    inertia = 0.0
     if source == "octave" and frequency:
         own = octave_stiffness(dense, frequency)
         if surface.linear:
             own = (dynamic_stiffness(surface, frequency, 0.0, 0.0).real,) * 2
         inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
-    if own is None:
-        own, inertia = press_stiffness(surface, dense, force), 0.0
+    else:
+        own = press_stiffness(surface, dense, force)
     if own is None:
         return None
     ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
