@@ -22,10 +22,10 @@ from logs.ros_bags import storage, wrench, write_bag
 from palpate.errors import InputError
 from palpate.files.limits import Limits
 from palpate.logs import read_log, read_record
-from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
 from palpate.logs.listing import list_log
 from palpate.logs.read import measured_by
+from palpate_bags import Bag
 
 T = np.arange(50) / 100
 COLUMNS = {"time": "t", "position": "x", "force": "f"}

@@ -115,7 +115,7 @@ class CovariateOptions:
 
     def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
         """One number of each log, by the covariate's name."""
-        from palpate.logs.covariates import read_covariates
+        from palpate.logs.many import read_covariates
 
         if self.covariates is not None and not self.covariate:
             raise InputError(
@@ -168,7 +168,7 @@ def identify(
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
-    from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
+    from palpate.logs.many import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
     output, cell = output or IdentifyOutput(), cell or CellOptions()
     source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from palpate.files.ownership import FORCE, MADE, SIGNATURE, WRITTEN, check_place, ours
 from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
 from palpate.files.writing import (
+    FORCE,
+    MADE,
     RECORD,
+    SIGNATURE,
+    WRITTEN,
     as_json,
     check_kept_folder,
+    check_place,
     fresh_folder,
     kept_folder,
+    ours,
     whole,
     with_author,
     write_json,

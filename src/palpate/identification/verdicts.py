@@ -304,8 +304,6 @@ def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
         return terms.force_unit
     if name == "n" or plain:
         return "1"
-    if name in ("K2", "K3"):
-        return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
     if fitted.model.of_power and fitted.model.depth is None:
         n = fitted["n"] + (name == "B")
         return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from palpate.logs.arm_logs import read_wrench_and_pose
     from palpate.logs.read import columns_of
     from palpate.logs.signals import read_log
-    from palpate.logs.store import read_record, write_record
+    from palpate.logs.tables.parquet import read_record, write_record
 
 __all__ = ["columns_of", "read_log", "read_record", "read_wrench_and_pose", "whole", "write_record"]
 
 _HOME = {
     "columns_of": "read",
     "read_log": "signals",
-    "read_record": "store",
+    "read_record": "tables.parquet",
     "read_wrench_and_pose": "arm_logs",
-    "write_record": "store",
+    "write_record": "tables.parquet",
 }
 
 

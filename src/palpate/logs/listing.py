@@ -11,8 +11,7 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.files.limits import Limits
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.bags import Bag
-from palpate.logs.bags.reading import leaves
+from palpate.logs.bags import Bag, bag_reader
 from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
@@ -82,7 +81,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     path = Path(path)
     kind = kind_of(path)
     if kind.is_bag:
-        with Bag(path, kind, limits) as bag:
+        with bag_reader().Bag(path, kind, limits) as bag:
             fields = {name: _fields(bag, name) for name in bag.topics}
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
@@ -111,7 +110,7 @@ def _fields(bag: Bag, name: str) -> tuple[str, ...]:
     topic = bag.topics[name]
     if not (topic.known and topic.count):
         return ()
-    return tuple(path for path, _ in leaves(bag.first(name)))
+    return tuple(path for path, _ in bag_reader().leaves(bag.first(name)))
 
 
 def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +14,8 @@ from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_
 from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, si
 from palpate.cli.toolkit import command, console, print_answer, print_lines
 from palpate.errors import InputError
-from palpate.files import MADE, write_text
+from palpate.files import MADE, read_text, write_text
+from palpate.force import Certificate
 
 if TYPE_CHECKING:
     from palpate.force import Certificate
@@ -215,8 +217,6 @@ def _check(path: Path, gains: Path | None, output: TuningOutputOptions) -> int:
 
     certificate = Certificate.load(path)
     if gains is not None and gains.suffix == ".h":
-        from palpate.force.c_header import check_header
-
         check_header(certificate, gains)
     elif gains is not None:
         certificate.check_of(load_gains(gains))
@@ -261,3 +261,27 @@ def _print(
     from palpate_certify.report import proof_lines
 
     print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())
+
+
+def check_header(certificate: Certificate, path: Path) -> None:
+    """Refuses a header that the certificate does not speak of.
+
+    Args:
+        certificate: of `palpate certify`.
+        path: `palpate_force.h` of `palpate export --to c`.
+
+    Raises:
+        InputError: no such header, another law, other gains.
+    """
+    notes = dict(re.findall(r"^// (law|gains): (.*?)\r?$", read_text(path, "a header"), re.MULTILINE))
+    if notes.keys() != {"law", "gains"}:
+        raise InputError(
+            f"{path}: no header of a force loop in C; give the palpate_force.h of palpate export"
+        )
+    own = certificate.gains
+    for what, mine in (("another law", own.law), ("other gains", own.digest)):
+        if notes[what.split()[1]] != mine:
+            raise InputError(
+                f"{path} is of {what} ({notes[what.split()[1]]:.24}) than the certificate ({mine:.24}); "
+                "export it from the certificate's gains, or certify its own"
+            )

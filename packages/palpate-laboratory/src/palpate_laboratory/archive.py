@@ -12,7 +12,7 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.files import check_place
-from palpate.files.ownership import SQLITE_ID
+from palpate.files.writing import SQLITE_ID
 
 T = TypeVar("T")
 

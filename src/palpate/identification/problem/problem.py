@@ -30,40 +30,6 @@ FREE_ROWS = 64
 _FEWEST = 30
 
 
-@dataclass(frozen=True)
-class Seen:
-    """Both channels behind a front end.
-
-    Args:
-        motion: the position, counted from the surface into it, at the rows in contact.
-        origin: position of the surface on the log's own scale [m].
-        force: at every row of the front end, shape (n,).
-        spans: number of the contact that each row in contact belongs to, shape (m,).
-        usable: rows that remember valid readings alone, shape (n,).
-        begins: first row behind the touch of each contact.
-        memory: rows that a disturbance is remembered for.
-        free: the force out of contact, in stretches of rows.
-        lag: prior of the force's.
-        read: the force before any filter, at the samples of the position; None if it is another's.
-        filtered: part of the force's lag that the position was sent through beforehand [s].
-        rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
-            are as white as their noise.
-    """
-
-    motion: Motion
-    origin: float
-    force: Array
-    spans: Rows
-    usable: Mask
-    begins: list[int]
-    memory: int
-    free: tuple[Array, ...]
-    lag: Lag
-    read: Array | None = None
-    filtered: float = 0.0
-    rounding: float = 0.0
-
-
 def numbered(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
     """The rows of all contacts, and the number of each one's contact.
 
@@ -100,50 +66,6 @@ def ends(channels: Channels, contacts: Contacts) -> list[int]:
     return found
 
 
-@dataclass(frozen=True)
-class Touch:
-    """Rows that hold the touches.
-
-    Args:
-        rows: shape (m,).
-        spans: number of the contact that each belongs to, shape (m,).
-        force: filtered, less what it rests at out of contact, shape (m,).
-    """
-
-    rows: Rows
-    spans: Rows
-    force: Array
-
-
-def touching(seen: Seen, resting: float, reach: int = 0) -> Touch | None:
-    """The rows in contact and those before each touch; None if no touch is in the log.
-
-    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
-
-    Args:
-        seen: the force and the rows in contact, by a front end.
-        resting: what the force rests at out of contact [N].
-        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
-    """
-    rows, spans, memory = seen.motion.rows, seen.spans, seen.memory
-    before, left = [], 0
-    edges = np.flatnonzero(np.diff(spans, prepend=-1))
-    for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
-        begin, wanted = seen.begins[number], max(memory, reach * int(own[-1] - own[0]))
-        first = max(begin - wanted, left + memory, memory)
-        if first < begin:
-            step = int(own[1] - own[0]) if len(own) > 1 else 1
-            fresh = np.arange(own[0] - step, first - 1, -step)
-            before += [(row, number) for row in fresh if seen.usable[row]]
-        left = int(own[-1])
-    if not before:
-        return None
-    fresh, numbers = np.array(before, dtype=np.intp).T
-    every = np.r_[rows, fresh]
-    order = np.argsort(every)
-    return Touch(every[order], np.r_[spans, numbers][order], seen.force[every[order]] - resting)
-
-
 MOST_ROWS = 1 << 16
 """Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""
 _PIECE = 1 << 14
@@ -159,14 +81,16 @@ class Problem:
         spans: number of the contact that each belongs to, shape (m,).
         lag: prior.
         free: the force out of contact behind the same front end, in stretches of rows.
-        touch: the rows with those shortly before each touch; None if no touch is in the log.
-        approach: the same with as many rows before a touch as the contact has, where there are so many.
         origin: position of the surface on the log's own scale [m].
         contacts: as found.
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
         read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
-        rounding: deviation of a sample of the force by the last digit of the log [N].
+        rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
+            are as white as their noise.
         filtered: part of the force's lag that the position was sent through beforehand, so that `lag` is the rest [s].
+        with_touches: the same over the rows from shortly before each touch, the force counted from where it rests; None
+            if no touch is in the log.
+        with_approach: the same from as long before each touch as the contact lasts, where there are so many rows.
     """
 
     motion: Motion
@@ -174,14 +98,14 @@ class Problem:
     spans: NDArray[np.intp]
     lag: Lag
     free: tuple[Array, ...]
-    touch: Touch | None
-    approach: Touch | None
     origin: float
     contacts: Contacts
     counted: bool = False
     read: Array | None = None
     rounding: float = 0.0
     filtered: float = 0.0
+    with_touches: Problem | None = None
+    with_approach: Problem | None = None
 
     @property
     def time(self) -> Array:
@@ -198,23 +122,15 @@ class Problem:
         """Zero of the force: its mean out of contact, for rows that hold the touches [N]."""
         return self.contacts.resting if self.counted else 0.0
 
-    @property
-    def with_touches(self) -> Problem | None:
-        """The same over the rows from before each touch, the force counted from where it rests; None if unknown."""
-        return self._at(self.touch)
+    def at(self, rows: Rows, force: Array, spans: Rows) -> Problem:
+        """The same at other rows.
 
-    @property
-    def with_approach(self) -> Problem | None:
-        """The same over the rows from as long before each touch as the contact lasts; None without a touch."""
-        return self._at(self.approach)
-
-    def _at(self, touch: Touch | None) -> Problem | None:
-        if touch is None:
-            return None
-        motion = replace(self.motion, rows=touch.rows, _kept={})
-        return replace(
-            self, motion=motion, force=touch.force, spans=touch.spans, touch=None, approach=None, counted=True
-        )
+        Args:
+            rows: shape (m,).
+            force: at these, shape (m,).
+            spans: number of the contact that each belongs to, shape (m,).
+        """
+        return replace(self, motion=replace(self.motion, rows=rows, _kept={}), force=force, spans=spans)
 
     @property
     def in_contact(self) -> Mask:
@@ -227,22 +143,62 @@ class Problem:
         return found
 
 
+@dataclass(frozen=True)
+class Memory:
+    """Rows that a front end has, and how long it remembers what was before.
+
+    Args:
+        force: at every row of the front end, shape (n,).
+        usable: rows that remember valid readings alone, shape (n,).
+        begins: first row behind the touch of each contact.
+        length: rows that a disturbance is remembered for.
+    """
+
+    force: Array
+    usable: Mask
+    begins: list[int]
+    length: int
+
+
+def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None:
+    """The problem with the rows before each touch, the force counted from its rest; None if no touch is in the log.
+
+    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
+
+    Args:
+        problem: of the rows in contact.
+        memory: of the front end.
+        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
+    """
+    rows, spans, length = problem.motion.rows, problem.spans, memory.length
+    before, left = [], 0
+    edges = np.flatnonzero(np.diff(spans, prepend=-1))
+    for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
+        begin, wanted = memory.begins[number], max(length, reach * int(own[-1] - own[0]))
+        first = max(begin - wanted, left + length, length)
+        if first < begin:
+            step = int(own[1] - own[0]) if len(own) > 1 else 1
+            fresh = np.arange(own[0] - step, first - 1, -step)
+            before += [(row, number) for row in fresh if memory.usable[row]]
+        left = int(own[-1])
+    if not before:
+        return None
+    fresh, numbers = np.array(before, dtype=np.intp).T
+    every = np.r_[rows, fresh]
+    order = np.argsort(every)
+    at = every[order]
+    force = memory.force[at] - problem.contacts.resting
+    return replace(problem.at(at, force, np.r_[spans, numbers][order]), counted=True)
+
+
 def reduced(problem: Problem) -> Problem:
     """The same with so many rows at most, in evenly spaced unbroken pieces."""
+    wider = (None if own is None else reduced(own) for own in (problem.with_touches, problem.with_approach))
     rows = problem.motion.rows
-    if len(rows) <= MOST_ROWS:
-        return problem
-    kept = _pieces(len(rows))
-    motion = replace(problem.motion, rows=rows[kept], _kept={})
-    fewer = replace(problem, motion=motion, force=problem.force[kept], spans=problem.spans[kept])
-    return replace(fewer, touch=_fewer(problem.touch), approach=_fewer(problem.approach))
-
-
-def _fewer(touch: Touch | None) -> Touch | None:
-    if touch is None or len(touch.rows) <= MOST_ROWS:
-        return touch
-    kept = _pieces(len(touch.rows))
-    return Touch(touch.rows[kept], touch.spans[kept], touch.force[kept])
+    kept = _pieces(len(rows)) if len(rows) > MOST_ROWS else np.ones(len(rows), bool)
+    fewer = problem if kept.all() else problem.at(rows[kept], problem.force[kept], problem.spans[kept])
+    touches, approach = wider
+    return replace(fewer, with_touches=touches, with_approach=approach)
 
 
 def _pieces(count: int) -> Mask:

@@ -17,7 +17,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files.limits import ReadingBudget
-from palpate.logs.bags.scanning import (
+from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
+from palpate_bags.scanning import (
     ZSTD,
     End,
     RawMessage,
@@ -28,7 +29,6 @@ from palpate.logs.bags.scanning import (
     unpack_file,
     unpack_message,
 )
-from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}
 _LATEST = 2**63

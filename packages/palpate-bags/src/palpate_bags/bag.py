@@ -14,9 +14,9 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.files.limits import Limits, ReadingBudget
-from palpate.logs.bags.reading import Stream, finder, first_line, leaves, no_field, open_files
-from palpate.logs.bags.scanning import TopicInFile
 from palpate.logs.kinds import Kind
+from palpate_bags.reading import Stream, finder, first_line, leaves, no_field, open_files
+from palpate_bags.scanning import TopicInFile
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
