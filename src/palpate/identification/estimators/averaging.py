@@ -29,7 +29,7 @@ from palpate.identification.estimators.octaves import (
 from palpate.identification.models import Motion
 from palpate.identification.problem import Problem
 
-_SIZES = np.geomspace(0.001, LARGEST, 4)
+_SIZES = (0.001, 0.01, 0.3, LARGEST)
 """Deviations of the prior of a force's size, over that of the whole force: hardly there, or of some order of magnitude.
 `make trust` measures the coverage that follows."""
 _SINGULAR = 1e-12
