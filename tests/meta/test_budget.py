@@ -25,7 +25,7 @@ LARGEST = {
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=10342, tokens=82828),
     "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2459, tokens=16242),
-    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17978),
+    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17981),
     "packages/palpate-references/src/palpate_references": Weight(files=6, lines=768, tokens=6210),
     "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1431, tokens=12142),
     "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=768, tokens=5579),
