@@ -20,19 +20,6 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-<<<<<<< HEAD
-    "src/palpate": Weight(files=280, lines=51205, tokens=344873),
-    "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1354, tokens=9301),
-    "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1951, tokens=12577),
-    "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=10342, tokens=82828),
-    "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2459, tokens=16242),
-    "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17981),
-    "packages/palpate-references/src/palpate_references": Weight(files=6, lines=768, tokens=6210),
-    "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1431, tokens=12142),
-    "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=768, tokens=5579),
-    "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2279, tokens=14857),
-    "packages/palpate-export/src/palpate_export": Weight(files=8, lines=1950, tokens=12436),
-=======
     "src/palpate": Weight(files=280, lines=50973, tokens=343888),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1933, tokens=12577),
@@ -44,7 +31,6 @@ LARGEST = {
     "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=760, tokens=5555),
     "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2279, tokens=14829),
     "packages/palpate-export/src/palpate_export": Weight(files=8, lines=1936, tokens=12408),
->>>>>>> main
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2501, tokens=19133),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1305, tokens=9043),
