@@ -1,7 +1,5 @@
 """Wrench and pose of an arm's log, in three dimensions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Bags of messages by topic: the reader is the distribution palpate-bags."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any, TypeAlias
 

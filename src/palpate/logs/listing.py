@@ -1,7 +1,5 @@
 """Contents of a log: topics, variables or columns, and their names on the command line."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, bag_reader
 from palpate.logs.columns import ColumnStatistics
@@ -67,7 +65,7 @@ class Listing:
     facts: list[str] = field(default_factory=list)
 
 
-def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> Listing:
+def list_log(path: str | Path, delimiter: str | None = None, limits: ReadingLimits | None = None) -> Listing:
     """Contents of a log, its faults, and a command to identify it.
 
     Args:
@@ -91,7 +89,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     entries = [_of_column(column, clock) for column in columns]
     entries += [SignalEntry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
     proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
-    repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
+    repeats = equal_sheets(path, limits or ReadingLimits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
         first = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "

@@ -1,7 +1,5 @@
 """From a log file to a record in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs.bags import bag_reader
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import Kind, kind_of
@@ -34,7 +32,7 @@ def read_log(
     missing: Sequence[str | float] = (),
     delimiter: str | None = None,
     held: str | None = None,
-    limits: Limits | None = None,
+    limits: ReadingLimits | None = None,
     **columns: str,
 ) -> Record:
     """Read columns of a log into a record.

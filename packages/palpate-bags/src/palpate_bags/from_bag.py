@@ -1,7 +1,5 @@
 """Fields of a bag's messages in SI units: which clock times them, and one table of rows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

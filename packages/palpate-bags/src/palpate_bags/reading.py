@@ -1,7 +1,5 @@
 """The files of a bag read from their beginnings, as far as they are whole."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence

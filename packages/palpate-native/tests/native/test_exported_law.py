@@ -7,6 +7,7 @@ import json
 import math
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -89,15 +90,30 @@ def test_the_strictest_compiler_finds_nothing(name, request, tmp_path):
 
 @needs_compiler
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="there is no CMake")
-def test_the_folder_builds_installs_and_passes_its_own_test(force, tmp_path):
-    force.write(tmp_path / "law", "0", replace=False)
+@pytest.mark.parametrize("ament", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_the_folder_builds_installs_and_passes_its_own_test(force, tmp_path, ament):
+    """As a plain CMake package by a Python without `ament_package`, and as an ament package by the one that has it."""
+    python = "/usr/bin/python3" if ament else sys.executable
+    asked = subprocess.run([python, "-c", "import ament_package"], check=False, capture_output=True)
+    if ament and asked.returncode != 0:
+        pytest.skip("there is no ament_cmake")
+    force.write(tmp_path / "law", "0.1.0", replace=False)
     for words in (
-        ("cmake", "-S", "law", "-B", "build", "-DCMAKE_INSTALL_PREFIX=there"),
+        (
+            "cmake",
+            "-S",
+            "law",
+            "-B",
+            "build",
+            "-DCMAKE_INSTALL_PREFIX=there",
+            f"-DPython3_EXECUTABLE={python}",
+        ),
         ("cmake", "--build", "build"),
         ("ctest", "--test-dir", "build"),
         ("cmake", "--install", "build"),
     ):
         subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "there" / "share" / "ament_index").is_dir() == ament
     (tmp_path / "use").mkdir()
     (tmp_path / "use" / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.16)\nproject(use CXX)\nfind_package(palpate_force REQUIRED)\n"
@@ -271,6 +287,10 @@ def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, reque
         ("raises_to", "** 0.5 for a root"),
         ("prints_into", "a number or a truth"),
         ("walks_over", "count with range"),
+        ("names_an_argument", "all its arguments in order"),
+        ("writes_on_the_way", "alone in a statement"),
+        ("adds_a_text", "no type that Numba infers"),
+        ("goes_on", "continue has no C"),
     ],
 )
 def test_a_law_outside_the_subset_is_refused_with_file_line_and_remedy(function, says):
@@ -318,6 +338,49 @@ def walks_over(x):
     for y in (x, x):
         total += y
     return total
+
+
+@law
+def product(x, y=2.0):
+    """A law with a default."""
+    return x * y
+
+
+@law
+def names_an_argument(x):
+    """A law that names an argument of another."""
+    return product(x, y=3.0)
+
+
+@law
+def puts(a, x):
+    """A law that writes to an array."""
+    a[0] = x
+    return x
+
+
+@law
+def writes_on_the_way(x):
+    """A law with a call that writes, in an expression that reads: C has no order of the two."""
+    a = np.zeros(2)
+    b = a
+    return puts(b, x) + a[0]
+
+
+@law
+def adds_a_text(x):
+    """A law that Numba refuses."""
+    return x + "N"
+
+
+@law
+def goes_on(x):
+    """A law with a statement that the subset has not."""
+    for _ in range(3):
+        if x > 1.0:
+            continue
+        x = x + 1.0
+    return x
 
 
 @needs_compiler
