@@ -54,7 +54,8 @@ def rival_step(law, kind, s, desired, force, position, direction):
     """A tick of a rival: velocity [m/s]."""
     c, n, filtered = law.press, vector_at(s, NORMAL), vector_at(s, FILTERED)
     moved = position - filtered
-    put_vector(s, FILTERED, filtered + 0.05 * c.tick / 2e-3 * moved)
+    if kind != FZI:
+        put_vector(s, FILTERED, filtered + 0.05 * c.tick / 2e-3 * moved)
     if kind == FROM_VELOCITY and sqrt(moved @ moved) > 5e-4:
         along = unit(moved, n)
         n = unit(n - 0.05 * (n @ along) * along, n)
@@ -62,8 +63,10 @@ def rival_step(law, kind, s, desired, force, position, direction):
     flat = direction - (direction @ n) * n
     across = (law.speed / max(sqrt(flat @ flat), 0.1)) * flat
     g = gain(c, s[BOUND])
-    if kind == FZI:  # the whole vector of force error moves the tip, and motion is superposed
-        return g * (desired * n - force) + across + 0.5 * g * (force - (force @ n) * n)
+    if kind == FZI:  # the whole vector of force error, and a spring to a target that moves along, move the tip
+        put_vector(s, FILTERED, filtered + c.tick * across)
+        behind = s[BOUND] * (filtered - position)
+        return g * (desired * n - force + behind - (behind @ n) * n)
     if kind == ADMITTANCE:  # M dv/dt + B v = F_d - f.n with B = 1/g and M/B of three lags
         press = vector_at(s, LAST) @ n
         return (press + c.tick / (3.0 * c.theta) * (g * (desired - force @ n) - press)) * n + across
