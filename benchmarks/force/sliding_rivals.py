@@ -1,8 +1,9 @@
 """Simple forms of other laws of a slide, which take over from the sliding law when the force is held.
 
 They keep its normal of that moment and its K_u. `fixed normal` turns neither; `normal from velocity` makes it
-perpendicular to the way of the last 40 ms; `fzi-like` moves the tip by the force error as a vector; `admittance` has a
-mass of three lags.
+perpendicular to the way of the last 40 ms; `fzi-like` moves the tip by the force error as a vector, along the surface
+against a spring of K_u to a target that moves as asked, without which friction would hold the tip; `admittance` has a mass
+of three lags.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from palpate.force.sliding.slide_state import (
 
 FIXED, FROM_VELOCITY, FZI, ADMITTANCE = 1.0, 2.0, 3.0, 4.0
 FILTERED, LAST = SIZE, SIZE + 3
-"""Places behind the law's state: the low-passed position, the last velocity."""
+"""Places behind the law's state: the low-passed position, or that of the target; the last velocity."""
 
 
 @part
