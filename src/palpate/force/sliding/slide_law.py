@@ -345,7 +345,7 @@ def command(law, s, desired, force, direction):
         if s[HALT] * c.tick > law.lead:
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
             stepped = s[TROUBLE] == STEPPED
-            mu, mu_std = s[MU] if stepped else LIKELY[0], AFTER[1] if stepped else LIKELY[1]
+            mu, mu_std = s[MU] if stepped else law.mu_max, AFTER[1] if stepped else LIKELY[1]
             slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], mu, mu_std)
             s[SLOW] = HALF
         return press * n
