@@ -14,8 +14,7 @@ import numpy as np
 from rich.progress import track
 from touches import Draw, Rig, share
 
-from palpate.force.expected import OVERSHOOT, STIFFENING_AT, stiffening
-from palpate.force.steps import step_of
+from palpate.force.expected import OVERSHOOT, STIFFENING_AT, step_of, stiffening
 
 PRIORS = (("as told", 1.0, 1.0), ("cap x 20", 20.0, 1.0), ("cap / 20", 0.05, 1.0), ("theta x 2", 1.0, 2.0),
           ("theta / 2", 1.0, 0.5), ("cap / 10, theta / 2", 0.1, 0.5))  # fmt: skip

@@ -15,7 +15,7 @@ from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState
 from palpate.errors import InputError
 from palpate.instruments import Converter
-from palpate.logs.store import read_record, write_record
+from palpate.logs.tables.parquet import read_record, write_record
 
 FOAM, RUBBER = KelvinVoigt(5200, 200, 0.10), KelvinVoigt(34500, 480, 0.05)
 SURFACES = {

@@ -16,7 +16,7 @@ from palpate.bench.plant import Plant
 from palpate.environments import KelvinVoigt, StickSlip, SurfaceState, join
 from palpate.friction import LuGre
 from palpate.instruments import Converter, analog_filter_190, force_sensor
-from palpate.logs.store import read_record, write_record
+from palpate.logs.tables.parquet import read_record, write_record
 from palpate.robots.arm3 import Arm3
 
 RATE, STEPS, DEPTH = 20000, 20, 4e-3

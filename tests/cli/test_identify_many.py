@@ -12,8 +12,7 @@ from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate.cli import main
 from palpate.cli.one_log import OneLog
-from palpate.logs.columns import gather_logs, is_folder_of_logs, log_of
-from palpate.logs.covariates import read_covariates
+from palpate.logs.many import gather_logs, is_folder_of_logs, log_of, read_covariates
 
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 

@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 
 from force.gained import gains_of
-from palpate.force.expected import OVERSHOOT, RISES, STIFFENING_AT, rise, settling_bound, softest, stiffening
+from palpate.force.expected import (
+    OVERSHOOT,
+    RISES,
+    STIFFENING_AT,
+    rise,
+    settling_bound,
+    softest,
+    step_of,
+    stiffening,
+)
 from palpate.force.simulated_press import pressed, surface, world_of
-from palpate.force.steps import step_of
 
 TOUCHES = 120
 """Of each arm; of 10 000 benchmarks/force/first_touches.py tells."""

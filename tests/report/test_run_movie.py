@@ -8,7 +8,7 @@ import pytest
 from bench.quick import quick
 from palpate.bench import build
 from palpate.errors import InputError
-from palpate.files.ownership import ours
+from palpate.files.writing import ours
 from palpate.records import Record
 from palpate.report.run import movie
 

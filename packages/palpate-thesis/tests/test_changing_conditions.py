@@ -9,8 +9,12 @@ from palpate._vector import Vec3
 from palpate.bench import build, with_values
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
-from palpate_thesis.configuration import GRAVITY, FrictionByConfiguration, tilting
-from palpate_thesis.explanations.e11_changing_conditions import PARAMETERS
+from palpate_thesis.explanations.e11_changing_conditions import (
+    GRAVITY,
+    PARAMETERS,
+    FrictionByConfiguration,
+    tilting,
+)
 
 
 def test_the_tilting_moment_is_that_of_the_links_own_weights():

@@ -20,8 +20,7 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate_thesis.claims import ThesisClaim, claim, often, spread, tables, verdict_of, with_wholes
 from palpate_thesis.figure import studies, study
-from palpate_thesis.measure import STATE, MeasurementFormat, measure
-from palpate_thesis.page import chapter_of
+from palpate_thesis.measure import STATE, MeasurementFormat, chapter_of, measure
 from palpate_thesis.runs import Runs
 
 FIELDS = ["id", "source", "claim", "thesis", "measured", "tolerance", "verdict", "note", "group"]

@@ -8,10 +8,10 @@ from palpate.errors import InputError
 from palpate.identifiers import RecursiveLeastSquares
 from palpate.networks import network, random_layers
 from palpate_checks import identifier_checks
-from palpate_thesis.continuous_least_squares import ContinuousLeastSquares
 from palpate_thesis.explanations import e7_continuous_least_squares as e7
 from palpate_thesis.explanations import e8_contact_network as e8
 from palpate_thesis.explanations import e9_model_tunes as e9
+from palpate_thesis.explanations.e7_continuous_least_squares import ContinuousLeastSquares
 from palpate_thesis.force_control.architectures import SIZES, radial_basis, recurrent
 
 START, PRIOR = (0.0, 0.0, 2e4), np.diag([1.0, 1e4, 1e8])

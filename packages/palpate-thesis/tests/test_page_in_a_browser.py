@@ -6,9 +6,9 @@ import pytest
 from opened_pages import open_page
 from palpate.cli import main
 from palpate.report import style
-from palpate.report.figure_panels.panels import panels_of
 from palpate_thesis.claims import Done
-from palpate_thesis.page import index_page
+from palpate_thesis.drawn_panels import panels_of
+from palpate_thesis.measure import index_page
 
 
 @pytest.fixture(scope="module")

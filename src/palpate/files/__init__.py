@@ -1,15 +1,18 @@
 """Files that palpate writes: atomically, and never over a file of another origin."""
 
-from __future__ import annotations
-
-from palpate.files.ownership import FORCE, MADE, SIGNATURE, WRITTEN, check_place, ours
 from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
 from palpate.files.writing import (
+    FORCE,
+    MADE,
     RECORD,
+    SIGNATURE,
+    WRITTEN,
     as_json,
     check_kept_folder,
+    check_place,
     fresh_folder,
     kept_folder,
+    ours,
     whole,
     with_author,
     write_json,

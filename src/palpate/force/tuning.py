@@ -1,7 +1,5 @@
 """From what is known of arm and surface to gains, what they will do, and where they are proved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite
@@ -13,12 +11,23 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval
-from palpate.force.expected import OVERSHOOT, RISES, STIFFENING_AT, rise, settling_bound, softest, stiffening
+from palpate.force.expected import (
+    OVERSHOOT,
+    RISES,
+    STIFFENING_AT,
+    Margins,
+    Step,
+    margins,
+    rise,
+    settling_bound,
+    softest,
+    step_of,
+    stiffening,
+)
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.known_surface import Known
 from palpate.force.lag import SOFTEST, sum_of_lags
 from palpate.force.peak import peak_bound
-from palpate.force.steps import Margins, Step, margins, step_of
 from palpate.records import Result
 
 RIGID = 1e9

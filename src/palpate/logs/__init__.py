@@ -3,8 +3,6 @@
 Its names are looked up when they are first used: what reads one file in a process of its own waits for no other reader.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -14,16 +12,16 @@ if TYPE_CHECKING:
     from palpate.logs.arm_logs import read_wrench_and_pose
     from palpate.logs.read import columns_of
     from palpate.logs.signals import read_log
-    from palpate.logs.store import read_record, write_record
+    from palpate.logs.tables.parquet import read_record, write_record
 
 __all__ = ["columns_of", "read_log", "read_record", "read_wrench_and_pose", "whole", "write_record"]
 
 _HOME = {
     "columns_of": "read",
     "read_log": "signals",
-    "read_record": "store",
+    "read_record": "tables.parquet",
     "read_wrench_and_pose": "arm_logs",
-    "write_record": "store",
+    "write_record": "tables.parquet",
 }
 
 

@@ -1,21 +1,12 @@
 """Statistics of a column before its role is known, and the value in it that stands for "no reading"."""
 
-from __future__ import annotations
-
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.errors import InputError
-from palpate.files import RECORD
-from palpate.files.limits import Limits
-from palpate.logs.kinds import STORAGES, Kind, kind_of
-from palpate.logs.tables import equal_sheets
 from palpate.units import known_unit, unit, unit_in_name
 
 NAMES = {
@@ -32,6 +23,9 @@ _USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 
 a marker that they do not see."""
 _LEAST_SHARE = 0.002
 """Of the rows: a reading that is right by accident is rarer, one in the number of steps of its converter."""
+_BLOCKS = 16
+"""Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
+number."""
 _APART = 0.5
 """Least distance of such a value from the readings beside it, in the column's unit: half of the step between whole
 numbers, which these values are."""
@@ -148,78 +142,53 @@ def _jumps(values: Array, here: Mask, value: float) -> bool:
     return float(np.median(np.abs(beside - value))) > _APART + 3 * float(np.median(steps))
 
 
-ENDINGS = {
-    ".csv", ".tsv", ".txt", ".dat", ".ddf", ".lvm", ".xlsx", ".parquet", ".mat", ".bag", *STORAGES
-}  # fmt: skip
-"""Of the files that are taken for logs in a folder."""
+def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float:
+    """How closely the ranks of two columns agree, from 0 to 1."""
+    from scipy.stats import spearmanr
+
+    a, b = first.readings, second.readings
+    there = np.isfinite(a) & np.isfinite(b)
+    rows = np.flatnonzero(there)[:: max(1, int(there.sum()) // 5000)]
+    if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
+        return 0.0
+    return abs(float(spearmanr(a[rows], b[rows]).statistic))
 
 
-def log_of(path: Path) -> Path:
-    """The record in the folder of a run or a press; of another path, the path itself."""
-    record = path / RECORD
-    beside = ("summary.json", "press.json")  # of a run or a simulated press; of a press over a wire
-    return record if record.is_file() and any((path / name).is_file() for name in beside) else path
+def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
+    """Share of the force's power that some filter of the position accounts for: its coherence (Welch), 0 to 1.
+
+    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
+    """
+    from scipy.signal import coherence, welch
+
+    a, b = position.readings, force.readings
+    there = np.isfinite(a) & np.isfinite(b)
+    rows = max(int(there.sum()) // _BLOCKS, 4)
+    if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
+        return 0.0
+    power = welch(b[there], nperseg=rows)[1]
+    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
 
 
-def is_folder_of_logs(path: Path) -> bool:
-    """Whether a path is a folder, and not itself one log, as a ROS 2 bag or the folder of a run is."""
-    if not path.is_dir() or log_of(path) != path:
+def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
+    """Whether two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
+
+    A position and a force by their units are none, as a simulated spring is a line too.
+    """
+    if position.score("position", "length") > 1 and force.score("force", "force") > 1:
         return False
-    return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
+    a, b = position.readings, force.readings
+    there = np.flatnonzero(np.isfinite(a) & np.isfinite(b))[:100_000]
+    slope, offset = np.polyfit(a[there], b[there], 1)
+    apart = np.abs(b[there] - slope * a[there] - offset)
+    return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
 
 
-def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: Limits) -> tuple[Path, ...]:
-    """The paths, a book whose sheets repeat one test by those sheets.
-
-    Args:
-        paths: of logs.
-        names: of the columns that are read; a book without one of them stays as it is, as `SHEET.NAME` does.
-        limits: of a log.
-    """
-    found: list[Path] = []
-    for path in paths:
-        book = path.is_file() and kind_of(path) is Kind.SHEETS
-        found.extend((equal_sheets(path, limits, names) if book else []) or [path])
-    return tuple(found)
-
-
-def gather_logs(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """The logs that paths name: a file as it is, a folder by its files, in the order of their names and numbers.
-
-    Raises:
-        InputError: a folder holds none, or a log is named twice: pooled, it would count twice.
-    """
-    found: list[Path] = []
-    for path in paths:
-        found.extend(_of_folder(path) if is_folder_of_logs(path) else [log_of(path)])
-    seen: dict[Path, Path] = {}
-    for path in found:
-        if path.resolve() in seen:
-            raise InputError(f"{path} is named twice; a log counts once, leave one out")
-        seen[path.resolve()] = path
-    return tuple(found)
-
-
-def _of_folder(folder: Path) -> list[Path]:
-    logs = [
-        log_of(path)
-        for path in sorted(folder.iterdir(), key=_by_number)
-        if not path.name.startswith(".")
-        and (
-            path.suffix.lower() in ENDINGS
-            if path.is_file()
-            else path.is_dir() and not is_folder_of_logs(path)
-        )
-    ]
-    if not logs:
-        raise InputError(
-            f"{folder} is a folder and no ROS 2 bag, no run, and holds no log; logs are recognised by their"
-            f" endings: {', '.join(sorted(ENDINGS))}"
-        )
-    return logs
-
-
-def _by_number(path: Path) -> list[tuple[int, str]]:
-    """A key that sorts `press_40` before `press_250`."""
-    parts = re.split(r"(\d+)", path.name)
-    return [(int(part), "") if i % 2 else (0, part) for i, part in enumerate(parts)]
+def roughness(column: ColumnStatistics) -> float:
+    """The typical bend from row to row, as a share of the span."""
+    values = column.values[np.isfinite(column.values)]
+    return (
+        float(np.mean(np.abs(np.diff(values, 2)))) / column.span
+        if column.span > 0 and len(values) > 2
+        else np.inf
+    )

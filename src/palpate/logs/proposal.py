@@ -1,7 +1,5 @@
 """The proposed `palpate identify` command of a log, from its names, units and values."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -12,7 +10,14 @@ import numpy as np
 
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.bags import Bag, Topic
-from palpate.logs.columns import NAMES, ColumnStatistics
+from palpate.logs.columns import (
+    NAMES,
+    ColumnStatistics,
+    explained_power,
+    is_one_reading,
+    rank_correlation,
+    roughness,
+)
 from palpate.logs.presets import preset, presets
 from palpate.logs.roles import epoch_unit, usual_unit
 from palpate.logs.tables import Sheet
@@ -25,9 +30,9 @@ _COUNTS = 20
 _FOLLOWS = 0.3
 """Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
-_COHERENT, _BLOCKS = 0.5, 16
-"""Share of the power of a column that is named a force, in so many blocks, above which it follows a filtered position:
-of two columns of noise it is under a tenth."""
+_COHERENT = 0.5
+"""Share of the power of a column that is named a force above which it follows a filtered position: of two columns of
+noise it is under a tenth (`explained_power`)."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
 _JOINTS_ONLY = (
     "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
@@ -208,12 +213,12 @@ def _pair(
     follow = [
         pair
         for pair in pairs[:800]
-        if _together(*pair) > _FOLLOWS or (by_name and _coherence(*pair) > _COHERENT)
+        if rank_correlation(*pair) > _FOLLOWS or (by_name and explained_power(*pair) > _COHERENT)
     ]
-    pairs = [pair for pair in follow if not _one_reading(*pair)]
+    pairs = [pair for pair in follow if not is_one_reading(*pair)]
     if not pairs:
         return None
-    position, force = max(pairs, key=lambda pair: _together(*pair))
+    position, force = max(pairs, key=lambda pair: rank_correlation(*pair))
     left = dict.fromkeys(column.name for pair in pairs for column in pair if column not in (position, force))
     if by_name and left:
         more = ", ".join([*left][:8])
@@ -222,7 +227,7 @@ def _pair(
         known, other = (position, force) if places else (force, position)
         guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
     elif not by_name:
-        position, force = sorted((position, force), key=_roughness)
+        position, force = sorted((position, force), key=roughness)
         guesses.append(
             f"the columns have no names: {position.name!r} and {force.name!r} move together most,"
             " and the smoother is taken for the position"
@@ -236,58 +241,6 @@ def _best(
     """The columns of the highest score, if one is above 0."""
     most = max(map(score, columns), default=0)
     return [column for column in columns if score(column) == most] if most > 0 else []
-
-
-def _together(first: ColumnStatistics, second: ColumnStatistics) -> float:
-    """How closely the ranks of two columns agree, from 0 to 1."""
-    from scipy.stats import spearmanr
-
-    a, b = first.readings, second.readings
-    there = np.isfinite(a) & np.isfinite(b)
-    rows = np.flatnonzero(there)[:: max(1, int(there.sum()) // 5000)]
-    if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
-        return 0.0
-    return abs(float(spearmanr(a[rows], b[rows]).statistic))
-
-
-def _coherence(position: ColumnStatistics, force: ColumnStatistics) -> float:
-    """Share of the force's power that some filter of the position accounts for: its coherence (Welch), 0 to 1.
-
-    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
-    """
-    from scipy.signal import coherence, welch
-
-    a, b = position.readings, force.readings
-    there = np.isfinite(a) & np.isfinite(b)
-    rows = max(int(there.sum()) // _BLOCKS, 4)
-    if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
-        return 0.0
-    power = welch(b[there], nperseg=rows)[1]
-    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
-
-
-def _one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
-    """Whether two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
-
-    A position and a force by their units are none, as a simulated spring is a line too.
-    """
-    if position.score("position", "length") > 1 and force.score("force", "force") > 1:
-        return False
-    a, b = position.readings, force.readings
-    there = np.flatnonzero(np.isfinite(a) & np.isfinite(b))[:100_000]
-    slope, offset = np.polyfit(a[there], b[there], 1)
-    apart = np.abs(b[there] - slope * a[there] - offset)
-    return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
-
-
-def _roughness(column: ColumnStatistics) -> float:
-    """The typical bend from row to row, as a share of the span."""
-    values = column.values[np.isfinite(column.values)]
-    return (
-        float(np.mean(np.abs(np.diff(values, 2)))) / column.span
-        if column.span > 0 and len(values) > 2
-        else np.inf
-    )
 
 
 def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: list[str]) -> str:

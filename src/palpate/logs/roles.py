@@ -1,11 +1,9 @@
 """Roles of a record's columns (time, length, force) and their possible units in a log."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,35 +23,24 @@ POSE = (
 )
 """Columns of a record in three dimensions, in the order in which their names are given."""
 
-_QUANTITY = {
-    "time": "time",
-    "position": "length",
-    "force": "force",
-    "torque": "torque",
-    "quaternion": "number",
-    "rotvec": "angle",
-    "rpy": "angle",
-    "matrix": "number",
-}
-_SI = {
-    "time": "s",
-    "position": "m",
-    "force": "N",
-    "torque": "N m",
-    "quaternion": "1",
-    "rotvec": "rad",
-    "rpy": "rad",
-    "matrix": "1",
-}
-_ALLOWED = {
-    "time": {"time"},
-    "position": {"length", "angle", "number"},
-    "force": {"force", "torque", "number"},
-    "torque": {"torque"},
-    "quaternion": {"number"},
-    "rotvec": {"angle"},
-    "rpy": {"angle"},
-    "matrix": {"number"},
+
+class _Family(NamedTuple):
+    quantity: str
+    si: str
+    allowed: frozenset[str] = frozenset()
+    """Quantities of the units that its columns may have beside its own."""
+
+
+_ANY_NUMBER, _ANGLE = _Family("number", "1"), _Family("angle", "rad")
+_FAMILIES = {
+    "time": _Family("time", "s"),
+    "position": _Family("length", "m", frozenset({"angle", "number"})),
+    "force": _Family("force", "N", frozenset({"torque", "number"})),
+    "torque": _Family("torque", "N m"),
+    "quaternion": _ANY_NUMBER,
+    "rotvec": _ANGLE,
+    "rpy": _ANGLE,
+    "matrix": _ANY_NUMBER,
 }
 
 
@@ -87,18 +74,19 @@ def family(role: str) -> str:
 
 def quantity(role: str) -> str:
     """Quantity of a role; empty for an unknown one."""
-    return _QUANTITY.get(family(role), "")
+    known = _FAMILIES.get(family(role))
+    return known.quantity if known else ""
 
 
 def si_unit(role: str) -> str:
     """The unit of a role whose column has none of its own."""
-    return _SI.get(family(role), "1")
+    return _FAMILIES.get(family(role), _ANY_NUMBER).si
 
 
 def check_quantity(role: str, name: str, symbol: str) -> None:
     """Refuse a unit that a role cannot have."""
-    found = unit(symbol).quantity
-    if found not in _ALLOWED.get(family(role), {found}):
+    found, known = unit(symbol).quantity, _FAMILIES.get(family(role))
+    if known and found not in {known.quantity, *known.allowed}:
         raise InputError(
             f"{symbol!r} of {name}:{symbol} is a unit of {found}; {role} needs one of {quantity(role)}"
         )
@@ -113,8 +101,8 @@ def check_apart(places: Mapping[str, Any], names: Mapping[str, str], path: Path)
         path: of the log.
     """
     seen: dict[Any, str] = {}
-    for role in sorted(places, key=lambda role: (family(role) not in _QUANTITY, role)):
-        if family(role) not in _QUANTITY:
+    for role in sorted(places, key=lambda role: (family(role) not in _FAMILIES, role)):
+        if family(role) not in _FAMILIES:
             break
         other = seen.setdefault(places[role], role)
         if other != role:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from math import ceil, floor, inf, isfinite, log10
 from typing import Any
 
-from palpate.report.figure_panels.panels import shown_in
+from palpate.report.chart import page_figures
 from palpate.report.numbers import quantity
 from palpate.report.page import render
 from palpate.text import printable
@@ -68,7 +68,7 @@ class PageAnswer:
         lower: likewise, below the figures.
         scale: `log_scale`; None without.
         pairs: pictures that stand beside each other: source and caption.
-        figures: as `shown_in` takes them.
+        figures: as `report.chart.page_figures` takes them.
         folds: tables that are folded: title, a word about them, rows.
         source: a file's text, and its title.
     """
@@ -105,7 +105,7 @@ def answer_page(
         codes: scripts of that template, beside the page's own.
         values: what that template shows.
     """
-    shown = shown_in(answer.figures)
+    shown = page_figures(answer.figures)
     return render(
         f"{room}.html" if package else "page.html",
         *filter(None, [package]),

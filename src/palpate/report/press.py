@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
-from palpate.report.figure_panels.panels import panels_of
+from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.film import FRAMES, animation, coordinates, film_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
@@ -26,10 +26,6 @@ from palpate.report.page import CommandAnswer, Table, data_address
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _BEFORE = 0.4
 """Seconds of the approach that are shown."""
@@ -131,11 +127,9 @@ def _patch(place: Place, half: float) -> Array:
 def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: Path) -> None:
     """Writes figures, film.svg and report.html into a folder."""
     figures = []
-    for name, draw in (("touch", _touch), ("force", _force), ("torque", _torque)):
-        with style.ink():
-            drawing, caption = draw(record, asked)
-            style.save(drawing, folder / f"{name}.png")
-            figures.append({"panels": panels_of(drawing), "caption": caption})
+    for name, (charts, caption) in charts_of(record, asked).items():
+        style.save(figure_of(charts, 3 if name == "torque" else 1), folder / f"{name}.png")
+        figures.append({"panels": panels(charts), "caption": caption})
     write_text(folder / "film.svg", film(record, asked.arm, asked.place))
     captions = {
         "arm": "The arm, to scale, in real time.",
@@ -232,7 +226,7 @@ def answer_of(title: str, summary: dict[str, Any]) -> CommandAnswer:
     found = (summary["identified"] or {}).get("parameters", {})
     head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
     said = f"{head}\n{sentence(summary, found)}"
-    return CommandAnswer(title, said, tables(summary), notes(summary), summary)
+    return CommandAnswer(summary, title, said, tables(summary), notes(summary))
 
 
 def _force_table(summary: dict[str, Any]) -> Table:
@@ -253,58 +247,45 @@ def _force_table(summary: dict[str, Any]) -> Table:
     )
 
 
-def _touch(record: Record, asked: Asked) -> tuple[Figure, str]:
-    """The force about the touch."""
-    drawing, (axis,) = style.figure(1, height=2.6)
+def charts_of(record: Record, asked: Asked) -> dict[str, tuple[list[Chart], str]]:
+    """Charts of a press and their caption, by the name of their figure."""
     t, pressing = record["t"], record["phase"] == CONTACT
     touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
-    _forces(axis, record)
-    axis.set(xlabel="time [s]", ylabel="force [N]", xlim=(max(touch - 0.1, t[0]), min(touch + 0.5, t[-1])))
-    return drawing, "The force in the first half second after the touch."
+    forces = [
+        Series(t, record["force_sampled"], "measured", "reading", 0.7),
+        Series(t, record["force"], "F", "true"),
+        Series(t, np.where(pressing, record["force_desired"], np.nan), label="desired", **KNOWN),
+    ]
+    near = (max(touch - 0.1, float(t[0])), min(touch + 0.5, float(t[-1])))
+    depths = [
+        Series(t, 1e3 * record["penetration"], "F", "true", 1.4),
+        Series(t, 1e3 * (record["x_measured"] - asked.place.place), "measured", "by the encoders", 1.0),
+    ]
+    depth = Chart("depth [mm]", depths, [Band(0.0, 0.0, "quiet")], x="time [s]", height=2.1)
+    return {
+        "touch": (
+            [Chart("force [N]", forces, x="time [s]", xlim=near)],
+            "The force in the first half second after the touch.",
+        ),
+        "force": (
+            [Chart("force [N]", forces, height=2.1), depth],
+            "Force and depth of the tip. Encoders before elastic joints measure their deflection, too.",
+        ),
+        "torque": (_torques(record, asked), "Torque of each joint, the arm's weight included."),
+    }
 
 
-def _forces(axis: Axes, record: Record) -> None:
-    t = record["t"]
-    axis.plot(t, record["force_sampled"], color=style.MEASURED, linewidth=0.7, label="reading")
-    axis.plot(t, record["force"], color=style.F, linewidth=1.6, label="true")
-    wanted = np.where(record["phase"] == CONTACT, record["force_desired"], np.nan)
-    axis.plot(t, wanted, **style.KNOWN, label="desired")
-    style.legend(axis)
-
-
-def _force(record: Record, asked: Asked) -> tuple[Figure, str]:
-    drawing, (force, depth) = style.figure(2, height=2.1)
-    t = record["t"]
-    _forces(force, record)
-    force.set_ylabel("force [N]")
-    depth.plot(t, 1e3 * record["penetration"], color=style.F, linewidth=1.4, label="true")
-    seen = record["x_measured"] - asked.place.place
-    depth.plot(t, 1e3 * seen, color=style.MEASURED, linewidth=1.0, label="by the encoders")
-    depth.axhline(0.0, color=style.QUIET, linewidth=0.8)
-    depth.set(xlabel="time [s]", ylabel="depth [mm]")
-    style.legend(depth)
-    caption = (
-        "Force and depth of the tip. Encoders in front of elastic joints measure the joints' deflection besides the "
-        "surface's."
-    )
-    return drawing, caption
-
-
-def _torque(record: Record, asked: Asked) -> tuple[Figure, str]:
-    """A panel a joint, in per cent of its motor's limit; in N m where nobody says how much that is."""
-    n = asked.arm.joints
-    drawing, axes = style.grid((9.0, 1.9 * -(-n // 3)), -(-n // 3), 3)
+def _torques(record: Record, asked: Asked) -> list[Chart]:
+    """A chart a joint, in per cent of its motor's limit; in N m where nobody says how much that is."""
     limits = np.asarray(asked.arm.torque, dtype=float)
     known = bool(np.isfinite(limits).all())
-    for i, (axis, name) in enumerate(zip(axes, asked.arm.names, strict=False)):
-        scale = 100.0 / limits[i] if known else 1.0
-        axis.plot(record["t"], scale * record[f"torque{i + 1}"], color=style.INK, linewidth=1.2)
-        if known:
-            axis.set_ylim(-110.0, 110.0)
-            for end in (-100.0, 100.0):
-                axis.axhline(end, color=style.MEASURED, linewidth=1.0, linestyle="--")
-        axis.set_title(style.literal(name), loc="left")
-        axis.set(ylabel="of the limit [%]" if known else "torque [N m]", xlabel="time [s]")
-    for axis in axes[n:]:
-        axis.remove()
-    return drawing, "Torque of each joint, the arm's weight included."
+    scales = 100.0 / limits if known else np.ones(len(limits))
+    return [
+        Chart(
+            "of the limit [%]" if known else "torque [N m]",
+            [Series(record["t"], scale * record[f"torque{i}"], "ink", width=1.2)],
+            [Band(end, end, "measured", "", 1.0, "--") for end in ((-100.0, 100.0) if known else ())],
+            x="time [s]", title=name, ylim=(-110.0, 110.0) if known else None, height=1.9,
+        )
+        for i, (name, scale) in enumerate(zip(asked.arm.names, scales, strict=False), 1)
+    ]  # fmt: skip

@@ -10,13 +10,12 @@ import numpy as np
 from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, sentence
-from palpate.force.expected import OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
-from palpate.force.steps import BAND
+from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
-from palpate.report import style
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
-from palpate.report.figure_panels.panels import panels_of
+from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
@@ -76,6 +75,35 @@ def _peak(told: Tuning) -> str:
     if bound is None:
         return f"{told.peak:.4g} N predicted (no bound)"
     return f"{told.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
+
+
+def answer_of(
+    told: Tuning, inner: dict[str, object] | None, written: Sequence[object], *, verbose: bool
+) -> CommandAnswer:
+    """The answer of `palpate tune`.
+
+    Args:
+        told: the tuned loop.
+        inner: the arm's inner loop, if a log of it was given.
+        written: paths of the written files.
+        verbose: whether a terminal shows everything.
+    """
+    json, slide = told.to_json() | {"inner_loop": inner}, ""
+    if told.gains.slide is not None:
+        from palpate.force.sliding.slide_domain import slide_json, slide_sentence
+
+        json |= {"slide": slide_json(told.gains)}
+        slide = f"Slide: {slide_sentence(told.gains)}."
+
+    def display(console: Console) -> None:
+        if verbose:
+            show_all(told, console)
+        else:
+            show(told, console, written)
+        for line in (*filter(None, [slide]), *(f"written: {path}" for path in written if verbose)):
+            console.print(line, soft_wrap=True)
+
+    return CommandAnswer(json, show=display)
 
 
 def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:
@@ -166,7 +194,7 @@ def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> 
         cards={"": _cards(told)},
         lower={"Margins on the stiffest surface": _margins(told)},
         scale=_scale(told),
-        figures=[{"panels": panels_of(draw(told)), "caption": _touch_caption(told)}],
+        figures=[{"panels": panels([touch_chart(told)]), "caption": _touch_caption(told)}],
         folds=[
             ("All numbers", "and the proof's own statements", rows(told)),
             ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
@@ -256,25 +284,26 @@ def _scale(told: Tuning) -> dict[str, object]:
 
 
 def draw(told: Tuning) -> Figure:
+    """The chart of the first touch as a figure."""
+    return figure_of([touch_chart(told)])
+
+
+def touch_chart(told: Tuning) -> Chart:
     """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
-    with style.ink():
-        figure, (axis,) = style.figure(height=2.9)
-        axis.set(xlabel="time from the touch [s]", ylabel="force [N]")
-        force = told.gains.force
-        for step, name, colour in zip(
-            told.steps, ("softest", "stiffest"), (style.MEASURED, style.F), strict=True
-        ):
-            axis.plot(step.time, force * step.force, color=colour, linewidth=1.6, label=name)
-        axis.axhline(force, **style.KNOWN, label="desired")
-        axis.axhspan(force * (1.0 - BAND), force * (1.0 + BAND), color=style.MEASURED, alpha=0.2, linewidth=0)
-        if told.peak_bound is not None:
-            axis.axhline(told.peak_bound, color=style.INK, linewidth=1.6, label="proved: below")
-        longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
-        axis.set(
-            xlim=(0.0, max(2.5 * longest, 0.1)), ylim=(0.0, 1.15 * max(told.peak_bound or 0.0, told.peak))
-        )
-        style.legend(axis)
-    return figure
+    force, bound = told.gains.force, told.peak_bound
+    looks = zip(told.steps, ("softest", "stiffest"), ("measured", "F"), strict=True)
+    longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
+    bands = [
+        Band(force, force, label="desired", **KNOWN),
+        Band(force * (1.0 - BAND), force * (1.0 + BAND), "measured"),
+        *([] if bound is None else [Band(bound, bound, "ink", "proved: below", 1.6)]),
+    ]
+    return Chart(
+        "force [N]",
+        [Series(step.time, force * step.force, colour, name) for step, name, colour in looks],
+        bands, x="time from the touch [s]", xlim=(0.0, max(2.5 * longest, 0.1)),
+        ylim=(0.0, 1.15 * max(bound or 0.0, told.peak)), height=2.9,
+    )  # fmt: skip
 
 
 def _touch_caption(told: Tuning) -> str:

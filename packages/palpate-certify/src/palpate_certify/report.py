@@ -15,17 +15,14 @@ from palpate.force.describe import UNCOVERED as CASES
 from palpate.force.describe import bounds
 from palpate.force.sliding.slide_proof import slide_proof
 from palpate.force.tuning import RIGID, surface_ends
-from palpate.report import style
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
-from palpate.report.figure_panels.panels import panels_of
+from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, panels
 from palpate.report.numbers import quantity
 from palpate.text import printable
 from palpate_certify.controller_file import UNCOVERED, ControllerVerdict
 from palpate_certify.delayed_contact import DelayedContact
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from palpate.force import Certificate
     from palpate.force.certificate import CertificateVerdict
 
@@ -81,7 +78,7 @@ def page(verdict: ControllerVerdict, path: Path, command: str) -> str:
             scale=_scale(answer),
             figures=[
                 {
-                    "panels": panels_of(draw(verdict)),
+                    "panels": panels([edge_chart(verdict)]),
                     "caption": "From which stiffness on the first axis is unstable, by the delay. Dashed: the delay "
                     "given, and the stiffest surface asked for.",
                 }
@@ -143,26 +140,20 @@ def _scale(answer: dict[str, Any]) -> Any:
     return log_scale("Where it is stable", caption, "N/m", extents, answer["asked"])
 
 
-def draw(verdict: ControllerVerdict) -> Figure:
+def edge_chart(verdict: ControllerVerdict) -> Chart:
     """The edge of the first axis by the delay, as the file stands and corrected."""
     answer = verdict.answer
-    with style.ink():
-        figure, (axis,) = style.figure(height=2.9)
-        axis.set(xlabel="delay [ms]", ylabel="unstable from [N/m]", yscale="log")
-        delays = answer["delay_s"] * DELAYS
-        for loop, name, colour in (
-            (verdict.before, "as it stands", style.F),
-            (verdict.after, "corrected", style.MEASURED),
-        ):
-            if loop is not None:
-                edges = [_edge_at(loop, float(delay)) for delay in delays]
-                axis.plot(1e3 * delays, edges, color=colour, linewidth=1.6, label=name)
-        axis.axvline(1e3 * answer["delay_s"], **style.KNOWN)
-        axis.axhline(answer["asked"], **style.KNOWN)
-        low, high = np.log10(axis.get_ylim())
-        axis.set_ylim(10.0 ** np.floor(low), 10.0 ** np.ceil(high))
-        style.legend(axis)
-    return figure
+    delays, asked, given = answer["delay_s"] * DELAYS, answer["asked"], 1e3 * answer["delay_s"]
+    loops = ((verdict.before, "as it stands", "F"), (verdict.after, "corrected", "measured"))
+    series = [
+        Series(1e3 * delays, np.array([_edge_at(loop, float(delay)) for delay in delays]), colour, name)
+        for loop, name, colour in loops
+        if loop is not None
+    ]
+    bands, marks = [Band(asked, asked, **KNOWN)], [Mark([(given, given)], "ink")]
+    chart = Chart("unstable from [N/m]", series, bands, marks, x="delay [ms]", log="y", height=2.9)
+    low, high = np.log10(chart.range)
+    return replace(chart, ylim=(10.0 ** np.floor(low), 10.0 ** np.ceil(high)))
 
 
 def _edge_at(loop: DelayedContact, delay: float) -> float:

@@ -11,7 +11,7 @@ import pytest
 from cli import asked
 from palpate.bench.tables import parse
 from palpate.cli import main
-from palpate.logs.store import read_record
+from palpate.logs.tables.parquet import read_record
 from palpate_excitation.report.table import percent
 
 SURFACES = ("--stiffness", "3:8:N/mm", "--damping", "100:300", "--mass", "0.1:0.3")

@@ -1,7 +1,5 @@
 """Tried, judged and bred laboratories, each in an SQLite file at once, so that none is computed twice."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -12,7 +10,7 @@ import msgspec
 
 from palpate.errors import InputError
 from palpate.files import check_place
-from palpate.files.ownership import SQLITE_ID
+from palpate.files.writing import SQLITE_ID
 
 T = TypeVar("T")
 

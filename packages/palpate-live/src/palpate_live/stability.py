@@ -144,7 +144,7 @@ def _as_arm(experiment: Experiment, table: CautiousController) -> OfArm:
 
 def _of_arm(asked: OfArm) -> Iterator[Answer]:
     """By the certificate of the cautious law: its gain held at that for the stiffest surface, then while it adapts."""
-    from palpate.force.steps import margins
+    from palpate.force.expected import margins
 
     gains = asked.gains
     own = margins(gains, gains.seen_cap)

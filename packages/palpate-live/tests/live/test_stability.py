@@ -6,7 +6,7 @@ import pytest
 
 from live.conftest import PATIENCE, near
 from palpate.force.certificate import Claim
-from palpate.force.steps import margins as margins_on
+from palpate.force.expected import margins as margins_on
 from palpate.press.engines import gains_for, loop_of
 from palpate.report.numbers import plain
 from palpate_live import stability

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
-from palpate.report.figure_panels.panels import panels_of
+from palpate.report.chart import KNOWN, Band, Chart, Series, panels
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import CommandAnswer, Table, data_address
@@ -112,7 +112,7 @@ def answer_of(result: MapResult) -> CommandAnswer:
     more = further(result)
     said = sentence(result) + (f" {' '.join(more)}." if more else "")
     title = f"{len(result.map)} presses"
-    return CommandAnswer(title, f": {said}", tables(result), warnings(result), result.to_json())
+    return CommandAnswer(result.to_json(), title, f": {said}", tables(result), warnings(result))
 
 
 def next_rows(result: MapResult) -> list[tuple[str, str, str]]:
@@ -160,7 +160,7 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         ],
         figures=[
             {
-                "panels": panels_of(draw_cut(result)),
+                "panels": panels([cut_chart(result)]),
                 "caption": "The dashed line of the map, from left to right.",
             }
         ],
@@ -316,7 +316,7 @@ def _cut_ends(result: MapResult) -> tuple[Any, Any]:
     return ends if way[0] >= 0.0 else ends[::-1]
 
 
-def draw_cut(result: MapResult) -> Figure:
+def cut_chart(result: MapResult) -> Chart:
     """Stiffness, its interval and that of a next press along a line, and the presses beside it."""
     surface = result.map.surface
     begin, end = _cut_ends(result)
@@ -327,28 +327,20 @@ def draw_cut(result: MapResult) -> Figure:
     offsets = surface.coordinates(result.map.places) - begin
     along, beside = offsets @ way, np.abs(offsets @ np.array([-way[1], way[0]]))
     near = (beside < 0.05 * length) & (along >= 0.0) & (along <= length)
-    with style.ink():
-        figure, (axis,) = style.figure(height=2.6)
-        x = 1e3 * length * steps
-        axis.plot(x, seen.stiffness, color=style.K, linewidth=1.6, label="stiffness")
-        for both, line, label in ((seen.ci95, "--", "95 %"), (seen.next95, ":", "next press, 95 %")):
-            for ends, name in zip(both.T, (label, None), strict=True):
-                axis.plot(x, ends, color=style.K, linewidth=0.9, linestyle=line, label=name)
-        if near.any():
-            label, order = f"presses within {plain(50 * length, 2)} mm", np.argsort(along[near])
-            at, values = 1e3 * along[near][order], result.map.stiffness[near][order]
-            axis.plot(at, values, "o", color=style.INK, markersize=4, label=label)
-        if result.request.stiffer_than is not None:
-            axis.axhline(result.request.stiffer_than, **style.KNOWN, label="threshold")
-        axis.set(
-            xlabel="distance along the cut [mm]", ylabel="stiffness [N/m]", xlim=(0.0, x[-1]), yscale="log"
-        )
-        low = axis.get_ylim()[0]
-        power = 10.0 ** np.floor(np.log10(low))
-        axis.set_ylim(bottom=power * np.floor(low / power))  # on a page steps are counted from here
-        style.logarithmic(axis, "y")
-        style.legend(axis)
-    return figure
+    x, threshold = 1e3 * length * steps, result.request.stiffer_than
+    series = [Series(x, seen.stiffness, "K", "stiffness")]
+    for both, dash, label in ((seen.ci95, "--", "95 %"), (seen.next95, ":", "next press, 95 %")):
+        series += [
+            Series(x, ends, "K", name, 0.9, dash) for ends, name in zip(both.T, (label, ""), strict=True)
+        ]
+    if near.any():
+        label, order = f"presses within {plain(50 * length, 2)} mm", np.argsort(along[near])
+        at, values = 1e3 * along[near][order], result.map.stiffness[near][order]
+        series.append(Series(at, values, "ink", label, dots=4.0))
+    bands = [] if threshold is None else [Band(threshold, threshold, label="threshold", **KNOWN)]
+    return Chart(
+        "stiffness [N/m]", series, bands, x="distance along the cut [mm]", xlim=(0.0, float(x[-1])), log="y"
+    )
 
 
 def _readout(result: MapResult, figure: Figure) -> dict[str, Any]:

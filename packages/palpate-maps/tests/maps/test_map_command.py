@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 
 from palpate.cli import main
 from palpate.errors import InputError
-from palpate.logs.store import write_record
+from palpate.logs.tables.parquet import write_record
 from palpate.records import Record
 from palpate_maps.phantom import Phantom, PhantomLump, load_phantom
 from palpate_maps.presses import Presses, merge_presses, read_table

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,15 +17,12 @@ from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
-from palpate.report.figure_panels.panels import panels_of
+from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
 from palpate.report.numbers import plain, quantity
 from palpate.report.page import data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, SETTLED, figures_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
     ("x", "y", "z"), "m"
@@ -95,10 +93,9 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     units = {name: _UNITS.get(name, "1") for name in columns}
     write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
-    with style.ink():
-        drawing = _draw(rows, gains, summary)
-        style.save(drawing, folder / "slide.png")
-        panels = panels_of(drawing)
+    charts = _charts(rows, gains, summary)
+    style.save(figure_of(charts), folder / "slide.png")
+    shown = panels(charts)
     alerts = [
         {"tone": "warn", "title": "", "text": f"{text[0].upper()}{text[1:]}."} for text in summary["troubles"]
     ]
@@ -117,7 +114,7 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
         sentence=sentence(summary),
         about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",
         alerts=alerts, cards={"": _cards(summary)}, pairs=pairs, folds=_along(summary),
-        figures=[{"panels": panels[:4], "caption": caption}, {"panels": panels[4:], "caption": caption}],
+        figures=[{"panels": shown[:4], "caption": caption}, {"panels": shown[4:], "caption": caption}],
         source=("The gains", gains.to_toml()),
     )  # fmt: skip
     write_text(folder / "report.html", answer_page(answer, room="slide", command=summary["command"]))
@@ -151,12 +148,11 @@ def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
     return [("Stiffness along the path", f"{len(rows)} places, for palpate map --table places.csv", rows)]
 
 
-def _draw(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
+def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
     """Force error, speed, normal, friction and stiffness against the path; stretches where the slide was slower."""
     on = rows[:, COLUMNS.index("sliding")] > 0.0
     kept = rows[on] if on.any() else rows
     c = dict(zip(COLUMNS, kept[:: max(len(kept) // 2000, 1)].T, strict=True))
-    drawing, axes = style.figure(5, height=1.7)
     step = np.linalg.norm(np.diff(np.stack([c[a] for a in "xyz"], 1), axis=0), axis=1)
     way = 1e3 * np.append(0.0, np.cumsum(step))
     within = 0.1 * gains.force
@@ -165,31 +161,30 @@ def _draw(rows: Array, gains: Gains, summary: dict[str, Any]) -> Figure:
         1e3 * summary["slide"]["speed_m_s"],
         np.degrees(CHI2_95 * c["cone"]),
     )
-    for panel, label, value, ends, known, color in (
-        (axes[0], "force error [N]", c["normal_force"] - c["desired"], (), (-within, within), style.F),
-        (axes[1], "speed [mm/s]", 1e3 * c["speed"], (), (asked,), style.INK),
-        (axes[2], "normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), style.INK),
-        (axes[3], "friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), style.INK),
-        (axes[4], "K [N/m]", c["stiffness"], _interval(c, "stiffness"), (truth["stiffness"],), style.K),
-    ):  # fmt: skip
-        panel.plot(way, value, color=color, linewidth=1.2, label="estimate" if ends else "")
-        for i, end in enumerate(ends):
-            panel.plot(way, end, color=style.MEASURED, linewidth=1.0, label="" if i else "95 %")
-        for level in known:
-            panel.axhline(level, **style.KNOWN)
-        panel.set_ylabel(label)
-        settled = np.concatenate(
-            [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)] + [np.array(known)]
-        )
-        settled = settled[np.isfinite(settled)]
-        if len(settled):
-            low, high = float(settled.min()), float(settled.max())
-            low = 0.0 if panel in (axes[1], axes[2]) else low
-            panel.set_ylim(low - 0.08 * (high - low) - 1e-9, high + 0.08 * (high - low) + 1e-9)
-        for start, end in _slower(way, c["speed"], summary["slide"]["speed_m_s"]):
-            panel.axvspan(start, end, color=style.DOUBT, alpha=0.12, linewidth=0)
-    axes[-1].set_xlabel("path [mm]")
-    return drawing
+    slower = _slower(way, c["speed"], summary["slide"]["speed_m_s"])
+    charts = []
+    for label, value, ends, known, colour, least in (
+        ("force error [N]", c["normal_force"] - c["desired"], (), (-within, within), "F", None),
+        ("speed [mm/s]", 1e3 * c["speed"], (), (asked,), "ink", 0.0),
+        ("normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), "ink", 0.0),
+        ("friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), "ink", None),
+        ("K [N/m]", c["stiffness"], _interval(c, "stiffness"), (truth["stiffness"],), "K", None),
+    ):
+        series = [Series(way, value, colour, "estimate" if ends else "", 1.2)]
+        series += [Series(way, end, "measured", "" if i else "95 %", 1.0) for i, end in enumerate(ends)]
+        settled = [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)]
+        bands, marks = [Band(level, level, **KNOWN) for level in known], [Mark(slower, "warn")]
+        ylim = _limits(np.concatenate([*settled, np.array(known)]), least)
+        charts.append(Chart(label, series, bands, marks, ylim=ylim, height=1.7))
+    return [*charts[:-1], replace(charts[-1], x="path [mm]")]
+
+
+def _limits(values: Array, least: float | None) -> tuple[float, float] | None:
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return None
+    low, high = float(known.min()) if least is None else least, float(known.max())
+    return low - 0.08 * (high - low) - 1e-9, high + 0.08 * (high - low) + 1e-9
 
 
 def _slower(way: Array, speed: Array, asked: float) -> list[tuple[float, float]]:

@@ -24,7 +24,7 @@ import palpate
 from palpate.bench.build import AnyExperiment, build_any
 from palpate.bench.speed import cores
 from palpate.errors import InputError
-from palpate.logs.store import write_parquet
+from palpate.logs.tables.parquet import write_parquet
 from palpate.plugins import Plugin
 from palpate.records import Record
 from palpate_studies.metrics import Window, metric_of

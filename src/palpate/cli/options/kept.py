@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter
 from palpate.cli.options.common import QUIET, Preset
 from palpate.errors import InputError, unknown
 from palpate.files import check_place, read_text, read_toml, write_text
-from palpate.files.ownership import MADE
+from palpate.files.writing import MADE
 from palpate.logs.presets import preset
 
 if TYPE_CHECKING:

@@ -1,9 +1,11 @@
-"""Columns of a Parquet file, fields of structs included; polars reads them in a process of their own."""
+"""Parquet: columns of any file, structs included, read by polars in a process of its own; records, in and out."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +15,17 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files import SIGNATURE
+from palpate.files import SIGNATURE, whole
 from palpate.files.confined import read_confined
-from palpate.files.limits import Limits, ReadingBudget
+from palpate.files.limits import ReadingBudget, ReadingLimits
 from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
+from palpate.records import Record
 
 if TYPE_CHECKING:
     import polars
+    from polars import DataFrame
+
 
 _BYTES = 8
 _KEPT = 8
@@ -119,7 +124,7 @@ def _query(
     return read_confined(__name__, path, "Parquet", budget, question)
 
 
-def stored_about(path: Path, limits: Limits | None = None) -> About | None:
+def stored_about(path: Path, limits: ReadingLimits | None = None) -> About | None:
     """Units and metadata that palpate left in a Parquet file; None where there are none.
 
     Raises:
@@ -134,7 +139,7 @@ def stored_about(path: Path, limits: Limits | None = None) -> About | None:
         ) from None
 
 
-def head(path: Path, limits: Limits | None = None) -> ParquetHead:
+def head(path: Path, limits: ReadingLimits | None = None) -> ParquetHead:
     """Read the statements of a Parquet file about itself.
 
     Raises:
@@ -143,17 +148,19 @@ def head(path: Path, limits: Limits | None = None) -> ParquetHead:
     return _open(path, limits)[0]
 
 
-def _open(path: Path, limits: Limits | None) -> tuple[ParquetHead, Array | None]:
+def _open(path: Path, limits: ReadingLimits | None) -> tuple[ParquetHead, Array | None]:
     """The head; and all columns, shape (columns, rows), of a small record of palpate's own."""
     try:
         state = path.stat()
     except FileNotFoundError:
         raise InputError(f"there is no file {path}; check the path") from None
-    return _head(path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), limits or Limits())
+    return _head(
+        path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), limits or ReadingLimits()
+    )
 
 
 @lru_cache(maxsize=_KEPT)
-def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[ParquetHead, Array | None]:
+def _head(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> tuple[ParquetHead, Array | None]:
     arrays, also = read_confined(__name__, path, "Parquet", ReadingBudget(path, limits))
     return msgspec.convert(also, ParquetHead), arrays.get("numbers")
 
@@ -232,3 +239,50 @@ def _fields(prefix: str, own: polars.Expr, struct: polars.Struct) -> Iterator[tu
             yield from _fields(name, value, field.dtype)
         elif not isinstance(field.dtype, polars.List | polars.Array):
             yield name, value
+
+
+def write_record(record: Record, path: str | Path) -> Path:
+    """Write a record so that the file is either whole or not there.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InputError: the folder does not exist, or palpate may not write over what stands there.
+    """
+    import polars
+
+    path = Path(path)
+    about = json.dumps({"units": dict(record.units), "meta": dict(record.meta)}, allow_nan=False)
+    write_parquet(
+        polars.DataFrame({name: np.asarray(column, float) for name, column in record.columns.items()}),
+        about,
+        path,
+    )
+    return path
+
+
+def write_parquet(frame: DataFrame, about: str, path: Path) -> None:
+    """Write a table as Parquet, whole or not at all, with a text about it in the file's own metadata.
+
+    Raises:
+        InputError: palpate may not write there.
+        OSError: the disk is full.
+    """
+    packed = BytesIO()  # what a library raises when the disk is full is its own affair
+    frame.write_parquet(packed, metadata={SIGNATURE: about})
+    with whole(path) as draft:
+        draft.write_bytes(packed.getbuffer())
+
+
+def read_record(path: str | Path, limits: ReadingLimits | None = None) -> Record:
+    """Read back what `write_record` wrote.
+
+    Raises:
+        InputError: the file is missing, is no Parquet file, or was not written by palpate.
+    """
+    path, limits = Path(path), limits or ReadingLimits()
+    about = stored_about(path, limits)
+    if about is None:
+        raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")
+    return Record(read_columns(path, ReadingBudget(path, limits)), about.units, about.meta)

@@ -14,8 +14,9 @@ from palpate.bench.force_input import CONTACT, LOST
 from palpate.files import write_text
 from palpate.records import Record
 from palpate.report import style
+from palpate.report.chart import KNOWN, Chart, Series, figure_of, page_figures, panels
 from palpate.report.numbers import NONE, quantity
-from palpate.report.page import Table, page
+from palpate.report.page import Table, render
 from palpate.report.run.table import notes, sentence, settling
 
 if TYPE_CHECKING:
@@ -227,21 +228,23 @@ def write_one_direction(
         dpi: of a PNG; `style.DPI` if none is given.
     """
     experiment = record.meta["experiment"]
-    figures = {}
-    for name, draw, caption in DRAWN if summary["force"] is not None else ():
-        with style.ink():
-            drawing = draw(record)
-            for ending in dict.fromkeys((*endings, ".png")):
-                style.save(drawing, folder / f"{name}{ending}", dpi)
-        figures[folder / f"{name}.png"] = caption
-    text = page(
+    figures = []
+    for name, (charts, caption) in (
+        one_direction_charts(record).items() if summary["force"] is not None else ()
+    ):
+        drawing = figure_of(charts)
+        for ending in dict.fromkeys((*endings, ".png")):
+            style.save(drawing, folder / f"{name}{ending}", dpi)
+        figures.append({"panels": panels(charts), "caption": caption})
+    text = render(
+        "page.html",
         title=experiment["title"],
         about=f"{sentence(summary)} {experiment['about']}",
         tables=one_direction_tables(record, summary),
-        figures=figures,
         command=summary["command"],
         source=source,
         notes=notes(summary),
+        **page_figures(figures),
     )
     write_text(folder / "report.html", text)
 
@@ -279,35 +282,34 @@ def _world(record: Record) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _force_panel(record: Record) -> Figure:
-    figure, (force, speed) = style.figure(2, height=2.3)
+def one_direction_charts(record: Record) -> dict[str, tuple[list[Chart], str]]:
+    """Charts of a run in one direction and their caption, by the name of their figure."""
     since, shown = around_contact(record, BEFORE_CONTACT)
-    style.panel(force, "force on the surface [N]")
-    measured, true = record["force_measured"][shown], record["force"][shown]
-    force.plot(since, measured, color=style.MEASURED, linewidth=0.8, label="reading")
-    force.plot(since, true, color=style.F, linewidth=1.6, label="true")
+    below = "time since the touch [s]"
     desired = np.where(record["phase"] == CONTACT, record["force_desired"], np.nan)[shown]
-    force.plot(since, desired, **style.KNOWN, label="desired")
-    style.legend(force)
-    style.panel(speed, "commanded speed [mm/s]", "time since the touch [s]")
-    speed.plot(since, 1e3 * record["speed"][shown], color=style.INK, linewidth=0.9)
-    return figure
-
-
-def _stiffness_bound(record: Record) -> Figure:
-    figure, (axis,) = style.figure(1, height=2.4)
-    since, shown = around_contact(record, BEFORE_CONTACT)
-    style.panel(axis, "stiffness [N/m]", "time since the touch [s]")
-    axis.plot(since, record["bound"][shown], color=style.K, linewidth=1.6, label="K_u, the law's upper bound")
-    axis.plot(
-        since,
-        _true_stiffness(record)[shown],
-        **style.KNOWN,
-        label="truth, with respect to the measured position",
+    forces = [
+        Series(since, record["force_measured"][shown], "measured", "reading", 0.8),
+        Series(since, record["force"][shown], "F", "true"),
+        Series(since, desired, label="desired", **KNOWN),
+    ]
+    speed = Series(since, 1e3 * record["speed"][shown], "ink", width=0.9)
+    true = Series(
+        since, _true_stiffness(record)[shown], label="truth, with respect to the measured position", **KNOWN
     )
-    axis.set_yscale("log")
-    style.legend(axis)
-    return figure
+    bound = Series(since, record["bound"][shown], "K", "K_u, the law's upper bound")
+    return {
+        "force": (
+            [
+                Chart("force on the surface [N]", forces, height=2.3),
+                Chart("commanded speed [mm/s]", [speed], x=below, height=2.3),
+            ],
+            "Force on the surface, and the commanded speed; times count from the touch.",
+        ),
+        "bound": (
+            [Chart("stiffness [N/m]", [bound, true], x=below, log="y", height=2.4)],
+            "The law's upper bound of the stiffness (not its estimate). It falls as the readings tell more.",
+        ),
+    }
 
 
 def _true_stiffness(record: Record) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -317,17 +319,3 @@ def _true_stiffness(record: Record) -> np.ndarray[Any, np.dtype[np.float64]]:
     later = surface["later"] or surface["stiffness"]
     own = np.where(since < surface["changes"], surface["stiffness"], later)
     return own / (1.0 + own / loop["series"]) if loop["kind"] == "position" else own
-
-
-DRAWN = (
-    (
-        "force",
-        _force_panel,
-        "Force on the surface, and the commanded speed; times count from the touch.",
-    ),
-    (
-        "bound",
-        _stiffness_bound,
-        "The law's upper bound of the stiffness (not its estimate). It falls as the readings give more information.",
-    ),
-)

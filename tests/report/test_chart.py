@@ -1,0 +1,69 @@
+"""A chart in a figure and in a page: the same lines, levels and marks, over the same axes."""
+
+import base64
+
+import numpy as np
+import pytest
+
+from palpate.report.chart import COLOURS, KNOWN, MOST, Band, Chart, Mark, Series, figure_of, panels
+
+T = np.linspace(0.0, 4.0, 40_001)
+
+
+def opened(column):
+    """As the page unpacks it; gaps and places that a line does not have are not numbers."""
+    if isinstance(column, list):
+        return np.array([np.nan if v in ("absent", None) else v for v in column])
+    codes = np.frombuffer(base64.b64decode(column["b"]), "<i2")
+    return np.where(codes < -32700, np.nan, (codes + 32500.0) * column["s"] + column["o"])
+
+
+def force():
+    values = np.sin(T)
+    values[12_345] = 9.0
+    return Chart(
+        "force [N]",
+        [Series(T, values, "F", "true"), Series(T[::1000], T[::1000], "measured", "reading", dots=4.0)],
+        [Band(0.5, 0.5, label="desired", **KNOWN), Band(-0.1, 0.1, "measured")],
+        [Mark([(1.0, 1.0)], "fail"), Mark([(2.0, 3.0)], "warn", "slower")],
+        xlim=(0.0, 3.5),
+    )
+
+
+def test_a_figure_and_a_page_show_the_same():
+    chart, below = force(), Chart("depth [mm]", [Series(T, T, "K")], x="time [s]", xlim=(0.0, 3.5), log="y")
+    axis, lower = figure_of([chart, below]).axes
+    shown, under = panels([chart, below])
+    spec, columns = shown["spec"], shown["columns"]
+    t, true = opened(columns["t"]), opened(columns["c0"])
+    assert len(t) <= 1.1 * MOST
+    assert np.nanmax(true) == pytest.approx(np.max(axis.lines[0].get_ydata()), abs=1e-3)  # its peak is kept
+    assert axis.lines[0].get_color() == COLOURS[spec["series"][0]["colour"]]
+    assert axis.get_xlim() == pytest.approx((t[0], t[-1]), abs=1e-3)
+    assert axis.get_ylim() == pytest.approx(spec["range"])
+    assert lower.get_ylim() == pytest.approx(under["spec"]["range"])
+    assert lower.get_yscale() == "log"
+    assert under["spec"]["log"] == "y"
+    legend = [text.get_text() for text in axis.get_legend().get_texts()]
+    named = [one["label"] for one in (*spec["series"], *spec["keys"]) if not one.get("silent")]
+    assert legend == named == ["true", "reading", "desired", "slower"]
+    assert spec["marks"] == [{"x": 1.0, "colour": "fail"}]
+    assert spec["shades"] == [[2.0, 3.0, "warn"]]
+    assert shown["group"] == under["group"]
+    assert spec["x"] == under["spec"]["x"] == "time [s]"  # from the one that it is zoomed with
+    assert (spec["unit"], under["spec"]["series"][0]["label"]) == ("s", "depth")
+
+
+def test_charts_in_rows_have_an_axis_each():
+    charts = [
+        Chart("torque [N m]", [Series(T, k * T, "ink")], x="time [s]", title=f"q{k}") for k in (1, 2, 3, 4)
+    ]
+    figure = figure_of(charts, columns=3)
+    assert [axis.get_title(loc="left") for axis in figure.axes] == ["q1", "q2", "q3", "q4"]
+    assert all(axis.get_xlabel() == "time [s]" for axis in figure.axes)
+
+
+def test_gaps_stay_gaps():
+    values = np.where((T > 1.0) & (T < 2.0), np.nan, T)
+    (shown,) = panels([Chart("force [N]", [Series(T, values, "F")])])
+    assert np.isnan(opened(shown["columns"]["c0"])).any()
