@@ -2,8 +2,8 @@
 
 They keep its normal of that moment and its K_u. `fixed normal` turns neither; `normal from velocity` makes it
 perpendicular to the way of the last 40 ms; `fzi-like` moves the tip by the force error as a vector, along the surface
-against a spring of K_u to a target that moves as asked, without which friction would hold the tip; `admittance` has a mass
-of three lags.
+against a spring of K_u to a target that moves as asked, without which friction would hold the tip; `admittance` has
+a mass of three lags.
 """
 
 from __future__ import annotations
