@@ -64,7 +64,7 @@ def rival_step(law, kind, s, desired, force, position, direction):
     flat = direction - (direction @ n) * n
     across = (law.speed / max(sqrt(flat @ flat), 0.1)) * flat
     g = gain(c, s[BOUND])
-    if kind == FZI:  # the whole vector of force error, and a spring to a target that moves along, move the tip
+    if kind == FZI:  # the whole force error, and a spring to a target that moves along, move the tip
         put_vector(s, FILTERED, filtered + c.tick * across)
         behind = s[BOUND] * (filtered - position)
         return g * (desired * n - force + behind - (behind @ n) * n)
