@@ -6,7 +6,7 @@ from palpate.identification.contacts import Contacts
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import Motion
 from palpate.identification.options import Lag
-from palpate.identification.problem.problem import Memory, Problem, touching
+from palpate.identification.problem import Memory, Problem, touching
 
 FORCE = np.arange(200.0)
 USABLE = np.ones(200, bool)

@@ -159,7 +159,7 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     """
     apart = point.stiffness.contributions["repetition"]
     own, place = found.budget["repetition"], found.names.index("K")
-    variance, freedom = own.variance.copy(), np.broadcast_to(own.freedom, own.variance.shape).copy()
+    variance, freedom = own.variance.copy(), own.each.copy()
     if apart.std**2 > variance[place]:
         variance[place], freedom[place] = apart.std**2, apart.freedom
     return found.budget | {"repetition": Spread(variance, freedom)}
@@ -294,7 +294,7 @@ def _remedy(name: str, terms: Terms) -> str:
     return NOISE.remedy
 
 
-def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
     """The unit of one parameter of a model."""
     units = impedance_units(terms.force_unit, terms.position_unit)
     plain = units["K"] == "1"

@@ -287,6 +287,10 @@ def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, reque
         ("raises_to", "** 0.5 for a root"),
         ("prints_into", "a number or a truth"),
         ("walks_over", "count with range"),
+        ("names_an_argument", "all its arguments in order"),
+        ("writes_on_the_way", "alone in a statement"),
+        ("adds_a_text", "no type that Numba infers"),
+        ("goes_on", "continue has no C"),
     ],
 )
 def test_a_law_outside_the_subset_is_refused_with_file_line_and_remedy(function, says):
@@ -334,6 +338,49 @@ def walks_over(x):
     for y in (x, x):
         total += y
     return total
+
+
+@law
+def product(x, y=2.0):
+    """A law with a default."""
+    return x * y
+
+
+@law
+def names_an_argument(x):
+    """A law that names an argument of another."""
+    return product(x, y=3.0)
+
+
+@law
+def puts(a, x):
+    """A law that writes to an array."""
+    a[0] = x
+    return x
+
+
+@law
+def writes_on_the_way(x):
+    """A law with a call that writes, in an expression that reads: C has no order of the two."""
+    a = np.zeros(2)
+    b = a
+    return puts(b, x) + a[0]
+
+
+@law
+def adds_a_text(x):
+    """A law that Numba refuses."""
+    return x + "N"
+
+
+@law
+def goes_on(x):
+    """A law with a statement that the subset has not."""
+    for _ in range(3):
+        if x > 1.0:
+            continue
+        x = x + 1.0
+    return x
 
 
 @needs_compiler

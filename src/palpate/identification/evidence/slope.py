@@ -13,7 +13,7 @@ from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.tangents import Slopes
+from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL

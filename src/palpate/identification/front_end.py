@@ -12,7 +12,7 @@ from palpate.identification.filters.sensor_path import PositionNoise, SensorPath
 from palpate.identification.filters.state_variable import Chain, low_passed, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Options, lag_prior
-from palpate.identification.problem.problem import FREE_ROWS, Memory, Problem, Rows, ends, numbered, touching
+from palpate.identification.problem import FREE_ROWS, Memory, Problem, Rows, ends, numbered, touching
 from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass

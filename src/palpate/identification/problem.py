@@ -17,11 +17,12 @@ from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters.bandwidth import highest_motion
-from palpate.identification.filters.state_variable import white_noise
+from palpate.identification.filters.sensor_path import position_noise
+from palpate.identification.filters.state_variable import ABOVE_FLOOR, FEWEST_SEGMENT, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Lag
 from palpate.identification.sampling import Channels
+from palpate.signals.samples import periodogram
 
 Rows = NDArray[np.intp]
 
@@ -206,3 +207,40 @@ def _pieces(count: int) -> Mask:
     every = -(-pieces // (MOST_ROWS // _PIECE))
     kept: Mask = (np.arange(count) // _PIECE) % every == 0
     return kept
+
+
+_CONTACTS = 32
+_APART = 3.0
+_MOST = 0.99
+_TAPER = 0.1
+
+
+def highest_motion(motion: Motion) -> float:
+    """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
+
+    Below it lies 99 % of the energy of the probe's speed in the contacts (the longest, where they are many), as far as
+    that stands above the position's own noise. Where a clean spectrum at last meets its floor is far above that, and no
+    motion.
+    """
+    rows = motion.instants.astype(np.intp)
+    step = np.diff(rows)
+    contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
+    stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
+    told = [stretch for stretch in sorted(stretches, key=len)[-_CONTACTS:] if len(stretch) >= FEWEST_SEGMENT]
+    if not told:
+        return float("inf")
+    spectra = [_energy(stretch) for stretch in told]
+    frequency, energy = (np.concatenate(parts) for parts in zip(*spectra, strict=True))
+    order = np.argsort(frequency, kind="stable")
+    below = np.cumsum(energy[order])
+    least = 1 / max(map(len, told))
+    return max(float(frequency[order][np.searchsorted(below, _MOST * below[-1])]), least) / motion.chain.dt
+
+
+def _energy(position: Array) -> tuple[Array, Array]:
+    """Of the speed in a stretch by frequency [1/sample], where it stands above the noise; both of shape (l,)."""
+    speed = np.diff(position)
+    frequency, power = periodogram(speed, _TAPER)
+    noise = position_noise([position])
+    floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
+    return frequency, np.where(power > ABOVE_FLOOR * floor, power, 0.0) * len(speed) / len(frequency)
