@@ -426,6 +426,22 @@ def test_the_operators_of_python_are_those_of_c(tmp_path):
         assert ours.hex() == theirs.hex() or (ours != ours and theirs != theirs), (name, a, b)
 
 
+@needs_compiler
+def test_the_quotients_of_whole_numbers_are_those_of_c(tmp_path):
+    """Remainder and quotient of Python by whole numbers of either sign."""
+    from palpate_native.translation import OPERATORS
+
+    cases = [(a, b) for a in range(-7, 8) for b in (-7, -3, -2, -1, 1, 2, 3, 7)]
+    functions = "\n".join(OPERATORS[name, "int64_t"] for name in ("modulo", "floored"))
+    calls = "".join(
+        f"    if (modulo({a}, {b}) != {a % b} || floored({a}, {b}) != {a // b}) return 1;\n" for a, b in cases
+    )
+    text = f"#include <stdint.h>\n{functions}\nint main(void) {{\n{calls}    return 0;\n}}\n"
+    (tmp_path / "whole.c").write_text(text)
+    subprocess.run(["cc", "-std=c99", "whole.c", "-o", "whole"], cwd=tmp_path, check=True)
+    subprocess.run([tmp_path / "whole"], check=True)
+
+
 def spelled(x):
     return "NAN" if x != x else ("-" if x < 0.0 else "") + "INFINITY" if abs(x) == float("inf") else repr(x)
 
