@@ -33,7 +33,7 @@ LARGEST = {
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2509, tokens=19220),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1315, tokens=9043),
-    "packages/palpate-slide/src/palpate_slide": Weight(files=10, lines=1768, tokens=14463),
+    "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2704, tokens=23675),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3202, tokens=18780),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6343, tokens=42591),
 }

@@ -7,6 +7,7 @@ own mass and compliance are removed.
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
@@ -291,6 +292,16 @@ def identify_contact(
     spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
     in_space = FORCE[0] in record.columns
     if in_space:
+        for entry in entry_points(group="palpate.slides"):
+            slid = entry.load()(
+                signals_of(record, frame or ContactFrame()),
+                frame or ContactFrame(),
+                arm,
+                tolerance,
+                calibration,
+            )
+            if slid is not None:
+                return slid, record
         record = project(record, frame or ContactFrame())
         spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
     elif inertia is not None and wrong_sign(inertia):
