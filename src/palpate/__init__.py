@@ -32,8 +32,6 @@ Names and rooms are imported when they are first used, so that `import palpate` 
 a shell: `palpate --help`.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

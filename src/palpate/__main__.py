@@ -1,7 +1,5 @@
 """`python -m palpate` is the program `palpate`."""
 
-from __future__ import annotations
-
 import sys
 
 from palpate.cli import main

@@ -1,7 +1,5 @@
 """Kinds of array that pass between functions; each docstring states shapes and units."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

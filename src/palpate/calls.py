@@ -1,7 +1,5 @@
 """The calls of `import palpate`: read and identify a record, a file or a table, and pool many, in one line each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import signature

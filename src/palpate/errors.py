@@ -1,7 +1,5 @@
 """Errors that palpate raises for wrong input."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from difflib import get_close_matches
 

@@ -5,8 +5,6 @@ A file is data, and may be a stranger's: a name in it is imported only if the us
 as a text, and nothing that reads them comes here.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import importlib.util

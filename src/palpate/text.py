@@ -1,7 +1,5 @@
 """Text from outside, made safe to show: names in a log are a stranger's."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import unicodedata

@@ -1,7 +1,5 @@
 """The units that logs use, and their way into SI. Inside palpate everything is SI."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

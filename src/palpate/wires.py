@@ -1,7 +1,5 @@
 """Interface of a wire to an arm: one reading at a time, one command at a time, and rest."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import Array
-from palpate.identification.filters.bandwidth import highest_motion
 from palpate.identification.filters.state_variable import Chain
 from palpate.identification.models import Motion
+from palpate.identification.problem import highest_motion
 
 DT = 1e-3
 TIME = np.arange(20_000) * DT

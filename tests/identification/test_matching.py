@@ -168,7 +168,7 @@ def test_the_noise_out_of_contact_is_the_sensors():
 def test_a_probe_that_never_leaves_counts_from_the_middle_of_its_motion():
     record = pressed_along(within)
     question, clock = asked(record, bonded=True)
-    assert question.touch is None
+    assert question.with_touches is None
     assert question.with_touches is None
     assert question.free == ()
     inside = question.motion.position[clock.rows[question.motion.rows]]

@@ -9,7 +9,7 @@ from identification.synthetic_contacts import pressed, record
 from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.identification.sampling import channels_of, last_digit
-from palpate.identification.strokes import strokes_of
+from palpate.identification.steady_press import strokes_of
 
 
 def test_a_jump_of_the_time_that_would_fill_the_memory_is_refused():

@@ -19,10 +19,10 @@ from foreign.scoring import record_of
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter, Verdict, identify
 from palpate.identification.sampling import channels_of
-from palpate.identification.strokes import strokes_of
+from palpate.identification.steady_press import strokes_of
 from palpate.logs import read_log
 from palpate.report.identification.answer import lines
-from palpate.report.identification.words import UNTOUCHED, formatted, sentence
+from palpate.report.identification.words import UNTOUCHED, full_number, sentence
 
 DATA = Path(__file__).parents[3] / "shared/data"
 _SURFACES, _NUISANCES = (
@@ -55,7 +55,7 @@ def check(found, record):
     number = point.stiffness
     K = found.parameters["K"]
     if number.verdict is Verdict.IDENTIFIED and K.unit == number.unit:
-        assert formatted(number) in table.partition("\n\n")[0] or formatted(number) in first
+        assert full_number(number) in table.partition("\n\n")[0] or full_number(number) in first
         if point.source == "press" and K.verdict is Verdict.IDENTIFIED:
             # A solid that relaxes is stiffer while it is pressed than at rest: by its branch's stiffness at most.
             branch = found.parameters["K1"].ci95[1] if "K1" in found.parameters else 0.0

@@ -14,7 +14,7 @@ from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.budget import Spread
 from palpate.identification.uncertainty import (
     Contribution,
-    Uncertainty,
+    Measurement,
     correlations,
     effective_freedom,
     student,
@@ -35,13 +35,13 @@ def test_the_end_gauge_of_annex_h1():
         "expansion": Contribution(2.9, 50.0),
         "temperature": Contribution(16.6, 2.0),
     }
-    found = Uncertainty(parts)
+    found = Measurement(900.0, parts)
     assert round(found.combined) == 32
     assert found.freedom == pytest.approx(16.7, abs=0.1)
     coverage = student(floor(found.freedom), 0.99)
     assert round(coverage, 2) == 2.92
     assert round(coverage * 32) == 93
-    assert found.coverage == pytest.approx(student(found.freedom), rel=1e-12)
+    assert found.half / found.combined == pytest.approx(student(found.freedom), rel=1e-12)
 
 
 def test_the_resistance_and_reactance_of_annex_h2():
@@ -86,7 +86,7 @@ def test_the_thermometer_of_annex_h3():
 def test_effective_degrees_of_freedom():
     assert effective_freedom([[1.0], [1.0]], [[4.0], [4.0]]) == pytest.approx([8.0])
     assert effective_freedom([[1.0], [0.0]], [[4.0], [1.0]]) == pytest.approx([4.0])
-    assert Uncertainty({"lag": Contribution(2.0)}).freedom == inf
+    assert Measurement(1.0, {"lag": Contribution(2.0)}).freedom == inf
     assert student(1e9) == pytest.approx(1.96, abs=1e-4)
 
 
@@ -107,16 +107,17 @@ def test_the_expanded_uncertainty_is_the_half_width(logs):
         numbers = [p for p in (*point, *found.parameters.values()) if p.value is not None]
         assert numbers
         for p in numbers:
-            own = p.uncertainty
-            assert own.expanded_uncertainty == pytest.approx((p.ci95[1] - p.ci95[0]) / 2)
-            assert own.coverage * own.combined == pytest.approx(own.expanded_uncertainty)
-            assert own.coverage >= student(own.freedom) * (1 - 1e-4)
-            listed = [own.coverage * part.std for part in own.contributions.values()]
-            assert np.hypot.reduce(listed) == pytest.approx(own.expanded_uncertainty)
+            own = p.measurement
+            coverage = own.half / own.combined
+            assert own.half == pytest.approx((p.ci95[1] - p.ci95[0]) / 2)
+            assert coverage >= student(own.freedom) * (1 - 1e-4)
+            listed = [coverage * part.std for part in own.contributions.values()]
+            assert np.hypot.reduce(listed) == pytest.approx(own.half)
         for name in found.parameters.keys() & {"K", "B", "M"}:
             p = found.parameters[name]
             if p.value is not None and p is not found.working_point.stiffness:
-                assert p.uncertainty.coverage == pytest.approx(student(p.uncertainty.freedom), rel=1e-4)
+                coverage = p.measurement.half / p.measurement.combined
+                assert coverage == pytest.approx(student(p.measurement.freedom), rel=1e-4)
 
 
 def test_an_input_times_its_sensitivity_is_its_contribution(logs):

@@ -20,16 +20,16 @@ from scipy.io import savemat
 
 from logs.ros_bags import storage, wrench, write_bag
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs import read_log, read_record
-from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
 from palpate.logs.listing import list_log
 from palpate.logs.read import measured_by
+from palpate_bags import Bag
 
 T = np.arange(50) / 100
 COLUMNS = {"time": "t", "position": "x", "force": "f"}
-SMALL = Limits(size=1e7)
+SMALL = ReadingLimits(size=1e7)
 
 
 def refused(path, words, limits=None, **columns):
@@ -53,7 +53,7 @@ def test_a_small_file_of_matlab_that_unpacks_to_much(tmp_path):
     savemat(path, {"t": np.zeros(4_000_000)}, do_compression=True)
     assert path.stat().st_size < 40_000
     refused(path, "more than 0.01 GB unpacked.*--max-size", SMALL)
-    assert len(read_log(path, rate=1, position="t", limits=Limits(size=1e8))) == 4_000_000
+    assert len(read_log(path, rate=1, position="t", limits=ReadingLimits(size=1e8))) == 4_000_000
 
 
 def test_a_long_text_of_nothing(tmp_path):

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gzip
+import sys
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -250,3 +251,13 @@ def test_a_column_that_is_there_twice_must_be_named_by_number(tmp_path):
     with pytest.raises(InputError, match=r"2 columns named 'f'.*1, 2"):
         read_log(log, time="t", position="f:mm", force="f:mN")
     assert len(read_log(log, time="t", position="1:mm", force="2:mN")) == 30
+
+
+def test_without_its_reader_a_bag_names_its_extra(tmp_path, monkeypatch):
+    path = tmp_path / "log.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n")
+    monkeypatch.setitem(sys.modules, "palpate_bags", None)
+    with pytest.raises(
+        InputError, match=r"palpate-bags, which is not installed: pip install 'palpate\[bags\]'"
+    ):
+        read_log(path, force="/ft.wrench.force.z", position="/pose.pose.position.z")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
 
@@ -140,7 +140,7 @@ def test_the_limit_of_time_holds_while_the_layout_is_found(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(WHOLE))
     with pytest.raises(InputError, match="takes more than 1e-09 s"):
-        list_log(path, limits=Limits(seconds=1e-9))
+        list_log(path, limits=ReadingLimits(seconds=1e-9))
 
 
 @pytest.mark.parametrize("quoted", [False, True])

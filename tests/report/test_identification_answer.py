@@ -12,7 +12,7 @@ from palpate.contact_frame.arm import with_arm
 from palpate.identification import Code, Parameter, Verdict, Warn
 from palpate.identification.indenter import Indenter, with_modulus
 from palpate.report.identification.answer import show
-from palpate.report.identification.words import formatted
+from palpate.report.identification.words import full_number
 from report.outcomes import OUTCOMES
 
 
@@ -38,11 +38,11 @@ def test_each_quantity_has_one_answer():
     lines = printed(found)
     assert (
         lines[0]
-        == f"{formatted(found.working_point.stiffness)}   stiffness   ✓ identified        press [1].csv"
+        == f"{full_number(found.working_point.stiffness)}   stiffness   ✓ identified        press [1].csv"
     )
     for name in ("K", "B", "M"):
         (row,) = (line for line in lines if line.startswith(f"{name} "))
-        assert formatted(found.parameters[name]) in row
+        assert full_number(found.parameters[name]) in row
         assert "✓ identified" in row
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.files import check_place
 from palpate.report.identification.figure import draw, write_figure
-from palpate.report.identification.words import formatted, sentence
+from palpate.report.identification.words import full_number, sentence
 from palpate.report.look.assets import with_peaks
 from report.outcomes import OUTCOMES
 
@@ -69,7 +69,7 @@ def test_the_sentence_and_the_verdicts_stand_above_the_panels(found):
     assert "press.csv" in written
     assert sentence(found) in written
     for name, p in found.parameters.items():
-        assert f"{name} {formatted(p)}" in written
+        assert f"{name} {full_number(p)}" in written
     assert written.index(sentence(found)) < written.index("K ")
 
 

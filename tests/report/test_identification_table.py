@@ -6,7 +6,7 @@ from rich.console import Console
 
 from palpate.identification.causes import Code, Warn
 from palpate.report.identification.details import show
-from palpate.report.identification.words import formatted, number, sentence
+from palpate.report.identification.words import full_number, number, sentence
 from palpate.report.numbers import between
 from report.outcomes import OUTCOMES
 
@@ -23,7 +23,7 @@ def test_the_sentence_is_the_first_line_and_the_working_point_follows():
     text = " ".join(printed(found).split())
     assert text.startswith(sentence(found))
     point = found.working_point
-    assert text.index(f"working point: {formatted(point.stiffness)}") < text.index("value ± 95 %")
+    assert text.index(f"working point: {full_number(point.stiffness)}") < text.index("value ± 95 %")
 
 
 def test_each_parameter_has_its_number_both_intervals_its_verdict_and_its_largest_cause():

@@ -5,8 +5,6 @@ Here the numbers are checked against each other; each number alone is checked wh
 The user's parts are tried before the first run: an error is reported once, not by every run.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """A rig without arm and control: a tip on a prescribed path presses a surface, and the bench's instruments watch."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Every time counts from the first touch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, pi, sqrt

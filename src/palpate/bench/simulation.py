@@ -3,8 +3,6 @@
 A part of the user's that fails is stepped once in plain Python, then compiled alone, for a diagnosis in one line.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

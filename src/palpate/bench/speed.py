@@ -1,7 +1,5 @@
 """How fast the loop runs here."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

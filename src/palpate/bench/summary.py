@@ -1,7 +1,5 @@
 """The summary of a run: outcome, force, limits of the motors, estimates and the truth."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

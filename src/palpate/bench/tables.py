@@ -1,7 +1,5 @@
 """An experiment: one TOML file with every number of a run, read and checked at the edge."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar

@@ -3,8 +3,6 @@
 The table of a part that the user brings is ``kind = "module:Class"``: its keys are the part's own fields.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 import re

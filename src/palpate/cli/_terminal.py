@@ -16,6 +16,8 @@ from palpate.files import as_json
 from palpate.text import duration, printable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
     from rich.progress import Progress
 
@@ -108,8 +110,11 @@ def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> No
 
 
 def show_answer(answer: CommandAnswer) -> Console:
-    """Print an answer: its title, sentence, tables and warnings; returns the console for further output."""
+    """Print an answer, whole or its title, sentence, tables and warnings; returns the console for further output."""
     screen = console()
+    if answer.show is not None:
+        answer.show(screen)
+        return screen
     head(screen, answer.title, answer.sentence)
     for table in answer.tables:
         show_table(screen, table)
@@ -121,6 +126,11 @@ def show_answer(answer: CommandAnswer) -> Console:
 def place(console: Console, what: str, where: object) -> None:
     """Path of a written file, not wrapped, so that it can be copied."""
     console.print(f"{what} {where}", soft_wrap=True)
+
+
+def places(paths: Iterable[Path]) -> list[str]:
+    """Paths of written files, each with its kind by its ending."""
+    return [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in paths]
 
 
 COMPILING = "compiling the loop: some ten seconds, once after installation"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._program import print_answer
-from palpate.cli._terminal import KINDS, console
+from palpate.cli._program import print_result
+from palpate.cli._terminal import places
 from palpate.cli.one_log import OneLog, has_number
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.common import QUIET, WRITTEN, Model, PictureOptions
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from palpate.arrays import Array
-    from palpate.identification import Identification
-    from palpate.report.identification.words import Source
 
 
 @Parameter(name="*", group=Group("The model", sort_key=4))
@@ -168,21 +166,26 @@ def identify(
         Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
+    output, cell = output or IdentifyOutput(), cell or CellOptions()
+    asked = OneLog(
+        fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions(),
+        pressed_by or IndenterOptions(),
+    )  # fmt: skip
+    asked.pressed_by.check()
+    cell.check()
+    cell.save(asked.parts)
+    return _identify(logs, asked, beside or CovariateOptions(), output)
+
+
+def _identify(logs: tuple[Path, ...], asked: OneLog, beside: CovariateOptions, output: IdentifyOutput) -> int:
+    """Identify one log, or many together."""
     from palpate.logs.many import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
-    output, cell = output or IdentifyOutput(), cell or CellOptions()
-    source, frame, arm = source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()
-    fitted, pressed_by = fitted or ModelOptions(), pressed_by or IndenterOptions()
-    beside = beside or CovariateOptions()
-    pressed_by.check()
-    cell.check()
-    asked = OneLog(fitted, source, frame, arm, pressed_by)
-    cell.save((source, frame, arm, fitted, pressed_by))
     if not logs:
         raise InputError(
             "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
-    logs = sheets_as_logs(logs, source.names, source.limits)
+    logs = sheets_as_logs(logs, asked.source.names, asked.source.limits)
     if len(logs) == 1 and not is_folder_of_logs(logs[0]):
         if beside != CovariateOptions():
             raise InputError("--covariate is of several logs; name more than one, or a folder of them")
@@ -193,7 +196,7 @@ def identify(
 
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
     logs = gather_logs(logs)
-    known = beside.of(logs, source)
+    known = beside.of(logs, asked.source)
     return many(logs, asked, known, (figure, page, table), json=output.json, dpi=output.dpi)
 
 
@@ -214,26 +217,10 @@ def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
         from palpate.report.many.table import LogRow, write_table
 
         write_table([LogRow(origin, found)], None, table)
-    _print(found, origin, [path for path in (figure, page, table) if path is not None], output)
+    from palpate.report.identification.answer import answer_of
+
+    more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+    written = places(path for path in (figure, page, table) if path is not None)
+    answer = answer_of(found, origin, written, more, verbose=output.verbose, budget=output.budget)
+    print_result(answer, json=output.json)
     return 0 if has_number(found) else 1
-
-
-def _print(found: Identification, origin: Source, written: list[Path], output: IdentifyOutput) -> None:
-    if output.json:
-        from palpate.report.identification.words import as_json
-
-        print_answer({"files": [{"file": origin.file, "sha256": origin.sha256}], **as_json(found, origin)})
-        return
-    from palpate.report.identification import answer, details
-
-    screen = console()
-    places = [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in written]
-    if not output.verbose:
-        more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
-        answer.show(found, origin.title, screen, origin.notes, "   ".join([*places, f"all evidence: {more}"]))
-    else:
-        details.show(found, origin.title, screen)
-        for line in (*origin.notes, *places):
-            screen.print(line, soft_wrap=True)
-    if output.budget:
-        details.show_budgets(found, screen)

@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from palpate.cli._program import command, print_answer
+from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
-from palpate.cli._terminal import KINDS, STYLE, bar, console, place, say
+from palpate.cli._terminal import bar, console, places, say
 from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.force import IndenterOptions
 from palpate.cli.options.log import LogOptions
@@ -91,6 +91,11 @@ class OneLog:
         )  # fmt: skip
 
     @property
+    def parts(self) -> tuple[object, ...]:
+        """The groups of options, which a cell's file keeps."""
+        return self.source, self.frame, self.arm, self.fitted, self.pressed_by
+
+    @property
     def options(self) -> dict[str, Any]:
         """The options of logs, frame, arm and indenter, as plain values."""
         return {
@@ -158,7 +163,9 @@ def many(
     found, names = [row.found for row in rows], [row.source.title for row in rows]
     pooled = pool(found, asked.fitted.tolerance, names, None if interrupted else covariates)
     if rows:
-        _print(rows, pooled, _write(rows, pooled, files, dpi), json=json)
+        from palpate.report.many.table import answer_of
+
+        print_result(answer_of(rows, pooled, places(_write(rows, pooled, files, dpi))), json=json)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
@@ -213,29 +220,6 @@ def _write(
 
         write_table(rows, pooled, table)
     return [path for path in files if path is not None]
-
-
-def _print(rows: Sequence[LogRow], pooled: Pooled, written: Sequence[Path], *, json: bool) -> None:
-    if json:
-        from palpate.report.many.table import json_of
-
-        print_answer(
-            {
-                "files": [{"file": r.source.file, "sha256": r.source.sha256} for r in rows],
-                **json_of(rows, pooled),
-            }
-        )
-        return
-    from palpate.report.identification.words import unit_warnings
-    from palpate.report.many.table import show
-
-    screen = console()
-    for row in rows:
-        for text in unit_warnings(row.found) if row.found else ():
-            screen.print(f"! {row.source.title}: {text}", style=STYLE, soft_wrap=True)
-    show(rows, pooled, screen)
-    for path in written:
-        place(screen, f"{KINDS.get(path.suffix.lower(), 'figure')}:", path)
 
 
 _LARGEST = 1 << 26

@@ -18,7 +18,8 @@ from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
-    pass
+    from palpate.contact_frame import Weighed
+    from palpate.records import Record
 
 
 _ENDINGS = (".toml", ".script", ".json", ".yaml")
@@ -83,29 +84,46 @@ def payload(
     report = output.page()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
-    from palpate.contact_frame import ContactFrame, compare, load_text, read_load, weigh
-    from palpate.report.payload import answer_of, page
+    from palpate.contact_frame import ContactFrame, compare, read_load, weigh
+    from palpate.report.payload import answer_of
 
     load = None if output.check is None else read_load(output.check)
     cell.save((source or LogOptions(), frame or FrameOptions()))
-    record = (source or LogOptions()).read(log)
-    if "force_x" not in record.columns:
-        raise InputError(
-            f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"
-        )
     contact = (frame or FrameOptions()).frame() or ContactFrame()
-    found = weigh(record, contact, tolerance)
+    found = weigh(_wrench_and_pose(log, source or LogOptions()), contact, tolerance)
     start = output.origin(contact.wrench_at)
-    written = []
-    if output.out is not None and found.payload is not None:
-        write_text(output.out, load_text(found, ending, start))
-        written.append(output.out)
-    if report is not None:
-        write_text(report, page(found, log.name))
-        written.append(report)
+    written = _write(found, log.name, (output.out, report), ending, start)
     rows = []
     if load is not None and found.payload is not None:
         rows = compare(found, load, start, compensated=contact.gravity_compensated)
     answer = answer_of(found, log.name, output.check, rows)
     print_result(answer, json=output.json, files=[("written:", path) for path in written])
     return 0 if found.payload is not None and all(row.agrees for row in rows) else 1
+
+
+def _wrench_and_pose(log: Path, source: LogOptions) -> Record:
+    record = source.read(log)
+    if "force_x" not in record.columns:
+        raise InputError(
+            f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"
+        )
+    return record
+
+
+def _write(
+    found: Weighed,
+    name: str,
+    files: tuple[Path | None, Path | None],
+    ending: str,
+    start: tuple[float, float, float],
+) -> list[Path]:
+    """Write the payload and the page; returns the written files."""
+    from palpate.contact_frame import load_text
+    from palpate.report.payload import page
+
+    out, report = files if found.payload is not None else (None, files[1])
+    if out is not None:
+        write_text(out, load_text(found, ending, start))
+    if report is not None:
+        write_text(report, page(found, name))
+    return [path for path in (out, report) if path is not None]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
 
-from palpate.cli._program import print_answer
+from palpate.cli._program import print_result
 from palpate.cli._terminal import print_lines
 from palpate.cli.options.common import WRITTEN
 from palpate.logs.signals import GB, Signals
@@ -47,17 +47,18 @@ def topics(
         Print one JSON object and nothing else.
     """
     from palpate.logs.listing import list_log
+    from palpate.report.page import CommandAnswer
 
     found = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits)
     command = found.proposal.command(log)
-    if json:
-        proposal = {"command": command, "guesses": list(found.proposal.guesses)}
-        entries = [entry.to_json() for entry in found.entries]
-        # A log of gigabytes is listed at once, and so is not read through for a digest.
-        files = [{"file": str(log), "sha256": None}]
-        print_answer({"files": files, "entries": entries, "troubles": found.troubles, "identify": proposal})
-        return 0
-    print_lines(*_table(log, found), *_proposal_lines(found, command))
+    proposal = {"command": command, "guesses": list(found.proposal.guesses)}
+    # A log of gigabytes is listed at once, and so is not read through for a digest.
+    plain = {
+        "files": [{"file": str(log), "sha256": None}], "entries": [entry.to_json() for entry in found.entries],
+        "troubles": found.troubles, "identify": proposal,
+    }  # fmt: skip
+    lines = [*_table(log, found), *_proposal_lines(found, command)]
+    print_result(CommandAnswer(plain, show=lambda _: print_lines(*lines)), json=json)
     return 0
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from palpate.cli._program import command, print_answer
-from palpate.cli._terminal import console, place
+from palpate.cli._program import command, print_result
 from palpate.cli.one_log import read_found
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import (
@@ -23,8 +22,6 @@ from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from palpate.force import Known, Tuning
 
 
@@ -70,14 +67,14 @@ def tune(
         The output of palpate identify --json, as a .json file; or a log.
     """
     surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
-    output, page = output or TuningOutputOptions(), page or ReportOption()
+    output, report = output or TuningOutputOptions(), (page or ReportOption()).page()
     output.check_new(output.out, ending=".toml")
-    report = page.page()
-    from palpate.force import tune as tuned
+    from palpate.force import tune as tune_loop
+    from palpate.report.tuning import answer_of
 
     one, inner = arm.load(columns)
     theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
-    told = tuned(
+    told = tune_loop(
         one,
         press.force.si,
         _surface_of(found, surface, columns),
@@ -89,7 +86,7 @@ def tune(
     told = replace(told, gains=(slide or SlideTuningOptions()).tuned_for(told.gains))
     written = _write(told, output.out, report)
     loop = None if inner is None else inner.to_json() | ({"theta_s": theta.to_json()} if theta else {})
-    _print(told, loop, written, output)
+    print_result(answer_of(told, loop, written, verbose=output.verbose), json=output.json)
     return 0 if told.proved else 1
 
 
@@ -120,37 +117,3 @@ def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
 
         write_text(page, page_of(told, command()))
     return [path for path in (out, page) if path is not None]
-
-
-def _print(
-    told: Tuning, inner: dict[str, object] | None, written: list[Path], output: TuningOutputOptions
-) -> None:
-    if output.json:
-        print_answer(told.to_json() | {"inner_loop": inner} | _slide(told))
-        return
-    from palpate.report.tuning import show, show_all
-
-    screen = console()
-    if not output.verbose:
-        show(told, screen, written)
-        _print_slide(told, screen)
-        return
-    show_all(told, screen)
-    _print_slide(told, screen)
-    for path in written:
-        place(screen, "written:", path)
-
-
-def _print_slide(told: Tuning, screen: Console) -> None:
-    if told.gains.slide is not None:
-        from palpate.force.sliding.slide_domain import slide_sentence
-
-        screen.print(f"Slide: {slide_sentence(told.gains)}.", soft_wrap=True)
-
-
-def _slide(told: Tuning) -> dict[str, Any]:
-    if told.gains.slide is None:
-        return {}
-    from palpate.force.sliding.slide_domain import slide_json
-
-    return {"slide": slide_json(told.gains)}

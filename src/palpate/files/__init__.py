@@ -1,7 +1,5 @@
 """Files that palpate writes: atomically, and never over a file of another origin."""
 
-from __future__ import annotations
-
 from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
 from palpate.files.writing import (
     FORCE,

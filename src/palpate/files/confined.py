@@ -5,8 +5,6 @@ file may unpack to any size, and MuJoCo may compile a short model for days. What
 words, never objects.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """How much of the machine a stranger's file may take: unpacked size and time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -40,7 +38,7 @@ def check_address_space() -> None:
 
 
 @dataclass(frozen=True)
-class Limits:
+class ReadingLimits:
     """The most that reading one file may take.
 
     Args:
@@ -76,7 +74,7 @@ class ReadingBudget:
     """
 
     path: Path
-    limits: Limits = field(default_factory=Limits)
+    limits: ReadingLimits = field(default_factory=ReadingLimits)
     _spent: float = 0.0
     _begun: float = field(default_factory=monotonic)
 

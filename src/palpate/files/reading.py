@@ -1,7 +1,5 @@
 """The one door for files that anybody may have written: regular files of a sane size, text, TOML."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

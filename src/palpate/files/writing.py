@@ -1,7 +1,5 @@
 """Files and folders are written whole or not at all, by one process at a time, and only over palpate's own."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

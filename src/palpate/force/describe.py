@@ -1,7 +1,5 @@
 """A certificate in words and as plain JSON values."""
 
-from __future__ import annotations
-
 from math import isfinite
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The law's numbers and its state as flat arrays: what a compiled call from Python takes without boxing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bound of the first peak at a touch, whatever the estimator does while its bound is one."""
 
-from __future__ import annotations
-
 from math import exp, pi, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How close the loop comes to growing: the peak of its sensitivity, and what gain that allows on stiff surfaces."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

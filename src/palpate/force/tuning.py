@@ -1,7 +1,5 @@
 """From what is known of arm and surface to gains, what they will do, and where they are proved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite

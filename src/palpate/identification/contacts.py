@@ -9,13 +9,11 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn
-from palpate.identification.filters.bandwidth import FASTEST, choose_cutoff
-from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
 from palpate.identification.free_motion import FLAT, Drift, FreeMotion, Payload, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
-from palpate.identification.strokes import Stroke, strokes_of
-from palpate.identification.tangents import SteadyPress, steady_press
+from palpate.identification.steady_press import SteadyPress, Stroke, steady_press, strokes_of
 from palpate.signals.samples import detrend, runs
 
 ONSET = 0.05
@@ -100,7 +98,11 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         strokes, contacts = (), replace(find_contacts(channels, chain, air, options), drift=drift)
     if not contacts.spans:
         return channels, chain, contacts
-    chosen = cutoff or _chosen_cutoff(channels, contacts)
+    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
+    around = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)  # its rise and fall, too
+    chosen = cutoff or choose_cutoff(
+        channels.position[around], channels.force[around], channels.dt, channels.rate
+    )
     if chosen > 0.9 * highest:
         return channels, chain, contacts
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
@@ -113,21 +115,19 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
 
 def _crossed(channels: Channels, air: FreeMotion, strokes: tuple[Stroke, ...]) -> bool:
     """Whether the strokes pass the air of a press and the force stays: places at rest have no slope to tell."""
-    limit, slopes = air.way * air.limit, []
+
+    def rise(x: Array, f: Array) -> float:
+        u = x - x.mean()
+        return abs(float(u @ f)) / max(float(u @ u), 1e-300)
+
     for stroke in strokes:
         more = _BESIDE * (stroke.end - stroke.begin)
         rows = replace(stroke, begin=stroke.begin - more, end=stroke.end + more).rows(channels)
         x, f = air.way * channels.position[rows], channels.force[rows]
-        inside = x < limit
-        if np.count_nonzero(inside) >= _SEVERAL:
-            slopes.append((float(np.ptp(x[inside])), _rise(x[inside], f[inside]), _rise(x, f)))
-    return any(abs(own) < FLAT * abs(whole) for _, own, whole in slopes)
-
-
-def _rise(x: Array, f: Array) -> float:
-    """Slope of a force over a position."""
-    u = x - x.mean()
-    return float(u @ f) / max(float(u @ u), 1e-300)
+        inside = x < air.way * air.limit
+        if np.count_nonzero(inside) >= _SEVERAL and rise(x[inside], f[inside]) < FLAT * rise(x, f):
+            return True
+    return False
 
 
 def _with_press(
@@ -136,23 +136,12 @@ def _with_press(
     """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
     if not strokes:
         return contacts
-    seen = (
-        contacts
-        if contacts.spans
-        else _never_left(channels, channels.force, channels.position, options, strokes)
-    )
+    whole = channels, channels.force, channels.position, options, strokes
+    seen = contacts if contacts.spans else _never_left(*whole)
     lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
     signs = seen.position_sign, seen.force_sign
     press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
     return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
-
-
-def _chosen_cutoff(channels: Channels, contacts: Contacts) -> float:
-    """From the longest contact with what is before and after it, so that its rise and fall are in the picture."""
-    begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
-    margin = (end - begin) // 2
-    around = slice(max(begin - margin, 0), end + margin)
-    return choose_cutoff(channels.position[around], channels.force[around], channels.dt, channels.rate)
 
 
 def find_contacts(

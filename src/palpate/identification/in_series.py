@@ -17,7 +17,7 @@ from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
-from palpate.identification.tangents import Slopes
+from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 
 Linear = TypeVar("Linear", Answer, Fit)

@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+
+import numpy as np
 
 from palpate.identification import in_series
 from palpate.identification.causes import Code, Warn
-from palpate.identification.contacts import contacts_of
-from palpate.identification.estimators.fit import fit
+from palpate.identification.contacts import Contacts, contacts_of
+from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
-from palpate.identification.options import Options
-from palpate.identification.outcome import nothing, outcome
-from palpate.identification.problem import problem_of, reduced
-from palpate.identification.result import Identification
-from palpate.identification.sampling import channels_of, thinned
-from palpate.identification.selection import choose
+from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.front_end import problem_of
+from palpate.identification.options import LAG, Options
+from palpate.identification.problem import Problem, reduced
+from palpate.identification.result import (
+    DynamicStiffness,
+    Identification,
+    LagFound,
+    Press,
+    Traces,
+    WorkingPoint,
+)
+from palpate.identification.sampling import Channels, channels_of, thinned
+from palpate.identification.selection import Choice, choose
+from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
 from palpate.identification.verdicts import Terms, verdicts
 from palpate.records import Record
+from palpate.signals import Estimate
 from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
+from palpate.units import impedance_units
 
 _MOST_SAMPLES = 2_000_000
 _FOLLOWS = 0.3
@@ -103,3 +118,214 @@ def identify(
         choice = replace(choice, answer=in_series.with_payload(choice.answer, contacts.payload.std))
     parameters, told = verdicts(choice, holds, evidence[2], terms)
     return outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)
+
+
+_SOFTEST, _STIFFEST = 1.0, 1e8
+_DEEPEST = 0.5
+"""No press goes deeper [m]."""
+_SHOWN = 50_000
+"""Samples of each trace: what is more is thinned, and averaged where it was fitted."""
+_NARROWER = 0.5
+"""Share of the prior's interval at or below which the log has told a lag something."""
+
+
+# More than seven arguments: it gathers what every stage has found.
+def outcome(
+    channels: Channels,
+    chain: Chain,
+    choice: Choice,
+    holds: Fit,
+    evidence: tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None],
+    parameters: dict[str, Parameter],
+    warnings: tuple[Warn, ...],
+    options: Options,
+    terms: Terms,
+) -> Identification:
+    """Identification from the fit, its verdicts and its evidence."""
+    problem, found = choice.problem, choice.answer
+    spectrum, press, point = evidence
+    mass = parameters.get("M")
+    name = found.fit.model.name
+    if (
+        name == "kelvin-voigt-mass"
+        and options.model is None
+        and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
+    ):
+        name = "kelvin-voigt"
+    return Identification(
+        model=name,
+        parameters=parameters,
+        contacts=tuple(_clock(channels, chain, problem.contacts, span) for span in problem.contacts.spans),
+        lag=_lag(choice),
+        r2=max(found.fit.r2, 0.0),
+        rmse=found.fit.rmse,
+        n=len(problem.force),
+        warnings=(*warnings, *_late(press, problem, warnings), *_doubts(parameters, problem, options, terms)),
+        comparison=choice.tried,
+        cutoff=problem.motion.chain.cutoff,
+        traces=_traces(channels, chain, choice, terms),
+        estimate=Estimate(holds.names, holds.theta, holds.cov, holds.noise.effective),
+        working_point=point,
+        dynamic_stiffness=spectrum,
+        press=press,
+        options=_plain_options(options),
+        depth=found.fit.model.depth,
+        inputs=_inputs(problem, options),
+        correlation=_correlation(choice, parameters, point),
+    )
+
+
+def nothing(
+    channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]
+) -> Identification:
+    """There is no contact: every parameter without a number."""
+    reason = "there is no contact in this log"
+    units = impedance_units(terms.force_unit, terms.position_unit)
+    parameters = {
+        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, unit in units.items()
+    }
+    nan = float("nan")
+    return Identification(
+        options.model or "kelvin-voigt",
+        parameters,
+        (),
+        None,
+        nan,
+        nan,
+        0,
+        warnings,
+        cutoff=chain.cutoff,
+        traces=_outcome_untouched(channels, chain, terms),
+        options=_plain_options(options),
+    )
+
+
+def _plain_options(options: Options) -> dict[str, object]:
+    """The given options, and the tolerance; a lag of 0 and "not bonded" are given too."""
+    told = {
+        own.name: getattr(options, own.name)
+        for own in fields(options)
+        if own.name == "tolerance" or getattr(options, own.name) != own.default
+    }
+    return told | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
+
+
+def _inputs(problem: Problem, options: Options) -> dict[str, Input]:
+    """The input quantities whose uncertainty is given, or assumed, before the log is read."""
+    payload, (share, share_std) = problem.contacts.payload, options.swing
+    found = {
+        "lag": Input(problem.lag.value + problem.filtered, problem.lag.std, "s"),
+        "calibration": Input(1.0, options.calibration, "1"),
+        "series stiffness": Input(options.series_stiffness or 0.0, options.series_std, "N/m"),
+        "tip's mass": Input(share, share_std, "s^2"),
+        "tool's inertia": Input(payload.mass, payload.std, "kg") if payload else Input(0.0, 0.0, "kg"),
+    }
+    return {cause: own for cause, own in found.items() if own.std > 0}
+
+
+def _correlation(
+    choice: Choice, parameters: dict[str, Parameter], point: WorkingPoint | None
+) -> dict[str, float]:
+    """Of the fit's K, B and M that have a number; a tangent in place of K is no part of the fit."""
+    found = choice.answer
+    names = [
+        name
+        for name in ("K", "B", "M")
+        if name in found.names
+        and parameters[name].value is not None
+        and not (point is not None and parameters[name] is point.stiffness)
+    ]
+    places = [found.names.index(name) for name in names]
+    return correlations(names, found.cov[np.ix_(places, places)])
+
+
+def _lag(choice: Choice) -> LagFound | None:
+    prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered
+    if prior.known:
+        told = prior.value + filtered != 0 or prior.std > 0
+        return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "told") if told else None
+    half = found.half_of(LAG) if LAG in found.names else NORMAL * prior.std
+    if half <= _NARROWER * NORMAL * prior.std and not lag_open(choice.problem):
+        return LagFound(found[LAG] + filtered, half / NORMAL, half, "measured")
+    return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "prior")
+
+
+def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> list[Warn]:
+    """The lag that the work of the presses tells, where it is farther than the prior's bound and nobody told one."""
+    late = press.late if press else None
+    known = problem.lag.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
+    if late is None or known or late[0] <= NORMAL * problem.lag.std:
+        return []
+    text = (
+        f"unloading returns more work than loading took, which no passive surface does: the force is read"
+        f" after the position by {problem.lag.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
+    )
+    return [Warn(Code.FORCE_LAGS_POSITION, text)]
+
+
+def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms) -> list[Warn]:
+    warnings = []
+    stiffness = parameters["K"].value if "K" in parameters else None
+    if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
+        text = (
+            f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
+        )
+        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
+    series = options.series_stiffness
+    if stiffness is not None and series and stiffness > series / 3:
+        text = (
+            f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K depends on that calibration"
+        )
+        warnings.append(Warn(Code.SERIES_COMPLIANCE, text))
+    position = problem.motion.position
+    at = np.clip(np.round(problem.motion.instants).astype(np.intp), 0, len(position) - 1)
+    deep = float(np.ptp(position[at]))
+    if terms.position_unit == "m" and deep > _DEEPEST:
+        text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
+        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
+    return warnings
+
+
+def _clock(
+    channels: Channels, chain: Chain, contacts: Contacts, span: tuple[int, int]
+) -> tuple[float, float]:
+    """Times of a contact on the log's own clock: the filter's delay is taken off."""
+    delay = 0.0 if contacts.bonded else chain.delay
+    begin, end = (channels.start + i * channels.dt - delay for i in span)
+    return max(float(begin), channels.start), float(end)
+
+
+def _outcome_untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
+    """The force of a log in which nothing is touched: seen, it says why."""
+    step = max(len(channels.force) // _SHOWN, 1)
+    none = np.empty(0)
+    time, force = channels.time - chain.delay, chain(channels.force)
+    return Traces(
+        time[::step], force[::step], none, none, none, none,
+        position_unit=terms.position_unit, force_unit=terms.force_unit,
+    )  # fmt: skip
+
+
+def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> Traces:
+    problem, fitted = choice.answer.problem, choice.answer.fit
+    step = max(len(channels.position) // _SHOWN, 1)
+    size = max(len(problem.force) // _SHOWN, 1)
+    linear = fitted.model.linear
+    nonlinear = {parameter.name: fitted[parameter.name] for parameter in fitted.model.nonlinear}
+    columns = fitted.model.columns(problem.motion, nonlinear, fitted.lag)
+    lag = problem.lag
+    return Traces(
+        time=(channels.time - chain.delay)[::step],
+        force=chain(problem.contacts.force_sign * channels.force)[::step] - problem.resting,
+        fitted_time=block_means(channels.start + problem.time, size),
+        fitted_position=block_means(problem.motion.moved(0, fitted.lag), size),
+        fitted_force=block_means(problem.force, size),
+        predicted=block_means(fitted.force, size),
+        columns={name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
+        theta={name: fitted[name] for name in linear},
+        prior={"M": lag.mass[1]} if lag.mass and "M" in linear else {},
+        matched=problem.motion.matched,
+        position_unit=terms.position_unit,
+        force_unit=terms.force_unit,
+    )

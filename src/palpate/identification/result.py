@@ -351,11 +351,11 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
     def uncertainty_json(self) -> dict[str, Any]:
         """Uncertainty budgets of the working point and of each parameter with a number, as plain values."""
         point = [self.working_point.stiffness] if self.working_point else []
-        own = {"working_point": next(iter(point), None), **self.parameters}
+        every = {"working_point": next(iter(point), None), **self.parameters}
         budgets = {
-            name: p.uncertainty.to_json(self.inputs) | {"value": p.value, "unit": p.unit}
-            for name, p in own.items()
-            if p is not None and p.uncertainty is not None
+            name: own.budget_json(self.inputs) | {"value": own.value, "unit": p.unit}
+            for name, p in every.items()
+            if p is not None and (own := p.measurement) is not None
         }
         return {
             "working_point": budgets.pop("working_point", None),

@@ -103,9 +103,17 @@ def half_width(contributions: Contributions) -> float:
     return float(half_widths(std**2, freedom))
 
 
+class Input(NamedTuple):
+    """An input quantity that a cause stands for: estimate, standard uncertainty, and their unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
 @dataclass(frozen=True)
 class Measurement:
-    """A value and the contributions to its uncertainty, by cause."""
+    """A value and the contributions to its uncertainty, by cause; independent of each other."""
 
     value: float
     contributions: Contributions
@@ -117,48 +125,7 @@ class Measurement:
 
     @property
     def half(self) -> float:
-        """95 % half-width of all causes together."""
-        return half_width(self.contributions)
-
-    @property
-    def relative_half(self) -> float:
-        """The same over the value."""
-        return self.half / abs(self.value or 1e-300)
-
-    def known_to(self, tolerance: float) -> bool:
-        """Whether its half-width is at most a share of its value."""
-        return self.half <= tolerance * abs(self.value)
-
-    def with_cause(self, cause: str, own: Contribution) -> Measurement:
-        """The same with one more cause of error."""
-        return replace(self, contributions={**self.contributions, cause: own})
-
-    def through(self, value: float, gain: float) -> Measurement:
-        """A function of it instead, by its value and its derivative."""
-        return Measurement(value, {cause: own.times(gain) for cause, own in self.contributions.items()})
-
-
-class Input(NamedTuple):
-    """An input quantity that a cause stands for: estimate, standard uncertainty, and their unit."""
-
-    value: float
-    std: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """Combined and expanded uncertainty of one result.
-
-    Args:
-        contributions: by cause; independent of each other.
-    """
-
-    contributions: Contributions
-
-    @property
-    def expanded_uncertainty(self) -> float:
-        """Half-width of the 95 % interval."""
+        """95 % half-width of all causes together: the expanded uncertainty."""
         return half_width(self.contributions)
 
     @property
@@ -174,11 +141,23 @@ class Uncertainty:
         return found if found < 0.99 * _MOST_FREEDOM else np.inf
 
     @property
-    def coverage(self) -> float:
-        """Coverage factor k, the expanded over the combined uncertainty."""
-        return self.expanded_uncertainty / self.combined
+    def relative_half(self) -> float:
+        """The half-width over the value."""
+        return self.half / abs(self.value or 1e-300)
 
-    def to_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
+    def known_to(self, tolerance: float) -> bool:
+        """Whether its half-width is at most a share of its value."""
+        return self.half <= tolerance * abs(self.value)
+
+    def with_cause(self, cause: str, own: Contribution) -> Measurement:
+        """The same with one more cause of error."""
+        return replace(self, contributions={**self.contributions, cause: own})
+
+    def through(self, value: float, gain: float) -> Measurement:
+        """A function of it instead, by its value and its derivative."""
+        return Measurement(value, {cause: own.times(gain) for cause, own in self.contributions.items()})
+
+    def budget_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
         """Plain values that JSON can hold, largest contribution first; an infinite number is None.
 
         Args:
@@ -189,8 +168,8 @@ class Uncertainty:
         return {
             "combined_standard_uncertainty": self.combined,
             "effective_degrees_of_freedom": _finite(self.freedom),
-            "coverage_factor": self.coverage,
-            "expanded_uncertainty": self.expanded_uncertainty,
+            "coverage_factor": self.half / self.combined,
+            "expanded_uncertainty": self.half,
             "sources": [self._source(name, own, inputs.get(name)) for name, own in rows if own.std > 0],
         }
 
@@ -265,8 +244,8 @@ class Parameter(Readable):
             reason: of that.
             contributions: to its uncertainty, by cause.
         """
-        whole = Uncertainty(contributions)
-        half = whole.expanded_uncertainty
+        whole = Measurement(value, contributions)
+        half = whole.half
         share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
         parts = {cause: share * part.std for cause, part in contributions.items()}
         budget = {
@@ -294,11 +273,11 @@ class Parameter(Readable):
         return replace(bare, verdict=verdict, reason=reason)
 
     @property
-    def uncertainty(self) -> Uncertainty | None:
-        """Combined and expanded uncertainty; None without a number, or where no cause is known."""
+    def measurement(self) -> Measurement | None:
+        """Value and contributions; None without a number, or where no cause is known."""
         if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
             return None
-        return Uncertainty(self.contributions)
+        return Measurement(self.value, self.contributions)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""

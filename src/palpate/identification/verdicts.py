@@ -159,7 +159,7 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     """
     apart = point.stiffness.contributions["repetition"]
     own, place = found.budget["repetition"], found.names.index("K")
-    variance, freedom = own.variance.copy(), np.broadcast_to(own.freedom, own.variance.shape).copy()
+    variance, freedom = own.variance.copy(), own.each.copy()
     if apart.std**2 > variance[place]:
         variance[place], freedom[place] = apart.std**2, apart.freedom
     return found.budget | {"repetition": Spread(variance, freedom)}
@@ -294,7 +294,7 @@ def _remedy(name: str, terms: Terms) -> str:
     return NOISE.remedy
 
 
-def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
     """The unit of one parameter of a model."""
     units = impedance_units(terms.force_unit, terms.position_unit)
     plain = units["K"] == "1"
@@ -304,8 +304,6 @@ def unit_of(name: str, fitted: Fit | Prediction, terms: Terms) -> str:
         return terms.force_unit
     if name == "n" or plain:
         return "1"
-    if name in ("K2", "K3"):
-        return f"{terms.force_unit}/{terms.position_unit}^{name[1]}"
     if fitted.model.of_power and fitted.model.depth is None:
         n = fitted["n"] + (name == "B")
         return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"

@@ -3,8 +3,6 @@
 Its names are looked up when they are first used: what reads one file in a process of its own waits for no other reader.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -1,7 +1,5 @@
 """Wrench and pose of an arm's log, in three dimensions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -12,7 +10,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.logs.bags import Bag
+from palpate.logs.bags import Bag, bag_reader
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.read import read_log
 from palpate.logs.roles import POSE, WRENCH
@@ -212,7 +210,7 @@ def read_wrench_and_pose(
     """
     path = Path(path)
     kind = kind_of(path)
-    with Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
+    with bag_reader().Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
         wrench = wrench or _only("wrench", bag, path)
         pose = pose or _only("pose", bag, path)
         columns = _columns("wrench", wrench, path, kind, bag) | _columns(

@@ -1,7 +1,5 @@
 """Statistics of a column before its role is known, and the value in it that stands for "no reading"."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Columns of text, Parquet, MATLAB and spreadsheet files in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The format of a log file, recognised by its first bytes, not by its name."""
 
-from __future__ import annotations
-
 from enum import Enum
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile

@@ -1,7 +1,5 @@
 """Contents of a log: topics, variables or columns, and their names on the command line."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.bags import Bag
-from palpate.logs.bags.reading import leaves
+from palpate.logs.bags import Bag, bag_reader
 from palpate.logs.columns import ColumnStatistics
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
@@ -68,7 +65,7 @@ class Listing:
     facts: list[str] = field(default_factory=list)
 
 
-def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | None = None) -> Listing:
+def list_log(path: str | Path, delimiter: str | None = None, limits: ReadingLimits | None = None) -> Listing:
     """Contents of a log, its faults, and a command to identify it.
 
     Args:
@@ -82,7 +79,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     path = Path(path)
     kind = kind_of(path)
     if kind.is_bag:
-        with Bag(path, kind, limits) as bag:
+        with bag_reader().Bag(path, kind, limits) as bag:
             fields = {name: _fields(bag, name) for name in bag.topics}
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
@@ -92,7 +89,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: Limits | No
     entries = [_of_column(column, clock) for column in columns]
     entries += [SignalEntry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
     proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
-    repeats = equal_sheets(path, limits or Limits()) if kind is Kind.SHEETS and path.is_file() else []
+    repeats = equal_sheets(path, limits or ReadingLimits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
         first = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
@@ -111,7 +108,7 @@ def _fields(bag: Bag, name: str) -> tuple[str, ...]:
     topic = bag.topics[name]
     if not (topic.known and topic.count):
         return ()
-    return tuple(path for path, _ in leaves(bag.first(name)))
+    return tuple(path for path, _ in bag_reader().leaves(bag.first(name)))
 
 
 def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:

@@ -1,7 +1,5 @@
 """Many logs: the files of folders and the sheets of books that paths name, and covariates, such as a temperature."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence
@@ -12,7 +10,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.files.reading import read_text
 from palpate.logs.kinds import STORAGES, Kind, kind_of
 from palpate.logs.tables import equal_sheets, open_table
@@ -37,7 +35,7 @@ def is_folder_of_logs(path: Path) -> bool:
     return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
 
 
-def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: Limits) -> tuple[Path, ...]:
+def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: ReadingLimits) -> tuple[Path, ...]:
     """The paths, a book whose sheets repeat one test by those sheets.
 
     Args:

@@ -1,7 +1,5 @@
 """The proposed `palpate identify` command of a log, from its names, units and values."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence

@@ -1,7 +1,5 @@
 """From a log file to a record in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,9 +9,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files.limits import Limits
-from palpate.logs.bags import Bag
-from palpate.logs.from_bag import from_bag
+from palpate.files.limits import ReadingLimits
+from palpate.logs.bags import bag_reader
 from palpate.logs.from_table import from_table
 from palpate.logs.kinds import Kind, kind_of
 from palpate.logs.roles import Loaded, check_range, implausible_times
@@ -35,7 +32,7 @@ def read_log(
     missing: Sequence[str | float] = (),
     delimiter: str | None = None,
     held: str | None = None,
-    limits: Limits | None = None,
+    limits: ReadingLimits | None = None,
     **columns: str,
 ) -> Record:
     """Read columns of a log into a record.
@@ -79,8 +76,8 @@ def read_log(
     if kind.is_bag and rate is not None:
         raise InputError(f"the messages of {path} have their own times; leave out --rate")
     if kind.is_bag:
-        with Bag(path, kind, limits) as bag:
-            loaded = from_bag(bag, columns, missing, held)
+        with bag_reader().Bag(path, kind, limits) as bag:
+            loaded = bag_reader().from_bag(bag, columns, missing, held)
     else:
         loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
     check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)

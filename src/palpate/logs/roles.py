@@ -1,7 +1,5 @@
 """Roles of a record's columns (time, length, force) and their possible units in a log."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from palpate.errors import InputError
-from palpate.files.limits import Limits
+from palpate.files.limits import ReadingLimits
 from palpate.logs import read
 from palpate.logs.arm_logs import read_wrench_and_pose
 from palpate.logs.kinds import Kind, kind_of
@@ -77,9 +77,9 @@ class Signals:
         return [split_spec(spec)[0] for spec in specs if spec]
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> ReadingLimits:
         """Limits of size and time."""
-        return Limits(self.max_size * 1e9, self.max_seconds)
+        return ReadingLimits(self.max_size * 1e9, self.max_seconds)
 
     def complete(self, path: Path, *, known_frame: bool = False) -> tuple["Signals", dict[str, Any]]:
         """The signals with the names that a log's own names, units and values leave no doubt of.

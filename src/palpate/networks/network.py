@@ -1,7 +1,5 @@
 """A small perceptron inside a kernel: forward, the gradients backwards, and one step down them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple

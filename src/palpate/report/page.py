@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +14,7 @@ from palpate.text import OPTION
 
 if TYPE_CHECKING:
     from markupsafe import Markup
+    from rich.console import Console
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,21 @@ class CommandAnswer:
     """The answer of a command, as a terminal and a program show it.
 
     Args:
+        json: for a program.
         title: what it is of.
         sentence: the answer, with what stands between it and the title.
         tables: below it.
         notes: warnings.
-        json: the same for a program.
+        show: prints it on a terminal instead of title, sentence, tables and notes, where its lines have a layout of
+            their own.
     """
 
-    title: str
-    sentence: str
-    tables: Sequence[Table]
-    notes: Sequence[str]
     json: Mapping[str, Any]
+    title: str = ""
+    sentence: str = ""
+    tables: Sequence[Table] = ()
+    notes: Sequence[str] = ()
+    show: Callable[[Console], None] | None = None
 
 
 _SENTENCE = 32

@@ -67,7 +67,7 @@ def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfL
         checked = {"file": str(check), "agrees": agrees, "numbers": numbers}
     if check is not None and rows:
         said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
-    return CommandAnswer(log, f": {said}", tables, notes, found.to_json() | {"check": checked})
+    return CommandAnswer(found.to_json() | {"check": checked}, log, f": {said}", tables, notes)
 
 
 def check_table(rows: list[NumberOfLoad]) -> Table:

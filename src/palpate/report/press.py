@@ -226,7 +226,7 @@ def answer_of(title: str, summary: dict[str, Any]) -> CommandAnswer:
     found = (summary["identified"] or {}).get("parameters", {})
     head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
     said = f"{head}\n{sentence(summary, found)}"
-    return CommandAnswer(title, said, tables(summary), notes(summary), summary)
+    return CommandAnswer(summary, title, said, tables(summary), notes(summary))
 
 
 def _force_table(summary: dict[str, Any]) -> Table:

@@ -15,6 +15,7 @@ from palpate.force.tuning import RIGID, Tuning
 from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import print_hanging
 from palpate.text import printable
 
@@ -74,6 +75,35 @@ def _peak(told: Tuning) -> str:
     if bound is None:
         return f"{told.peak:.4g} N predicted (no bound)"
     return f"{told.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
+
+
+def answer_of(
+    told: Tuning, inner: dict[str, object] | None, written: Sequence[object], *, verbose: bool
+) -> CommandAnswer:
+    """The answer of `palpate tune`.
+
+    Args:
+        told: the tuned loop.
+        inner: the arm's inner loop, if a log of it was given.
+        written: paths of the written files.
+        verbose: whether a terminal shows everything.
+    """
+    json, slide = told.to_json() | {"inner_loop": inner}, ""
+    if told.gains.slide is not None:
+        from palpate.force.sliding.slide_domain import slide_json, slide_sentence
+
+        json |= {"slide": slide_json(told.gains)}
+        slide = f"Slide: {slide_sentence(told.gains)}."
+
+    def display(console: Console) -> None:
+        if verbose:
+            show_all(told, console)
+        else:
+            show(told, console, written)
+        for line in (*filter(None, [slide]), *(f"written: {path}" for path in written if verbose)):
+            console.print(line, soft_wrap=True)
+
+    return CommandAnswer(json, show=display)
 
 
 def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:

@@ -3,8 +3,6 @@
 `scipy.signal` has the last ones too, but its import takes longer than the identification of a log; so `scipy.fft`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -12,8 +12,6 @@ NamedTuple of numbers with `start() -> state` and `step(state, desired, force, p
 fills in the fields `tick`, `theta`, `approach`, `noise` and `force`, where it has them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_type_hints

@@ -5,8 +5,6 @@ Capabilities, 2016) and the tree of robots (Nature Machine Intelligence, 2025, d
 the definitions are those below, made so that one record gives one number.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

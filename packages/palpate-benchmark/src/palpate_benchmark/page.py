@@ -1,7 +1,5 @@
 """The page of a result: its sentence, the leaderboard, a table an entry, and what the metrics mean."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

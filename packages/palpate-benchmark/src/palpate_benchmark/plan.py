@@ -1,7 +1,5 @@
 """Desired force of the test: a touch from free motion, a step up and down, and a sum of sines."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

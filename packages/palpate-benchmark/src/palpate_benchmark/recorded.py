@@ -5,8 +5,6 @@ steps down and up in its middle third; the force before is that of the touch. A 
 its mean over the loop's lag has, as palpate press says it; peaks, losses and rises are those of single readings.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ None knows the surface. Where a law wants a stiffness it is told `NOMINAL`; wher
 that makes it equal to the fixed integral on that stiffness. In the air all approach at the cautious law's speed.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from palpate._jit import law, part

@@ -5,8 +5,6 @@ has downloaded. The splits are those of the benchmark's own loader: estimation o
 multisine, and three tests, whose state may be found from their first 50 samples.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

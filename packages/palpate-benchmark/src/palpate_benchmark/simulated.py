@@ -1,7 +1,5 @@
 """The test in simulation: an entry on surfaces over a range of stiffness, some presses on each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

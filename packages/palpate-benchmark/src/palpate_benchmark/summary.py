@@ -1,7 +1,5 @@
 """Numbers of a result: over all presses, and on each stiffness; as values, as tables, in a sentence."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any

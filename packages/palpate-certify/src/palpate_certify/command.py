@@ -12,12 +12,14 @@ from cyclopts import Group, Parameter
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
 from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, si
-from palpate.cli.toolkit import command, console, print_answer, print_lines
+from palpate.cli.toolkit import command, console, print_lines, print_result
 from palpate.errors import InputError
 from palpate.files import MADE, read_text, write_text
 from palpate.force import Certificate
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from palpate.force import Certificate
     from palpate.force.certificate import CertificateVerdict
 
@@ -190,6 +192,7 @@ def _prove(path: Path, asked: ProofOptions, columns: ColumnOptions, output: Tuni
 
 def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: TuningOutputOptions) -> int:
     """Print where a controller of others is stable; 1 if it is not proved on all surfaces asked for."""
+    from palpate.report.page import CommandAnswer
     from palpate_certify.controller_file import STIFFEST, certify_controller
     from palpate_certify.report import lines, page
 
@@ -204,10 +207,8 @@ def _others(path: Path, others: OthersOptions, asked: ProofOptions, output: Tuni
     if report is not None:
         write_text(report, page(verdict, path, command()))
         written.append(report)
-    if output.json:
-        print_answer(answer)
-    else:
-        print_lines(*lines(answer, written))
+    text_lines = lines(answer, written)
+    print_result(CommandAnswer(answer, show=lambda _: print_lines(*text_lines)), json=output.json)
     proved = answer["proved"]["stiffness"]
     return 0 if proved is not None and proved[1] >= stiffest else 1
 
@@ -247,20 +248,18 @@ def _print(
     output: TuningOutputOptions,
     written: Path | None = None,
 ) -> None:
-    if output.json:
-        from palpate.force.describe import as_json
-
-        print_answer(as_json(certificate, verdict))
-        return
-    if output.verbose:
-        from palpate.force.describe import lines
-
-        print_lines(*lines(certificate, verdict))
-        return
+    from palpate.force.describe import as_json, lines
+    from palpate.report.page import CommandAnswer
     from palpate.report.terminal import print_hanging
     from palpate_certify.report import proof_lines
 
-    print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console())
+    def display(console: Console) -> None:
+        if output.verbose:
+            print_lines(*lines(certificate, verdict))
+        else:
+            print_hanging(proof_lines(certificate, verdict, written if certificate.claims else None), console)
+
+    print_result(CommandAnswer(as_json(certificate, verdict), show=display), json=output.json)
 
 
 def check_header(certificate: Certificate, path: Path) -> None:

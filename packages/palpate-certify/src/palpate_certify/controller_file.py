@@ -9,8 +9,6 @@ crisp, franka: m xdd = k (x_d - x) - d xd of the tip's mass m, the torque late b
     not given (controller details of utiasDSL/crisp_controllers; cartesian_impedance_example_controller of franka_ros).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import StringIO

@@ -10,8 +10,6 @@ def test_my_controller(check):
 A check that fails raises an AssertionError that names the violated law. ``palpate checks module:Class`` runs them all.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

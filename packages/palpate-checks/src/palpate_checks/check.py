@@ -1,7 +1,5 @@
 """One check of a part, and its outcome."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of every controller."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws of every identifier with a regressor and a force."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The checks of a plug-in: of its class, or of its instance in an experiment."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of every surface of any model: it is passive, one-sided, and stable at any step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

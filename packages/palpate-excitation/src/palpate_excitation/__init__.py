@@ -1,7 +1,5 @@
 """Which force to ask for, so that a surface shows its stiffness, its damping and its mass."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -4,8 +4,6 @@ A sweep goes between the two most informative frequencies, a multisine is that o
 requested precision, remedies are changed limits that do.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil

@@ -1,7 +1,5 @@
 """Surfaces and robots of an excitation: the force that a surface feels, and the uncertainty predicted from it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product

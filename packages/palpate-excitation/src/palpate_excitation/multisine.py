@@ -6,8 +6,6 @@ time averages it out. So it is simulated: the motion is rounded from some places
 parameters follow.
 """
 
-from __future__ import annotations
-
 from math import ceil, floor
 
 import numpy as np

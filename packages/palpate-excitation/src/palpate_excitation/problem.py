@@ -1,7 +1,5 @@
 """Problem of an excitation: goals, surfaces, limits, loop, and the information of the sensors by frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import hypot, inf

@@ -16,8 +16,6 @@ m_i)^-1, for the worst of several surfaces. The update multiplies each power by 
 Kiefer and Wolfowitz (1960; Fedorov, 1972) says how far from the optimum it can be at most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import gcd, sqrt

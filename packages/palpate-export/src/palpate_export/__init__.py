@@ -1,7 +1,5 @@
 """An identified contact for a simulator: MuJoCo, Drake, Newton, or a plate on a spring in MJCF."""
 
-from __future__ import annotations
-
 from palpate_export.contact import Contact, Quantity, contact_from
 from palpate_export.exporting import TARGETS, TOLERANCE, Checked, Exported, Request, check, prepare
 

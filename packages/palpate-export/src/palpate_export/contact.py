@@ -1,7 +1,5 @@
 """The contact that a simulator is to have: a spring and a damper, from what `palpate identify --json` prints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite

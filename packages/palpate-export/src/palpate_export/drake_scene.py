@@ -10,8 +10,6 @@ The law of SolverSemiImplicit and SolverFeatherstone (newton 1.8): f = ke d + kd
 damper works going in only. SolverMuJoCo takes ke and kd for a constraint of its own, and wants the rule of MuJoCo.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

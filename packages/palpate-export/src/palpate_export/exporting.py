@@ -4,8 +4,6 @@ Without a scene it is a plate on a slide joint with a spring and a damper, in MJ
 displacement.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

@@ -7,8 +7,6 @@ d-th part; R is read off the engine with the contact made, as it depends on both
 force among its edges, a flat probe among its points: 1/R is then the sum of theirs.
 """
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Iterator, Mapping

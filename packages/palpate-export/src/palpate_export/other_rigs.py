@@ -3,8 +3,6 @@
 In Newton both shapes have the exported contact, and SolverSemiImplicit steps them.
 """
 
-from __future__ import annotations
-
 import runpy
 from importlib import import_module
 from importlib.util import find_spec

@@ -3,8 +3,6 @@
 The rig of MuJoCo presses two geoms of a scene on each other.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tried, judged and bred laboratories, each in an SQLite file at once, so that none is computed twice."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager

@@ -1,7 +1,5 @@
 """Results of an inference, as a page, a document, a figure and JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

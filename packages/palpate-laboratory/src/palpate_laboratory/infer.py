@@ -1,7 +1,5 @@
 """The whole inference: two searches, new judgements of their results, and the findings; each piece on disk at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import partial

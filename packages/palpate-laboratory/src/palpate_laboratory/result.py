@@ -1,7 +1,5 @@
 """Results of an inference, and their numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

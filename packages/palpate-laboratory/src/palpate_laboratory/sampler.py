@@ -1,7 +1,5 @@
 """A tempered sequential Monte Carlo sampler on the unit cube, for likelihoods that cost seconds and are steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

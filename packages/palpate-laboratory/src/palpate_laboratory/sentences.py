@@ -1,7 +1,5 @@
 """The thesis' sentences about its laboratory, each with the threshold of its claim in one trial."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """The experiments of chapters 4 and 6 in one laboratory, each run once and only when a sentence asks for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The unknowns of the thesis' laboratory: for each its physical range, its prior, and why."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Mapping

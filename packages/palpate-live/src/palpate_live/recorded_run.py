@@ -17,7 +17,7 @@ from palpate.identification import Identification, Parameter
 from palpate.logs.read import read_log
 from palpate.records import Record
 from palpate.report.identification.page import TONES
-from palpate.report.identification.words import CALLED, formatted
+from palpate.report.identification.words import CALLED, full_number
 from palpate.robots.arm3 import Arm3
 from palpate.signals.types import NORMAL
 from palpate.text import printable
@@ -88,7 +88,7 @@ def clear_at_restarts(columns: dict[str, Array]) -> tuple[dict[str, Array], tupl
 
 
 def _fact(name: str, p: Parameter) -> dict[str, str]:
-    text = formatted(p) if p.value is not None else "no number"
+    text = full_number(p) if p.value is not None else "no number"
     return {"name": printable(name), "text": text, "verdict": str(p.verdict), "tone": TONES[p.verdict]}
 
 

@@ -112,7 +112,7 @@ def answer_of(result: MapResult) -> CommandAnswer:
     more = further(result)
     said = sentence(result) + (f" {' '.join(more)}." if more else "")
     title = f"{len(result.map)} presses"
-    return CommandAnswer(title, f": {said}", tables(result), warnings(result), result.to_json())
+    return CommandAnswer(result.to_json(), title, f": {said}", tables(result), warnings(result))
 
 
 def next_rows(result: MapResult) -> list[tuple[str, str, str]]:

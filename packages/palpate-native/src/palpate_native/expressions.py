@@ -8,7 +8,7 @@ import inspect
 import math
 import operator
 from collections import ChainMap
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import reduce
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from palpate._jit.registry import parts, stored
 from palpate._jit.stored import kind_of
 from palpate_native.normal_form import normal_form
 from palpate_native.source import refuse, syntax_of
-from palpate_native.structs import by_pointer, c_name, is_struct, members, number, plain
+from palpate_native.structs import by_pointer, c_name, is_struct, leaves, members, number, plain
 
 CHOICE, OR, AND, EQUAL, ORDER, SUM, PRODUCT, UNARY, ATOM = range(9)
 """How tightly C binds an expression."""
@@ -46,9 +46,11 @@ REMEDIES = {
     "unaryop": "use - of numbers and not of truths",
     "boolop": "join truths; write a if b else c for another value",
     "ifexp": "give both values one type",
-    "call": "call a law, or abs, max, sqrt, or palpate's log; in a statement of its own if it writes to an array",
+    "call": "call a law, or abs, max, sqrt, or palpate's log, with all its arguments in order; and alone in a "
+    "statement if it writes to an array",
     "for": "count with range by 1 or by -1, with a name that nothing else has",
     "assign": "assign one type, as 0.0 for 0, to a name or an array's element, and arrays of a size in numbers",
+    "other": "use numbers, parts, arrays, operators and laws",
 }
 """Remedies of refused syntax, by its kind."""
 
@@ -60,7 +62,6 @@ class Value(NamedTuple):
         text: of it; that of a struct behind a pointer begins with *.
         type: Numba's.
         rank: how tightly it binds.
-        place: whether it has an address.
         fields: of a struct that is made here.
         call: of a function that writes a large struct, up to the address.
     """
@@ -68,7 +69,6 @@ class Value(NamedTuple):
     text: str
     type: Any
     rank: int = ATOM
-    place: bool = False
     fields: tuple[Value, ...] = ()
     call: str = ""
 
@@ -78,14 +78,12 @@ class Value(NamedTuple):
 
     def member(self, name: str, kind: Any) -> Value:
         """A field of the struct."""
-        pointer = self.text.startswith("*")
-        text = f"{self.text[1:]}->{name}" if pointer else f"{self.at(ATOM)}.{name}"
-        return Value(text, kind, place=self.place)
+        return Value(f"{self.text[1:]}->{name}" if self.text[0] == "*" else f"{self.at(ATOM)}.{name}", kind)
 
     @property
     def address(self) -> str:
         """Where a struct is."""
-        return self.text[1:] if self.text.startswith("*") else f"&{self.at(UNARY)}"
+        return self.text[1:] if self.text[0] == "*" else f"&{self.at(UNARY)}"
 
 
 class Expressions:
@@ -110,9 +108,7 @@ class Expressions:
             OutsideSubset: it is not good.
         """
         if not good:
-            remedy = REMEDIES.get(
-                type(node).__name__.lower(), "use numbers, parts, arrays, operators and laws"
-            )
+            remedy = REMEDIES.get(type(node).__name__.lower(), REMEDIES["other"])
             refuse(self.function, node, ast.unparse(node).split("\n")[0], remedy)
 
     def expression(self, node: Any, alone: bool = False) -> Any:
@@ -131,8 +127,6 @@ class Expressions:
         """A value as one of another type."""
         if value.type == kind:
             return value
-        if value.fields:
-            return self._struct(value.fields, kind, node)
         self.need(not is_struct(value.type) and not is_struct(kind) and kind != self.whole.boolean, node)
         return Value(f"({self.whole.structs.name(kind)}){value.at(UNARY)}", kind, UNARY)
 
@@ -151,16 +145,14 @@ class Expressions:
 
     def _literal(self, value: Any, node: Any) -> Value:
         self.need(type(value) in self.whole.kinds, node)
-        rank = UNARY if number(value).startswith("-") else ATOM
-        return Value(number(value), self.whole.kinds[type(value)], rank)
+        return Value(number(value), self.whole.kinds[type(value)])
 
     def _name(self, node: Any) -> Value:
         if isinstance(node, ast.Name) and node.id in self.variables:
             return self.variables[node.id]
         found, name = self.python_object(node), getattr(node, "id", getattr(node, "attr", ""))
         if isinstance(found, np.ndarray | tuple) or (type(found) in (int, float) and math.isfinite(found)):
-            name, kind = self.whole.constant(name, found, self.function)
-            return Value(name, kind, place=True)
+            return Value(*self.whole.constant(name, found, self.function))
         return self._literal(found, node)
 
     def _attribute(self, node: ast.Attribute) -> Value:
@@ -170,23 +162,19 @@ class Expressions:
         fields = dict(members(part.type)) if is_struct(part.type) else {}
         if name in fields:
             return part.member(name, fields[name])
-        getter = inspect.getattr_static(getattr(part.type, "instance_class", None), node.attr, None)
-        self.need(isinstance(getter, property), node)
-        return self._calling(getter.fget, [part], node, own=True)
+        getter = getattr(_method(part, node), "fget", None)
+        self.need(getter, node)
+        return self._calling(getter, [part], node, own=True)
 
     def _tuple(self, node: ast.Tuple) -> Value:
-        return self._new_part([self.expression(one, alone=True) for one in node.elts], None, node)
+        return self._new_part([self.expression(one, alone=True) for one in node.elts])
 
-    def _new_part(self, values: list[Value], cls: Any, node: Any) -> Value:
+    def _new_part(self, fields: list[Value], cls: Any = None) -> Value:
         """A part, or a tuple, of its fields."""
         from numba import types
 
-        kinds = tuple(value.type for value in values)
-        return self._struct(values, plain(types.BaseTuple.from_types(kinds, cls)), node)
-
-    def _struct(self, values: Iterable[Value], kind: Any, node: Any) -> Value:
-        fields = [self.cast(value, one, node) for value, (_, one) in zip(values, members(kind), strict=True)]
-        text = ", ".join(one.at(CHOICE) for one in fields)
+        kind = plain(types.BaseTuple.from_types(tuple(value.type for value in fields), cls))
+        text = ", ".join(one.text for one in fields)
         return Value(f"({self.whole.structs.name(kind)}){{{text}}}", kind, fields=tuple(fields))
 
     def _subscript(self, node: ast.Subscript) -> Value:
@@ -194,24 +182,24 @@ class Expressions:
         base: Value = self.expression(node.value.value if shape else node.value)  # type: ignore[attr-defined]
         if is_struct(base.type):
             return self._field(base, node)
-        name, integer, ndim = base.at(ATOM), self.whole.integer, base.type.ndim
+        name, integer = base.at(ATOM), self.whole.integer
         if shape:
             return Value(f"{name}.shape[{self._index(node.slice, node).text}]", integer)
         if isinstance(node.slice, ast.Slice):
             part, of = node.slice, self.whole.structs.name(base.type)
-            self.need(part.step is None and ndim == 1, node)
-            start = self._index(part.lower, node).at(SUM + 1) if part.lower else "0"
+            self.need(part.lower and part.step is None and base.type.ndim == 1, node)
+            start = self._index(part.lower, node).at(SUM + 1)
             stop = self._index(part.upper, node).at(SUM) if part.upper else f"{name}.shape[0]"
             return Value(f"({of}){{{name}.at + {start}, {{{stop} - {start}}}}}", base.type)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        self.need(len(indices) == ndim, node)
+        self.need(len(indices) == base.type.ndim, node)
         place, *others = (self._index(index, node) for index in indices)
         for k, index in enumerate(others, 1):
             text = f"{place.at(PRODUCT)} * {name}.shape[{k}] + {index.at(PRODUCT)}"
             place = Value(text, integer, SUM)
-        return Value(f"{name}.at[{place.text}]", self.whole.real, place=True)
+        return Value(f"{name}.at[{place.text}]", self.whole.real)
 
-    def _index(self, index: ast.expr, node: ast.Subscript) -> Value:
+    def _index(self, index: Any, node: ast.Subscript) -> Value:
         value: Value = self.expression(index)
         self.need(value.type == self.whole.integer and not value.text.startswith("-"), node)
         return value
@@ -222,11 +210,11 @@ class Expressions:
         if place.text.isdigit():
             return base.member(*inner[int(place.text)])
         self.need(all(kind == inner[0][1] for _, kind in inner), node)
-        *others, value = (base.member(*one) for one in inner)
-        for k in reversed(range(len(others))):
+        values = [base.member(*one) for one in inner]
+        for k in reversed(range(len(values) - 1)):
             test = Value(f"{place.at(ORDER)} == {k}", self.whole.boolean, EQUAL)
-            value = self._choice(test, others[k], value)
-        return value
+            values[k] = self._choice(test, *values[k : k + 2])
+        return values[0]
 
     def _binop(self, node: ast.BinOp) -> Value:
         if not isinstance(node.op, ast.Pow):
@@ -267,45 +255,35 @@ class Expressions:
         return Value(sign.join(self.truth(one).at(EQUAL) for one in node.values), self.whole.boolean, rank)
 
     def _ifexp(self, node: ast.IfExp) -> Value:
-        test, values = (
-            self.truth(node.test),
-            [self.expression(x, alone=True) for x in (node.body, node.orelse)],
-        )
-        kind = self.whole.typing.unify_types(*(value.type for value in values))
-        return self._choice(test, *(self.cast(value, plain(kind), node) for value in values))
+        test = self.truth(node.test)
+        values = [self.expression(one, alone=True) for one in (node.body, node.orelse)]
+        kind = plain(self.whole.typing.unify_types(*(value.type for value in values)))
+        return self._choice(test, *(self.cast(value, kind, node) for value in values))
 
     def _choice(self, test: Value, a: Value, b: Value) -> Value:
         if by_pointer(a.type):
-            return Value(f"*({test.at(OR)} ? {a.address} : {b.address})", a.type, UNARY, place=True)
+            return Value(f"*({test.at(OR)} ? {a.address} : {b.address})", a.type, UNARY)
         return Value(f"{test.at(OR)} ? {a.at(OR)} : {b.at(CHOICE)}", a.type, CHOICE)
 
     def _call(self, node: ast.Call) -> Value:
-        callee = self.python_object(node.func)
-        if callee is None and isinstance(node.func, ast.Attribute):
-            part = self.expression(node.func.value)
-            callee = inspect.getattr_static(getattr(part.type, "instance_class", None), node.func.attr, None)
+        self.need(not node.keywords, node)
+        callee, part = self.python_object(node.func), []
+        own = callee is None and isinstance(node.func, ast.Attribute)
+        if own:
+            part = [self.expression(node.func.value)]  # type: ignore[attr-defined]
+            callee = _method(part[0], node.func)  # type: ignore[arg-type]
             self.need(inspect.isfunction(callee), node)
-            return self._calling(callee, self._arguments(callee, node, part), node, own=True)
+        values = [*part, *map(self.expression, node.args)]
         if callee in stored:
-            (of, reads), values = stored[callee], [self.expression(one) for one in node.args]
+            of, reads = stored[callee]
             kind = plain(kind_of(of))
             name = self.whole.helper("read_TYPE" if reads else "write_TYPE", kind)
-            return self._call_of(name, values, kind if reads else self.whole.none, node, writes=not reads)
+            return self._call_of(name, values, *((kind,) if reads else (self.whole.none, node)))
         if inspect.isfunction(callee):
-            return self._calling(callee, self._arguments(callee, node), node)
+            return self._calling(callee, values, node, own)
         if callee in parts:
-            return self._new_part(self._arguments(callee, node), callee, node)
-        return self._built_in(callee, [self.expression(one) for one in node.args], node)
-
-    def _arguments(self, callee: Any, node: ast.Call, *known: Value) -> list[Value]:
-        """Values of a call in the order of the function's parameters, `known` first, defaults where none is given."""
-        bound = inspect.signature(callee).bind(
-            *known, *node.args, **{str(w.arg): w.value for w in node.keywords}
-        )
-        bound.apply_defaults()
-        others = list(bound.arguments.values())[len(known) :]
-        others = [self.expression(x) if isinstance(x, ast.AST) else self._literal(x, node) for x in others]
-        return [*known, *others]
+            return self._new_part(values, callee)
+        return self._built_in(callee, values, node)
 
     def _built_in(self, callee: Any, values: list[Value], node: ast.Call) -> Value:
         """A call of one of Python's own functions, or of its mathematics."""
@@ -329,28 +307,29 @@ class Expressions:
         """A call of a function, which is translated first; of a part's `own`, or the one that Numba has for it."""
         kinds = tuple(value.type for value in values)
         function = callee if own else self.whole.rules.implementation(callee, kinds)
-        self.need(function, node)
+        self.need(function and function.__code__.co_argcount == len(values), node)
         tree = syntax_of(function)
         if isinstance(tree, ast.Lambda):
             inner = Expressions(self.whole, function)
-            inner.variables = dict(zip(function.__code__.co_varnames, values, strict=False))
+            inner.variables = dict(zip(function.__code__.co_varnames, values, strict=True))
             value: Value = inner.expression(normal_form(tree.body))
             return value
         known = self.whole.function(function, kinds)
-        return self._call_of(known.name, values, known.result, node, known.writes)
+        return self._call_of(known.name, values, known.result, node if known.writes else None)
 
-    def _call_of(
-        self, name: str, values: list[Value], kind: Any, node: Any = None, writes: bool = False
-    ) -> Value:
-        """A call in C; that of a large struct writes it where its last argument points to."""
-        if writes:
-            self.need(id(node) in self._alone, node)
-            arrays = [one for one in values if getattr(one.type, "ndim", 0) or is_struct(one.type)]
-            self.writes |= any(value.text not in self.scratch for value in arrays)
-        texts = [value.address if by_pointer(value.type) else value.at(CHOICE) for value in values]
+    def _call_of(self, name: str, values: list[Value], kind: Any, writer: Any = None) -> Value:
+        """A call in C, of a `writer` to arrays; that of a large struct writes it where its last argument points to."""
+        if writer:
+            self.need(id(writer) in self._alone, writer)
+            self.writes |= any(leaves(one.type) > 1 and one.text not in self.scratch for one in values)
+        texts = [value.address if by_pointer(value.type) else value.text for value in values]
         call = f"{name}({', '.join(texts)}"
         if not by_pointer(kind):
             return Value(f"{call})", kind)
-        call += ", " if texts else ""
         new = f"&({self.whole.structs.name(kind)}){{0}}"
-        return Value(f"*{call}{new})", kind, UNARY, place=True, call=call)
+        return Value(f"*{call}, {new})", kind, UNARY, call=f"{call}, ")
+
+
+def _method(part: Value, node: ast.Attribute) -> Any:
+    """A function or a property of a part, by an attribute's name."""
+    return inspect.getattr_static(getattr(part.type, "instance_class", None), node.attr, None)

@@ -18,79 +18,76 @@ class _Rewriting(ast.NodeTransformer):
     def __init__(self) -> None:
         self._temporaries = 0
 
-    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+    def visit(self, node: ast.AST) -> Any:
+        """Rewrites a node after those inside it; the new nodes stand at its place in the file."""
+        new = getattr(self, f"_{type(node).__name__.lower()}", lambda one: one)(self.generic_visit(node))
+        for one in new if isinstance(new, list) else [new]:
+            ast.fix_missing_locations(ast.copy_location(one, node))
+        return new
+
+    def _compare(self, node: ast.Compare) -> ast.expr:
         """`a < b < c` as `a < b and b < c`; `a in (b, c)` as `a == b or a == c`."""
-        self.generic_visit(node)
         inside = isinstance(node.ops[0], ast.In | ast.NotIn)
         if inside and isinstance(node.comparators[0], ast.Tuple):
-            each = [ast.Compare(node.left, [ast.Eq()], [one]) for one in node.comparators[0].elts]
-            value: ast.expr = ast.BoolOp(ast.Or(), each)  # type: ignore[arg-type]
-            value = ast.UnaryOp(ast.Not(), value) if isinstance(node.ops[0], ast.NotIn) else value
-        elif len(node.ops) > 1:
-            triples = zip([node.left, *node.comparators], node.ops, node.comparators, strict=False)
-            value = ast.BoolOp(ast.And(), [ast.Compare(a, [op], [b]) for a, op, b in triples])
-        else:
-            return node
-        return _at_place_of(value, node)
+            value = ast.BoolOp(
+                ast.Or(), [ast.Compare(node.left, [ast.Eq()], [one]) for one in node.comparators[0].elts]
+            )
+            return ast.UnaryOp(ast.Not(), value) if isinstance(node.ops[0], ast.NotIn) else value
+        triples = zip([node.left, *node.comparators], node.ops, node.comparators, strict=False)
+        pairs: list[ast.expr] = [ast.Compare(a, [op], [b]) for a, op, b in triples]
+        return ast.BoolOp(ast.And(), pairs) if len(pairs) > 1 else node
 
-    def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
+    def _augassign(self, node: ast.AugAssign) -> list[ast.stmt]:
         """`a += b` as `a = a + b`."""
-        self.generic_visit(node)
-        before = copy.deepcopy(node.target)
+        before = copy.copy(node.target)
         before.ctx = ast.Load()
-        return self._assign(node.target, _at_place_of(ast.BinOp(before, node.op, node.value), node), node)
+        return [ast.Assign([node.target], ast.BinOp(before, node.op, node.value))]
 
-    def visit_Assign(self, node: ast.Assign) -> list[ast.stmt]:
+    def _assign(self, node: ast.Assign) -> list[ast.stmt]:
         """`a = b = c` as two assignments, and `a, b = c, d`."""
-        self.generic_visit(node)
-        if len(node.targets) == 1:
-            return self._assign(node.targets[0], node.value, node)
         lines: list[ast.stmt] = []
-        value = node.value
-        if not isinstance(value, ast.Constant | ast.UnaryOp):
-            lines, value = self._temporary(value)
-        return [*lines, *(line for one in node.targets for line in self._assign(one, value, node))]
+        alone = len(node.targets) == 1 or isinstance(node.value, ast.Constant | ast.UnaryOp)
+        value = node.value if alone else self._temporary(node.value, lines)
+        return [*lines, *(line for target in node.targets for line in self._split(target, value))]
 
-    def _assign(self, target: Any, value: Any, node: ast.stmt) -> list[ast.stmt]:
+    def _split(self, target: Any, value: Any) -> list[ast.stmt]:
         """Assigns an expression; of a tuple each element, and none before all are read that another's place is in."""
         if not isinstance(target, ast.Tuple):
-            return [_at_place_of(ast.Assign([target], value), node)]
+            return [ast.Assign([target], value)]
         lines: list[ast.stmt] = []
         if isinstance(value, ast.Tuple):
             pairs = list(zip(target.elts, value.elts, strict=True))
-            later = [(one, read) for i, (one, _) in enumerate(pairs) for _, read in pairs[i + 1 :]]
-            if any(_may_read(read, one) for one, read in later):
-                for i, (one, read) in enumerate(pairs):
-                    if not isinstance(read, ast.Constant):
-                        new, name = self._temporary(read)
-                        lines, pairs[i] = lines + new, (one, name)
+            if any(_may_read(read, one) for i, (one, _) in enumerate(pairs) for _, read in pairs[i + 1 :]):
+                pairs = [
+                    (one, read if isinstance(read, ast.Constant) else self._temporary(read, lines))
+                    for one, read in pairs
+                ]
         else:
-            if not isinstance(value, ast.Name):
-                lines, value = self._temporary(value)
-            parts = [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(len(target.elts))]
+            whole = value if isinstance(value, ast.Name) else self._temporary(value, lines)
+            parts = ((one, ast.Constant(i)) for i, one in enumerate(target.elts))
             pairs = [
-                pair for pair in zip(target.elts, parts, strict=True) if getattr(pair[0], "id", "") != "_"
+                (one, ast.Subscript(whole, i, ast.Load()))
+                for one, i in parts
+                if getattr(one, "id", "") != "_"
             ]
-        return lines + [
-            line for one, part in pairs for line in self._assign(one, _at_place_of(part, node), node)
-        ]
+        return lines + [line for one, part in pairs for line in self._split(one, part)]
 
-    def _temporary(self, value: ast.expr) -> tuple[list[ast.stmt], ast.Name]:
-        """The value under a name that the function does not have."""
+    def _temporary(self, value: ast.expr, lines: list[ast.stmt]) -> ast.Name:
+        """Stores a value in a variable that the function does not have, in one more line."""
         self._temporaries += 1
         name = f"value{self._temporaries}_"
-        line = ast.Assign([ast.Name(name, ast.Store())], value)
-        return [_at_place_of(line, value)], ast.Name(name, ast.Load())
-
-
-def _at_place_of(node: Any, beside: ast.AST) -> Any:
-    """A new node where another stands in the file."""
-    return ast.fix_missing_locations(ast.copy_location(node, beside))
+        lines.append(ast.Assign([ast.Name(name, ast.Store())], value))
+        return ast.Name(name, ast.Load())
 
 
 def _may_read(node: ast.expr, stored: ast.expr) -> bool:
     """Whether an expression may read what was stored before: a name, or any element of an array."""
-    targets = stored.elts if isinstance(stored, ast.Tuple) else [stored]
-    names = {one.id for one in ast.walk(node) if isinstance(one, ast.Name)}
-    elements = any(isinstance(one, ast.Subscript | ast.Call) for one in ast.walk(node))
-    return any(one.id in names if isinstance(one, ast.Name) else elements for one in targets)
+    reads, stores = list(ast.walk(node)), list(ast.walk(stored))
+    names = {one.id for one in stores if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)}
+    elements = any(isinstance(one, ast.Subscript) for one in stores)
+    return any(
+        one.id in names
+        if isinstance(one, ast.Name)
+        else elements and isinstance(one, ast.Subscript | ast.Call)
+        for one in reads
+    )

@@ -34,16 +34,21 @@ if(BUILD_TESTING)
   add_test(NAME recorded_press COMMAND replay ${{CMAKE_CURRENT_SOURCE_DIR}}/test/press.bin)
 endif()
 
-find_package(ament_cmake QUIET)
+find_package(Python3 COMPONENTS Interpreter QUIET)
+if(Python3_FOUND)
+  execute_process(COMMAND ${{Python3_EXECUTABLE}} -c "import ament_package" RESULT_VARIABLE NO_AMENT ERROR_QUIET)
+  if(NO_AMENT EQUAL 0)
+    find_package(ament_cmake QUIET)
+  endif()
+endif()
 if(ament_cmake_FOUND)
   ament_export_targets({name}Targets)
   ament_package()
 else()
+  message(STATUS "a plain CMake package: there is no ament_cmake, or ${{Python3_EXECUTABLE}} has no ament_package; "
+    "-DPython3_EXECUTABLE=... names another Python")
   file(WRITE ${{CMAKE_CURRENT_BINARY_DIR}}/{name}Config.cmake
-    "include(${{CMAKE_CURRENT_LIST_DIR}}/{name}Targets.cmake)\\n")
-  string(REPLACE "${{CMAKE_CURRENT_LIST_DIR}}" "\\${{CMAKE_CURRENT_LIST_DIR}}" CONFIG
-    "include(${{CMAKE_CURRENT_LIST_DIR}}/{name}Targets.cmake)\\n")
-  file(WRITE ${{CMAKE_CURRENT_BINARY_DIR}}/{name}Config.cmake "${{CONFIG}}")
+    "include(\\${{CMAKE_CURRENT_LIST_DIR}}/{name}Targets.cmake)\\n")
   install(FILES ${{CMAKE_CURRENT_BINARY_DIR}}/{name}Config.cmake DESTINATION share/{name}/cmake)
 endif()
 """
@@ -134,8 +139,16 @@ _ROS = """// Made by palpate: update() of a ros2_control controller around the f
 
 #include <controller_interface/controller_interface.hpp>
 
+#include <algorithm>
+#include <cmath>
+
 class PressController : public controller_interface::ControllerInterface {
-public:
+public: // on_init and the configurations of both kinds of interfaces are those of your arm
+    controller_interface::CallbackReturn on_activate(const rclcpp_lifecycle::State &) override {
+        loop_.reset();
+        command_ = state_interfaces_[1].get_value(); // the first command is where the tip is
+        return controller_interface::CallbackReturn::SUCCESS;
+    }
     controller_interface::return_type update(const rclcpp::Time &, const rclcpp::Duration &period) override {
         const double force = state_interfaces_[0].get_value();    // along the normal, positive where it presses [N]
         const double position = state_interfaces_[1].get_value(); // along the normal, growing into the surface [m]

@@ -131,7 +131,8 @@ def unequal_ticks(module: Module, sources: Sources, inputs: int, presses: Iterab
         build = [*command, *shlex.split(FLAGS), f"{module.name}.c", "replay.c", "-o", "replay", "-lm"]
         built = subprocess.run(build, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         if built.returncode != 0:
-            first = next((line for line in built.stderr.splitlines() if "error" in line), built.stderr[:200])
+            says = built.stderr or f"exit code {built.returncode}"
+            first = next((line for line in says.splitlines() if "error" in line), says[:200])
             raise InputError(f"{command[0]} refuses the C: {first}; name another compiler in CC")
         write_rows(folder / "press.bin", presses)
         run = subprocess.run([folder / "replay"], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603

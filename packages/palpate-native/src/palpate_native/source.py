@@ -14,7 +14,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
-import palpate
 from palpate.errors import InputError
 
 _DIRECTIVE = re.compile(r"#\s*(fmt|noqa|type|ruff|mypy)\b")
@@ -25,41 +24,39 @@ class OutsideSubset(InputError):
     """A law has something that the subset of Python which becomes C does not have; the text names file and line."""
 
 
-def refuse(function: Callable[..., Any], node: ast.AST, fault: str, remedy: str) -> NoReturn:
+def refuse(function: Callable[..., Any], node: Any, fault: str, remedy: str) -> NoReturn:
     """Raises the refusal of a node of a function.
 
     Raises:
         OutsideSubset: always.
     """
-    place = place_of(function, getattr(node, "lineno", 0))
+    place = place_of(function, node.lineno)
     raise OutsideSubset(f"{place}: {function.__name__}: {fault} has no C here; {remedy}")
 
 
-def place_of(function: Callable[..., Any], line: int = 0) -> str:
-    """File and line of a function, from the package's folder on; or another line of it."""
-    return f"{_short(function.__code__.co_filename)}:{line or function.__code__.co_firstlineno}"
-
-
-def _short(file: str) -> str:
-    path = Path(file)
-    roots = (Path(str(one.__file__)).resolve().parents[1] for one in (palpate, sys.modules[__package__]))
-    return next((path.relative_to(root).as_posix() for root in roots if root in path.parents), file)
+def place_of(function: Callable[..., Any], line: int) -> str:
+    """File and line of a function's code, from the folder of its package on."""
+    file, packages = function.__code__.co_filename, function.__module__.count(".")
+    return f"{'/'.join(Path(file).parts[-1 - packages :]) if packages else file}:{line}"
 
 
 def syntax_of(function: Callable[..., Any]) -> ast.FunctionDef | ast.Lambda:
     """The syntax tree of a function or a lambda, from its file.
 
     Raises:
-        OutsideSubset: it has no file.
+        OutsideSubset: it has no file, or another begins in its line.
     """
-    code = function.__code__
-    names = list(code.co_varnames[: code.co_argcount])
+    code, found = function.__code__, []
     for node in ast.walk(_tree(code.co_filename)):
-        if isinstance(node, ast.FunctionDef | ast.Lambda) and names == [one.arg for one in node.args.args]:
-            lines = [node.lineno, *(one.lineno for one in getattr(node, "decorator_list", ()))]
-            if min(lines) == code.co_firstlineno:
-                return node
-    raise OutsideSubset(f"{code.co_filename}: no source of {function.__name__}; keep the law in a file")
+        if isinstance(node, ast.FunctionDef | ast.Lambda):
+            first = min([node, *getattr(node, "decorator_list", ())], key=lambda one: one.lineno)
+            found += [node] if first.lineno == code.co_firstlineno else []
+    if len(found) != 1:
+        place = place_of(function, code.co_firstlineno)
+        raise OutsideSubset(
+            f"{place}: no source of {function.__name__} alone; keep the law in a file, in lines of its own"
+        )
+    return found[0]
 
 
 @functools.cache
@@ -97,9 +94,14 @@ def home_of(name: str, value: Any, function: Callable[..., Any]) -> tuple[str, s
     return function.__module__, ""
 
 
+def comment_text(text: str) -> str:
+    """A text as a C comment can have it."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
 def first_sentence(text: str) -> str:
-    """The first paragraph of a docstring in one line, safe inside a C comment."""
-    return " ".join(text.strip().split("\n\n")[0].split()).replace("*/", "* /").replace("/*", "/ *")
+    """The first paragraph of a docstring in one line of a C comment."""
+    return comment_text(" ".join(text.strip().split("\n\n")[0].split()))
 
 
 def field_notes(cls: type) -> dict[str, str]:

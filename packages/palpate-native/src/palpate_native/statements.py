@@ -15,7 +15,7 @@ from palpate._jit.registry import parts
 from palpate_native.expressions import SUM, UNARY, Expressions, Value
 from palpate_native.normal_form import normal_form
 from palpate_native.source import comments_of, syntax_of
-from palpate_native.structs import by_pointer, c_name, is_struct, members
+from palpate_native.structs import by_pointer, c_name, is_struct, leaves, members
 
 STEP = "    "
 
@@ -54,15 +54,12 @@ class FunctionBody(Expressions):
         """The function in C."""
         parameters = []
         for argument, kind in zip(self._given, self.kinds, strict=True):
-            own, of = c_name(argument), self.whole.structs.name(kind)
-            given = f"const {of} *{own}" if by_pointer(kind) else f"{of} {own}"
-            value = _behind(own, kind) if by_pointer(kind) else Value(own, kind, place=True)
-            if by_pointer(kind) and self._stores[argument] > 1:
-                self._first.append(f"{of} {own}_;")
-            if not self._uses[argument]:
-                self._first.append(f"(void){own};")
-            parameters.append(given)
-            self.variables[argument], self._blocks[argument] = value, self.tree.body
+            own, of, large = c_name(argument), self.whole.structs.name(kind), by_pointer(kind)
+            parameters.append(f"const {of} *{own}" if large else f"{of} {own}")
+            self.variables[argument] = _behind(own, kind) if large else Value(own, kind)
+            self._blocks[argument] = self.tree.body
+            self._first += [f"{of} {own}_;"] if large and self._stores[argument] > 1 else []
+            self._first += [] if self._uses[argument] else [f"(void){own};"]
         returns = [one.value for one in ast.walk(self.tree) if isinstance(one, ast.Return) and one.value]
         if len(returns) == 1:
             once = {name for name, times in _names(returns).items() if times == 1 and name not in self._given}
@@ -76,24 +73,21 @@ class FunctionBody(Expressions):
         return "\n".join([head, *(STEP + line for line in self._first), *lines, "}"])
 
     def _block(self, block: list[ast.stmt]) -> list[str]:
-        lines, before = [], self._block_now
+        lines = []
         for statement in block:
             self._block_now = block
             new = self.expression(statement)
             if new and statement.lineno in self._comments:
                 new[0] += f" /* {self._comments.pop(statement.lineno)} */"
             lines += [STEP + line for line in new]
-        self._block_now = before
         return lines
 
     def _expr(self, node: ast.Expr) -> list[str]:
         comment = isinstance(node.value, ast.Constant)
         return [] if comment else [f"{self.expression(node.value, alone=True).text};"]
 
-    def _break(self, node: ast.Break | ast.Continue) -> list[str]:
-        return [f"{type(node).__name__.lower()};"]
-
-    _continue = _break
+    def _break(self, _: ast.Break) -> list[str]:
+        return ["break;"]
 
     def _while(self, node: ast.While) -> list[str]:
         self.need(not node.orelse, node)
@@ -114,7 +108,7 @@ class FunctionBody(Expressions):
         values = [self.cast(self.expression(one), self.whole.integer, one) for one in call.args]
         at, down, own = int(len(values) > 1), len(values) == 3, c_name(target)
         self.need(not down or values[2].text == "-1", node)
-        self.variables[target] = Value(own, self.whole.integer, place=True)
+        self.variables[target] = Value(own, self.whole.integer)
         first, end = f"int64_t {own} = {values[0].text if at else '0'}", values[at].at(SUM)
         if re.search(r"[^-\w]", end) or changes[getattr(call.args[at], "id", "")]:
             first, end = f"{first}, {own}_end = {values[at].text}", f"{own}_end"
@@ -157,7 +151,6 @@ class FunctionBody(Expressions):
         value = self.expression(node.value, alone=True)
         if isinstance(target, ast.Name):
             return self._store(target.id, value, node)
-        self.need(isinstance(target, ast.Subscript), node)
         place = self.expression(target)
         self.need(".at[" in place.text, node)
         self.writes |= self.expression(_root(target)).text not in self.scratch
@@ -170,33 +163,32 @@ class FunctionBody(Expressions):
         if known and known.type == value.type:
             return self._store_again(name, known, value)
         self.need(not known or self._blocks[name] is self._block_now, node)
-        of, large, block = self.whole.structs.name(value.type), by_pointer(value.type), self._block_now
-        home = self._homes.pop(name, None)
-        if home and home.type == value.type and not known:
-            self.variables[name], self._blocks[name] = _behind(c_name(name), value.type), block
-            self._first.append(f"{of} *{c_name(name)} = {home.address};")
-            self._standing.add((f"*{c_name(name)}", home.text))
-            return self._fill(self.variables[name], value)
-        place = Value(f"{c_name(name)}_{of}" if known else c_name(name), value.type, place=True)
-        self.variables[name], self._blocks[name] = place, block
-        if not known and _names(block)[name] != self._uses[name]:
-            zero = "{0}" if is_struct(value.type) or hasattr(value.type, "ndim") else "0"
-            self._first.append(f"{of} {place.text} = {zero};")
-            return self._fill(place, value)
-        if large and value.place and not value.call and self._stays(name, node.value):
+        of, own = self.whole.structs.name(value.type), c_name(name)
+        large, built = by_pointer(value.type), value.call or value.fields
+        place, home = Value(f"{own}_{of}" if known else own, value.type), self._homes.pop(name, None)
+        self.variables[name], self._blocks[name] = place, self._block_now
+        if home:
+            place = self.variables[name] = _behind(own, value.type)
+            self._first.append(f"{of} *{own} = {home.address};")
+            self._standing.add((place.text, home.text))
+        elif not known and _names(self._block_now)[name] != self._uses[name]:
+            self._first.append(f"{of} {own} = {'{0}' if leaves(value.type) > 1 else '0'};")
+        elif large and built:
+            return [f"{of} {place.text};", *self._fill(place, value)]
+        elif large and self._stays(name, node.value):
             self.variables[name] = _behind(place.text, value.type)
             return [f"const {of} *{place.text} = {value.address};"]
-        if large and (value.call or value.fields):
-            return [f"{of} {place.text};", *self._fill(place, value)]
-        text = value.text.removeprefix(f"({of})") if is_struct(value.type) else value.text
-        return [f"{of} {place.text} = {text};"]
+        else:
+            text = value.text.removeprefix(f"({of})") if is_struct(value.type) else value.text
+            return [f"{of} {place.text} = {text};"]
+        return self._fill(place, value)
 
     def _store_again(self, name: str, known: Value, value: Value) -> list[str]:
         """Assigns to a variable; an argument by pointer then points to a struct of the function's own."""
         if value.text == known.text:
             return []
         own, given = known.text.removeprefix("*"), name in self._given and by_pointer(known.type)
-        place = Value(f"{own}_", known.type, place=True) if given else known
+        place = Value(f"{own}_", known.type) if given else known
         reads = re.search(rf"(?<![\w>.]){re.escape(own)}\b", value.text)
         lines = [f"{place.text} = {value.text};"] if reads else self._fill(place, value)
         return [*lines, f"{own} = &{place.text};"] if given else lines
@@ -212,10 +204,10 @@ class FunctionBody(Expressions):
 
         size, name = node.value.args[0], getattr(target, "id", "")
         lengths: Any = [getattr(one, "value", None) for one in getattr(size, "elts", [size])]
-        self.need(all(type(n) is int for n in lengths), node)
-        self.need(_names(self._block_now)[name] == self._uses[name] > 0, node)
+        inside = _names(self._block_now)[name] == self._uses[name] > 0
+        self.need(inside and all(type(n) is int for n in lengths), node)
         kind, own = types.Array(types.float64, len(lengths), "C"), c_name(name)
-        self.variables[name] = Value(own, kind, place=True)
+        self.variables[name] = Value(own, kind)
         self.scratch.add(own)
         return [
             f"double {own}_numbers[{math.prod(lengths)}] = {{0}};",
@@ -225,7 +217,7 @@ class FunctionBody(Expressions):
 
 def _behind(name: str, kind: Any) -> Value:
     """The struct behind a pointer."""
-    return Value(f"*{name}", kind, UNARY, place=True)
+    return Value(f"*{name}", kind, UNARY)
 
 
 def _root(node: Any) -> Any:

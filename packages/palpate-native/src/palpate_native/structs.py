@@ -33,11 +33,7 @@ def plain(kind: Any) -> Any:
     """A Numba type without literals in it: the type of any such value."""
     from numba import types
 
-    kind = types.unliteral(kind)
-    if is_struct(kind):
-        named = getattr(kind, "instance_class", None)
-        return types.BaseTuple.from_types(tuple(plain(one) for one in kind.types), named)
-    return types.Array(kind.dtype, kind.ndim, kind.layout) if isinstance(kind, types.Array) else kind
+    return types.unliteral(kind)
 
 
 def is_struct(kind: Any) -> bool:
@@ -60,20 +56,19 @@ def leaves(kind: Any) -> int:
 
 def by_pointer(kind: Any) -> bool:
     """Whether functions take values of a type by a pointer to constant, and write them where a pointer says."""
-    return is_struct(kind) and leaves(kind) > LARGE
+    return leaves(kind) > LARGE
 
 
 def c_name(name: str, field: bool = False) -> str:
     """A name of Python as one of C: no leading underscore, none that the language or its library has."""
-    bare = name.strip("_") or "unnamed"
+    bare = name.strip("_")
     taken = bare in _OF_THE_LANGUAGE.split() or (not field and bare in _OF_ITS_LIBRARY.split())
     return f"{bare}_" if taken or bare != name else bare
 
 
 def number(value: float | bool) -> str:
     """A number as C reads it back, to the last bit."""
-    text = str(value) if isinstance(value, int | np.bool_) else repr(float(value))
-    return _NUMBERS.get(text, text)
+    return _NUMBERS.get(str(value), str(value))
 
 
 def initial(value: Any, kind: Any) -> str:
@@ -81,7 +76,7 @@ def initial(value: Any, kind: Any) -> str:
     if is_struct(kind):
         inner = [initial(one, of) for one, (_, of) in zip(value, members(kind), strict=True)]
     elif hasattr(kind, "ndim"):
-        table = np.asarray(value, dtype=float)
+        table = np.asarray(value)
         numbers = "".join(
             f"\n    {', '.join(map(number, row))}," for row in table.reshape(-1, table.shape[-1]).tolist()
         )
@@ -121,7 +116,6 @@ class Structs:
         Raises:
             KeyError: a type that the subset does not have.
         """
-        kind = plain(kind)
         if kind not in self._names:
             name, text = self._struct(kind, publish) if is_struct(kind) else self._view(kind)
             short = self._names[kind] = self._claim(name)
@@ -134,7 +128,7 @@ class Structs:
         return self._public.get(short, short) if publish else short
 
     def _view(self, kind: Any) -> tuple[str, str]:
-        if getattr(kind, "layout", "") != "C" or self._names[kind.dtype] != "double":
+        if getattr(kind, "layout", "") != "C" or self._names[kind.dtype] != "double" or kind.ndim > 3:
             raise KeyError(kind)
         order = ["", ", row by row", ", table by table, row by row"][kind.ndim - 1]
         return f"array{kind.ndim}", VIEW.format(order, kind.ndim)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.typing_rules import TypingRules
-from palpate_native.source import home_of, place_of, refuse
+from palpate_native.source import comment_text, home_of, place_of, refuse
 from palpate_native.statements import FunctionBody
 from palpate_native.structs import Structs, c_name, initial, plain
 
@@ -63,8 +63,12 @@ class Translation:
             except KeyError as error:
                 fault, remedy = f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays"
                 refuse(function, body.tree, fault, remedy)
-            says = [*_docstring(function), place_of(function)]
-            comment = "\n".join(f" * {line}".rstrip() for line in says).removeprefix(" * ")
+            says = (
+                comment_text(inspect.cleandoc(function.__doc__ or "")),
+                place_of(function, function.__code__.co_firstlineno),
+            )
+            lines = "\n\n".join(filter(None, says)).split("\n")
+            comment = "\n".join(f" * {line}".rstrip() for line in lines).removeprefix(" * ")
             self.definitions.append(f"/* {comment} */\n{text}")
         return self._functions[key]
 
@@ -98,9 +102,3 @@ class Translation:
         own = next(choice for choice in choices if choice not in self._taken)
         self._taken.add(own)
         return own
-
-
-def _docstring(function: Callable[..., Any]) -> list[str]:
-    """Lines of a function's own docstring, an empty one behind them; none where it has none."""
-    text = inspect.cleandoc(function.__doc__ or "").replace("*/", "* /").replace("/*", "/ *")
-    return [*text.split("\n"), ""] if text else []

@@ -7,6 +7,7 @@ import json
 import math
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -89,15 +90,30 @@ def test_the_strictest_compiler_finds_nothing(name, request, tmp_path):
 
 @needs_compiler
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="there is no CMake")
-def test_the_folder_builds_installs_and_passes_its_own_test(force, tmp_path):
-    force.write(tmp_path / "law", "0", replace=False)
+@pytest.mark.parametrize("ament", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_the_folder_builds_installs_and_passes_its_own_test(force, tmp_path, ament):
+    """As a plain CMake package by a Python without `ament_package`, and as an ament package by the one that has it."""
+    python = "/usr/bin/python3" if ament else sys.executable
+    asked = subprocess.run([python, "-c", "import ament_package"], check=False, capture_output=True)
+    if ament and asked.returncode != 0:
+        pytest.skip("there is no ament_cmake")
+    force.write(tmp_path / "law", "0.1.0", replace=False)
     for words in (
-        ("cmake", "-S", "law", "-B", "build", "-DCMAKE_INSTALL_PREFIX=there"),
+        (
+            "cmake",
+            "-S",
+            "law",
+            "-B",
+            "build",
+            "-DCMAKE_INSTALL_PREFIX=there",
+            f"-DPython3_EXECUTABLE={python}",
+        ),
         ("cmake", "--build", "build"),
         ("ctest", "--test-dir", "build"),
         ("cmake", "--install", "build"),
     ):
         subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "there" / "share" / "ament_index").is_dir() == ament
     (tmp_path / "use").mkdir()
     (tmp_path / "use" / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.16)\nproject(use CXX)\nfind_package(palpate_force REQUIRED)\n"

@@ -7,8 +7,6 @@ Second: the linear parameters by Cholesky's factors of the normal equations, the
 the gradient of what is left of the sum of squares. Both have to agree to 20 digits; 15 are written, 11 are certified.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

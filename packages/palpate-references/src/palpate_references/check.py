@@ -1,7 +1,5 @@
 """Checks solvers against the certified logs: the digits in which each parameter and its deviation agree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf, log10

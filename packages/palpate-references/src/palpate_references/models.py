@@ -4,8 +4,6 @@ Each model is linear in its parameters but for at most two. A function turns the
 the elementary functions of a number type into the columns of the regression; arrays are of floats or of objects.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A certified log: its motion, its forces, starting values, and the certified parameters."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Laws of every wire, for your own too: `palpate checks module:Class?WHERE`. The arm is at rest, and none moves it."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator

@@ -7,8 +7,6 @@ that turns the tool, and settings that would change what is simulated are refuse
 controller does, it ends the motion where 20 commands in a row are missing.
 """
 
-from __future__ import annotations
-
 import struct
 import sys
 from typing import Any

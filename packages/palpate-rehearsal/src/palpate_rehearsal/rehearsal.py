@@ -1,7 +1,5 @@
 """Common parts of the simulated arms that stand in for real ones: an arm of one direction, its messages, its pace."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

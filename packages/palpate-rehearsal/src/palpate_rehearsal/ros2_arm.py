@@ -6,8 +6,6 @@ controller of ros2_control does after its time-out. The tool keeps pointing down
 standard error, and the arm rests.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from typing import Any

@@ -7,8 +7,6 @@ joints are those of a UR5e. Variables of RTDE that are not simulated are NaN, or
 one is NOT_FOUND.
 """
 
-from __future__ import annotations
-
 import selectors
 import socket
 import struct

@@ -1,7 +1,5 @@
 """A UR's controller with ur-rtde's control script, on a simulated arm: commands in, variables out."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable

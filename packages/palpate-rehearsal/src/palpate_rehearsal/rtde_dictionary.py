@@ -1,7 +1,5 @@
 """Variables of RTDE and their types, as the tables of UR's guide to the Real-Time Data Exchange interface have them."""
 
-from __future__ import annotations
-
 CODES = {
     "VECTOR6D": "6d", "VECTOR3D": "3d", "VECTOR6INT32": "6i", "UINT64": "Q", "UINT32": "I", "INT32": "i", "UINT8": "B",
     "BOOL": "?", "DOUBLE": "d",

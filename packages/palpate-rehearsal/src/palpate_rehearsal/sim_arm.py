@@ -4,8 +4,6 @@ It moves in one direction and listens on the loopback alone. Readings go to one 
 it rests.
 """
 
-from __future__ import annotations
-
 import socket
 import time
 from dataclasses import dataclass

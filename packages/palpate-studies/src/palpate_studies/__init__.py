@@ -4,8 +4,6 @@ from palpate_studies import run
 frame = run(text_of_a_study, "runs/mine")
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

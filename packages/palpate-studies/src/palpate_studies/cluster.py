@@ -1,7 +1,5 @@
 """Many runs on a Dask cluster: batches of runs go to its workers, rows come back in any order."""
 
-from __future__ import annotations
-
 import logging
 import math
 import pickle

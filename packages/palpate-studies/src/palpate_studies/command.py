@@ -204,5 +204,5 @@ def _show(found: Findings, folder: Path, as_json: bool) -> None:
     tables, summary = found.tables, found.summary
     few = [tables[0], *tables[1:2], tables[-1]] if len(tables) > _SHOWN else tables
     said = f", {summary['runs']} runs\n{chr(10).join(summary['answer'])}"
-    answer = CommandAnswer(summary["study"], said, few, found.notes, summary)
+    answer = CommandAnswer(summary, summary["study"], said, few, found.notes)
     print_result(answer, json=as_json, files=[("report:", folder / "report.html")])

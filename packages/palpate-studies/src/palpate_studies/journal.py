@@ -1,7 +1,5 @@
 """A journal: one value per line with its checksum, on disk at once; damaged lines are skipped."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

@@ -1,7 +1,5 @@
 """The values of a parameter, and their effect on an experiment: dotted paths are read, set, multiplied or added to."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

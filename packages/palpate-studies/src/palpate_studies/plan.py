@@ -3,8 +3,6 @@
 The points are those of Sobol's sequence, one by one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

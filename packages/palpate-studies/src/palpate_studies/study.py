@@ -1,7 +1,5 @@
 """A study: one TOML file with its experiment, parameters and metrics, and its tables; checked at the edge."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar

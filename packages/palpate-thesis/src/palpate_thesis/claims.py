@@ -1,7 +1,5 @@
 """Claims of the thesis and their verdicts; their texts are in claims.toml."""
 
-from __future__ import annotations
-
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

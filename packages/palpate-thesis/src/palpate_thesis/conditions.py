@@ -1,7 +1,5 @@
 """Worlds that the figures are tried in: other surfaces, other friction, other poses; as changes of an experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar
 

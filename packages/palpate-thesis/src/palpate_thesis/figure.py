@@ -1,7 +1,5 @@
 """Interface of a file under `figures/` or `explanations/`, and the discovery of these files."""
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Sequence
 from importlib import import_module

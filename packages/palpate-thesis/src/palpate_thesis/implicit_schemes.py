@@ -3,8 +3,6 @@
 The thesis names them in a sentence each; the laws are those of their kind, the numbers are ours.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """One look for all figures: sizes, colours and frames; and the types that drawing functions name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any

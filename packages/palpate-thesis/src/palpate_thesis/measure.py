@@ -1,7 +1,5 @@
 """Measures the thesis, study by study; each result is on disk at once, and an interrupted run resumes."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace

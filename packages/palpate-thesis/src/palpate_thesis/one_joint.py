@@ -3,8 +3,6 @@
 Thesis, sec. 2.2, fig. 2.3 and 2.4; after Yabuta and Yamada. The network gives the torque.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

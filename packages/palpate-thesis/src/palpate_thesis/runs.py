@@ -1,7 +1,5 @@
 """Many runs of an experiment: over seeds, over parameters, on all cores."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -4,8 +4,6 @@ Makers' libraries wait for answers for as long as they choose, and some let no o
 process that holds one also outlives this one: it brings the arm to rest when this process has gone or stands still.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import socket

@@ -1,7 +1,5 @@
 """An arm at rest before a press: rate, bias and noise, and the faults with which no press should begin."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

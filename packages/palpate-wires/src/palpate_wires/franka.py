@@ -1,7 +1,5 @@
 """The wire to a Franka, by pylibfranka in a process of its own: the controller's state in, speeds of the tool out."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 from palpate.errors import InputError

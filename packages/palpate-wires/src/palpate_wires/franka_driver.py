@@ -6,8 +6,6 @@ packet: each state is answered within the tick, with the speed that was asked fo
 with less and less.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import select

@@ -4,8 +4,6 @@ The guard lets no command out that is not finite and within the limits, and ends
 still. The stop conditions compare each reading with the limits.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -4,8 +4,6 @@ One thread reads the arm and hands its readings on; the other takes commands. If
 that the loop bears, or the loop's process has gone, the arm is brought to rest.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -1,7 +1,5 @@
 """From an address to a wire: KIND:WHERE without any default, or module:Class of one's own."""
 
-from __future__ import annotations
-
 import re
 import sys
 

@@ -1,7 +1,5 @@
 """Order of a press over a wire, with its limits; checked against the gains before anything moves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Orientations as the arms give them, as quaternions x, y, z, w."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Rows go into a file that is mapped into memory: what is written there outlives t
 become `record.parquet`, which `palpate identify` takes as it takes the record of a run.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ all stop conditions, and each speed goes out through the guard. Whatever ends th
 all that came is kept.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

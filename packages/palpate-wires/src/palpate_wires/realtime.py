@@ -1,7 +1,5 @@
 """Priority for a loop or a simulated controller, where the system gives one, and a word where it does not."""
 
-from __future__ import annotations
-
 import gc
 import os
 import struct

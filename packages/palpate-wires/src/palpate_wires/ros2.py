@@ -1,7 +1,5 @@
 """The wire to an arm under ROS 2, by cyclonedds alone: wrench, pose or joints in; a twist, pose or array out."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Their fields are those of the definitions that rosbags carries; here stands only
 Needs cyclonedds and rosbags.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from types import new_class

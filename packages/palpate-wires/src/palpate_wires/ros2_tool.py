@@ -1,7 +1,5 @@
 """Where an arm's tool is, from what ROS 2 publishes of it: its pose, or the positions of the arm's joints."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

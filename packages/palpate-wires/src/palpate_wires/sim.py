@@ -1,7 +1,5 @@
 """The wire to an arm of ours in another process, over loopback: `python -m palpate_rehearsal.sim_arm` is that arm."""
 
-from __future__ import annotations
-
 import math
 import secrets
 import socket

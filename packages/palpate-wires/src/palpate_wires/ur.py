@@ -4,8 +4,6 @@ ur-rtde waits for a controller for as long as it chooses, and mostly lets no oth
 in a process of its own.
 """
 
-from __future__ import annotations
-
 import socket
 import time
 from importlib.util import find_spec

@@ -275,7 +275,7 @@ def spread_default(text: str, kind: str) -> Typed[tuple[float, float]]:
     return Typed(text, spread("the default", text, kind))
 
 
-def typed(parse: Callable[[str, str], Any]) -> Parameter:
+def typed_option(parse: Callable[[str, str], Any]) -> Parameter:
     """An option that is kept as it is typed, beside its value.
 
     Args:
@@ -299,20 +299,20 @@ if TYPE_CHECKING:
 else:
     Quantity = Ends = Triple = str  # what the help names
 
-Damping = Annotated[Quantity, typed(partial(quantity, kind="damping"))]
-Force = Annotated[Quantity, typed(partial(quantity, kind="force"))]
-ForceRate = Annotated[Quantity, typed(partial(quantity, kind="force rate"))]
-Frequency = Annotated[Quantity, typed(partial(quantity, kind="frequency"))]
-Length = Annotated[Quantity, typed(partial(quantity, kind="length"))]
-Mass = Annotated[Quantity, typed(partial(quantity, kind="mass"))]
-Stiffness = Annotated[Quantity, typed(partial(quantity, kind="stiffness"))]
-Time = Annotated[Quantity, typed(partial(quantity, kind="time"))]
-Velocity = Annotated[Quantity, typed(partial(quantity, kind="velocity"))]
-DampingRange = Annotated[Ends, typed(partial(spread, kind="damping"))]
-MassRange = Annotated[Ends, typed(partial(spread, kind="mass"))]
-StiffnessRange = Annotated[Ends, typed(partial(spread, kind="stiffness"))]
-TimeRange = Annotated[Ends, typed(partial(spread, kind="time"))]
-Interval = Annotated[Ends, typed(span)]
-Angles = Annotated[Triple, typed(partial(vector, quantity="angle"))]
-Direction = Annotated[Triple, typed(partial(vector, quantity="number"))]
-Point = Annotated[Triple, typed(partial(vector, quantity="length"))]
+Damping = Annotated[Quantity, typed_option(partial(quantity, kind="damping"))]
+Force = Annotated[Quantity, typed_option(partial(quantity, kind="force"))]
+ForceRate = Annotated[Quantity, typed_option(partial(quantity, kind="force rate"))]
+Frequency = Annotated[Quantity, typed_option(partial(quantity, kind="frequency"))]
+Length = Annotated[Quantity, typed_option(partial(quantity, kind="length"))]
+Mass = Annotated[Quantity, typed_option(partial(quantity, kind="mass"))]
+Stiffness = Annotated[Quantity, typed_option(partial(quantity, kind="stiffness"))]
+Time = Annotated[Quantity, typed_option(partial(quantity, kind="time"))]
+Velocity = Annotated[Quantity, typed_option(partial(quantity, kind="velocity"))]
+DampingRange = Annotated[Ends, typed_option(partial(spread, kind="damping"))]
+MassRange = Annotated[Ends, typed_option(partial(spread, kind="mass"))]
+StiffnessRange = Annotated[Ends, typed_option(partial(spread, kind="stiffness"))]
+TimeRange = Annotated[Ends, typed_option(partial(spread, kind="time"))]
+Interval = Annotated[Ends, typed_option(span)]
+Angles = Annotated[Triple, typed_option(partial(vector, quantity="angle"))]
+Direction = Annotated[Triple, typed_option(partial(vector, quantity="number"))]
+Point = Annotated[Triple, typed_option(partial(vector, quantity="length"))]

@@ -110,8 +110,7 @@ class Answer:
     def half(self) -> Array:
         """95 % half-widths of all causes together, shape (p,)."""
         parts = self.budget.values()
-        freedom = [np.broadcast_to(part.freedom, part.variance.shape) for part in parts]
-        return half_widths([part.variance for part in parts], freedom)
+        return half_widths([part.variance for part in parts], [part.each for part in parts])
 
     def half_of(self, name: str) -> float:
         """The same of one parameter."""

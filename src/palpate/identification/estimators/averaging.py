@@ -159,11 +159,7 @@ def _mean(weight: Array, spreads: list[Spread]) -> Spread:
     variance = np.stack([own.variance for own in spreads]) * weight[:, None]
     whole = variance.sum(axis=0)
     loss = sum(
-        (
-            own / np.broadcast_to(spread.freedom, own.shape)
-            for own, spread in zip(variance, spreads, strict=True)
-        ),
-        np.zeros(len(whole)),
+        (own / spread.each for own, spread in zip(variance, spreads, strict=True)), np.zeros(len(whole))
     )
     return Spread(whole, np.where(loss > 0, whole / np.where(loss > 0, loss, 1.0), np.inf))
 

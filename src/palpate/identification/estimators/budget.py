@@ -40,14 +40,18 @@ class Spread:
     variance: Array
     freedom: Array | float = np.inf
 
+    @property
+    def each(self) -> Array:
+        """The degrees of freedom of each parameter, shape (p,)."""
+        return np.broadcast_to(self.freedom, self.variance.shape)
+
     def of(self, places: list[int]) -> Spread:
         """Of some of the parameters."""
-        return Spread(self.variance[places], np.broadcast_to(self.freedom, self.variance.shape)[places])
+        return Spread(self.variance[places], self.each[places])
 
     def at(self, place: int) -> Contribution:
         """Contribution to the uncertainty of one parameter."""
-        freedom = np.broadcast_to(self.freedom, self.variance.shape)
-        return Contribution(float(np.sqrt(self.variance[place])), float(freedom[place]))
+        return Contribution(float(np.sqrt(self.variance[place])), float(self.each[place]))
 
 
 Budget = dict[str, Spread]

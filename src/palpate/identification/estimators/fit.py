@@ -96,16 +96,6 @@ def resting(jacobian: Array, position: Array, count: float, stiffness: float) ->
     return found
 
 
-def of_derivatives(model: Model, theta: Array) -> tuple[Array, Array]:
-    """How noise of the position's derivatives 0 to 3 stands in the columns, (p, 4), and in the force, (4,)."""
-    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)
-    for name, d in model.derivatives.items():
-        place = model.linear.index(name)
-        noisy[place, d] = 1.0
-        force[d] = theta[place]
-    return noisy, force
-
-
 def bias_corrected(
     model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
 ) -> Compensation:
@@ -114,7 +104,10 @@ def bias_corrected(
     Where no sensor's way and no encoder's counts are known, the noise is only known to be no larger: nothing is taken
     out then, and all that it may have done is open.
     """
-    noisy, force = of_derivatives(model, theta)
+    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)  # of the position's derivatives 0 to 3
+    for name, d in model.derivatives.items():
+        place = model.linear.index(name)
+        noisy[place, d], force[d] = 1.0, theta[place]
     noisy[-1, 1:] = -force[:3]
     weight = np.zeros(len(theta)) if std is None else (level / std) ** 2
     asked = lag.std > 0
@@ -128,39 +121,23 @@ def bias_corrected(
     return Compensation(np.append(part.step, 0.0), np.pad(part.less, (0, 1)), np.pad(part.doubt, (0, 1)))
 
 
-def hidden(model: Model, motion: Motion, jacobian: Array, theta: Array) -> Array:
-    """Covariance of Phi' e for what the position's encoder hides, as `resting` has it, shape (p, p)."""
-    stiffness = float(theta[model.linear.index("K")]) if "K" in model.linear else 0.0
-    return resting(jacobian, motion.moved(0, float(theta[-1])), motion.noise.count, stiffness)
-
-
 @dataclass(frozen=True)
 class Fit:
     """A model fitted to a log.
 
     Args:
-        model: which.
         names: of the parameters: the linear ones, then the nonlinear ones, then the lag.
         theta: their values, shape (p,).
         cov: their covariance, coloured noise and the lag's uncertainty included, shape (p, p).
-        predicted, residuals: of the filtered force, shape (n,).
-        r2, rmse: of the fit.
+        r2: share of the force's variance that it explains.
         noise: colour of the residuals.
-        lag: the lag used [s].
-        jacobian: of the predicted force by all of them, shape (n, p).
     """
 
-    model: Model
     names: tuple[str, ...]
     theta: Array
     cov: Array
-    predicted: Array
-    residuals: Array
     r2: float
-    rmse: float
     noise: Noise
-    lag: float
-    jacobian: Array
 
     def __getitem__(self, name: str) -> float:
         return float(self.theta[self.names.index(name)])
@@ -205,20 +182,7 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | Non
             of every interval.
         start: where that search begins [s]; the prior's value if not given.
     """
-    asked = lag if lag.std > 0 else None
-    descent = Descent(model, motion, force)
-    best = descent.best_start(lag.value if start is None else start)
-    for _ in range(2 if asked or lag.mass else 1):
-        best = descent.from_point(best, asked)
-        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
-        descent = replace(descent, known=prior_of(lag, noise, asked is not None))
-    if descent.known.known:
-        best = descent.from_point(best, asked)
-    return _finish(descent, best, lag)
-
-
-def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
-    model, motion, force = descent.model, descent.motion, descent.force
+    descent, point = _search(model, motion, force, lag, start)
     jacobian = descent.jacobian(point)
     names = names_of(model)
     noise = noise_of(point.residuals, motion.rows, len(names) - int(lag.std == 0))
@@ -229,7 +193,8 @@ def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
     if model.of_position:
         by_noise = bias_corrected(model, motion, jacobian, theta, level, lag, std)
         theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
-        more = hidden(model, motion, jacobian, theta)
+        stiffness = float(theta[names.index("K")]) if "K" in names else 0.0
+        more = resting(jacobian, motion.moved(0, float(theta[-1])), motion.noise.count, stiffness)
     prior = np.full(len(names), np.inf) if std is None else std
     prior[-1] = lag.std
     cov, own = np.zeros_like(pulled), slice(None if lag.std > 0 else -1)
@@ -243,17 +208,30 @@ def _finish(descent: Descent, point: Point, lag: Lag) -> Fit:
     )
     residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.nonlinear.values(), point.lag])
     spread = float(np.mean((force - force.mean()) ** 2))
-    rmse = float(np.sqrt(np.mean(residuals**2)))
-    return Fit(
-        model=model,
-        names=names,
-        theta=theta,
-        cov=cov,
-        predicted=force - residuals,
-        residuals=residuals,
-        r2=1 - rmse**2 / spread if spread else 0.0,
-        rmse=rmse,
-        noise=noise,
-        lag=float(theta[-1]),
-        jacobian=jacobian,
-    )
+    return Fit(names, theta, cov, 1 - float(np.mean(residuals**2)) / spread if spread else 0.0, noise)
+
+
+def nonlinear_fit(model: Model, motion: Motion, force: Array, lag: Lag) -> dict[str, float]:
+    """The nonlinear parameters of a model by least squares, by name.
+
+    Args:
+        model: which.
+        motion: the position.
+        force: filtered, at the motion's rows, shape (n,).
+        lag: what is known about it.
+    """
+    return _search(model, motion, force, lag)[1].nonlinear
+
+
+def _search(
+    model: Model, motion: Motion, force: Array, lag: Lag, start: float | None = None
+) -> tuple[Descent, Point]:
+    """The least cost, and the search with what is known beside the log against its noise."""
+    asked = lag if lag.std > 0 else None
+    descent = Descent(model, motion, force)
+    best = descent.best_start(lag.value if start is None else start)
+    for _ in range(2 if asked or lag.mass else 1):
+        best = descent.from_point(best, asked)
+        noise = float(np.sqrt(best.rss / max(len(force) - len(best.theta), 1)))
+        descent = replace(descent, known=prior_of(lag, noise, asked is not None))
+    return descent, descent.from_point(best, asked) if descent.known.known else best

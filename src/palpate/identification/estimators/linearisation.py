@@ -22,7 +22,7 @@ from palpate.identification.estimators.averaging import (
 )
 from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
 from palpate.identification.estimators.descent import linearised, slope_of_lag
-from palpate.identification.estimators.fit import fit
+from palpate.identification.estimators.fit import nonlinear_fit
 from palpate.identification.estimators.octaves import (
     Octaves,
     Segment,
@@ -302,8 +302,8 @@ def _linearise(
         return {}, {**own, LAG: slope}, problem.force + slope * lag
     nonlinear = {p.name: theta[p.name] for p in model.nonlinear if p.name in theta}
     if len(nonlinear) < len(model.nonlinear):
-        fitted = fit(model, motion, problem.force, replace(problem.lag, value=lag, std=0.0))
-        nonlinear = {p.name: fitted[p.name] for p in model.nonlinear}
+        exact = replace(problem.lag, value=lag, std=0.0)
+        nonlinear = nonlinear_fit(model, motion, problem.force, exact)
     at, jacobian, residuals = linearised(model, motion, problem.force, nonlinear, lag)
     free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
     own = {name: jacobian[:, i] for name, i in free.items()}

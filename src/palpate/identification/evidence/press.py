@@ -28,7 +28,7 @@ from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
-from palpate.identification.tangents import Slopes, SteadyPress
+from palpate.identification.steady_press import Slopes, SteadyPress, few_points
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
@@ -169,9 +169,6 @@ _LEVELS = (0.3, 0.5, 0.7, 0.9)
 _WIDE = 0.15
 """Half of the share of the force about a level over which its slope is taken: the levels lie .2 apart."""
 
-_SHOWN = 400
-"""Points of a curve that are kept at most, to be drawn."""
-
 
 def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
     """The press of a log; None without a loading."""
@@ -184,8 +181,8 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     back = unloading_of(problem, lag, segments)
     return Press(
         tuple(t for t in tangent if t.half < abs(t.stiffness)),
-        _thin(loading.depth, loading.force),
-        _thin(*back.curve),
+        few_points(np.stack([loading.depth, loading.force])),
+        few_points(back.curve),
         back.loss,
         relaxation(problem, lag, segments, slope_between(loadings, later)),
         back.late,
@@ -255,11 +252,6 @@ def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
 def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.intp]:
     """Rows about a share of the force between two ends."""
     return np.flatnonzero(np.abs((force - low) / (high - low or 1.0) - level) < _WIDE)
-
-
-def _thin(x: Array, f: Array) -> Array:
-    step = max(len(x) // _SHOWN, 1)
-    return np.stack([x[::step], f[::step]])
 
 
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]

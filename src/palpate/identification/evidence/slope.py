@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.filters.state_variable import ORDER, Chain
+from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.tangents import Slopes
+from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
@@ -75,7 +75,7 @@ def loadings_in(problem: Problem, lag: float, segments: list[Segment]) -> list[L
             x, v, f, t = channels
             whole = Loading(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
             loading = Loading(x[advance], v[advance], f[advance], t[advance], whole)
-            found.append(replace(_sharpen(loading, motion.chain), read=_as_read(problem, lag, loading)))
+            found.append(replace(loading, read=_as_read(problem, lag, loading)))
     return found
 
 
@@ -102,20 +102,6 @@ def _as_read(problem: Problem, lag: float, loading: Loading) -> Array | None:
     return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
 
-def _sharpen(loading: Loading, chain: object) -> Loading:
-    """The same without what the filter adds to a curve.
-
-    The mean of a square is the square of the mean and the variance: behind a filter a force of bend c over the depth is
-    larger by c times the way within the filter's memory squared, to the second order of that.
-    """
-    if not isinstance(chain, Chain):
-        return loading
-    way = (chain.delay / ORDER**0.5 * loading.speed) ** 2
-    u = loading.depth - loading.depth[_meeting_point(loading)].mean()
-    bend = _last(np.column_stack([np.ones(len(u)), u, u**2 + way]), loading, 1e-6)
-    return replace(loading, force=loading.force - bend * way)
-
-
 def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> tuple[int, int]:
     """The advance without a rest that goes farthest; the whole, if none goes half of the range of all.
 
@@ -127,26 +113,20 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 
 
-def _meeting_point(loading: Loading) -> Mask:
-    """Rows in which the surface is met."""
-    low, high = np.percentile(loading.force, [2, 98])
-    rows: Mask = loading.force >= low + _MET * (high - low)
-    return rows
-
-
-def _last(columns: Array, loading: Loading, least: float) -> float:
-    """Coefficient of the last column in the force where the surface is met; 0 for directions below a share."""
-    own = columns[_meeting_point(loading)]
-    size = np.sqrt((own**2).sum(axis=0))
-    size[size == 0] = 1.0
-    theta, *_ = np.linalg.lstsq(own / size, loading.force[_meeting_point(loading)], rcond=least)
-    return float(theta[-1] / size[-1])
-
-
 def of_speed(loading: Loading) -> float:
     """Dependence of the force on the speed over a whole loading, beside a spring that may curve [N s/m]."""
-    u = loading.depth - loading.depth[_meeting_point(loading)].mean()
-    return _last(np.column_stack([np.ones(len(u)), u, u**2, loading.speed]), loading, 1e-3)
+    low, high = np.percentile(loading.force, [2, 98])
+    met = loading.force >= low + _MET * (high - low)
+    u = loading.depth - loading.depth[met].mean()
+    return _last_of(np.column_stack([np.ones(len(u)), u, u**2, loading.speed])[met], loading.force[met])
+
+
+def _last_of(columns: Array, force: Array) -> float:
+    """Coefficient of the last column in a force; nothing of directions below a thousandth of the columns."""
+    size = np.sqrt((columns**2).sum(axis=0))
+    size[size == 0] = 1.0
+    theta, *_ = np.linalg.lstsq(columns / size, force, rcond=1e-3)
+    return float(theta[-1] / size[-1])
 
 
 _UPPER = 0.4
@@ -278,8 +258,5 @@ def _at_rest(loading: Loading) -> float:
     advances tell the two apart.
     """
     rows = _upper(loading.force)
-    columns = np.column_stack([np.ones(len(rows)), loading.depth[rows], loading.speed[rows]])
-    size = np.sqrt((columns**2).sum(axis=0))
-    size[size == 0] = 1.0
-    theta, *_ = np.linalg.lstsq(columns / size, loading.force[rows], rcond=1e-3)
-    return float(theta[1] / size[1])
+    columns = np.column_stack([np.ones(len(rows)), loading.speed[rows], loading.depth[rows]])
+    return _last_of(columns, loading.force[rows])

@@ -32,7 +32,7 @@ from palpate.identification.in_series import slopes_without_series
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, WorkingPoint
-from palpate.identification.tangents import Slopes
+from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement, Parameter, Verdict
 from palpate.signals.types import NORMAL
 

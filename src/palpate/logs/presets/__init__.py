@@ -1,7 +1,5 @@
 """Columns or topics, units and frames of the recorders that come with usual robots, a TOML file each."""
 
-from __future__ import annotations
-
 import tomllib
 from importlib.resources import files
 from typing import Any

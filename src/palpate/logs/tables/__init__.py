@@ -1,10 +1,8 @@
 """Logs of columns: text, Parquet, MATLAB, spreadsheets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
-from palpate.files.limits import Limits, ReadingBudget
+from palpate.files.limits import ReadingBudget, ReadingLimits
 from palpate.logs.kinds import Kind
 from palpate.logs.tables.matlab import read_matlab
 from palpate.logs.tables.parquet import read_parquet
@@ -15,13 +13,15 @@ from palpate.logs.tables.text import read_text_sheet
 __all__ = ["Sheet", "Stated", "equal_sheets", "open_table"]
 
 
-def open_table(path: Path, kind: Kind, delimiter: str | None = None, limits: Limits | None = None) -> Sheet:
+def open_table(
+    path: Path, kind: Kind, delimiter: str | None = None, limits: ReadingLimits | None = None
+) -> Sheet:
     """A file of columns, read where they are asked for.
 
     Raises:
         InputError: it cannot be read, or is larger than the limits.
     """
-    budget = ReadingBudget(path, limits or Limits())
+    budget = ReadingBudget(path, limits or ReadingLimits())
     match kind:
         case Kind.MAT:
             return read_matlab(path, budget)

@@ -1,7 +1,5 @@
 """Layout of a text log: its delimiter, its first row, the names and units above it."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """MATLAB files, v4 to v7: variables as columns of numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from io import SEEK_CUR
 from itertools import product

@@ -17,7 +17,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.files.confined import read_confined
-from palpate.files.limits import Limits, ReadingBudget
+from palpate.files.limits import ReadingBudget, ReadingLimits
 from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 from palpate.records import Record
@@ -124,7 +124,7 @@ def _query(
     return read_confined(__name__, path, "Parquet", budget, question)
 
 
-def stored_about(path: Path, limits: Limits | None = None) -> About | None:
+def stored_about(path: Path, limits: ReadingLimits | None = None) -> About | None:
     """Units and metadata that palpate left in a Parquet file; None where there are none.
 
     Raises:
@@ -139,7 +139,7 @@ def stored_about(path: Path, limits: Limits | None = None) -> About | None:
         ) from None
 
 
-def head(path: Path, limits: Limits | None = None) -> ParquetHead:
+def head(path: Path, limits: ReadingLimits | None = None) -> ParquetHead:
     """Read the statements of a Parquet file about itself.
 
     Raises:
@@ -148,17 +148,19 @@ def head(path: Path, limits: Limits | None = None) -> ParquetHead:
     return _open(path, limits)[0]
 
 
-def _open(path: Path, limits: Limits | None) -> tuple[ParquetHead, Array | None]:
+def _open(path: Path, limits: ReadingLimits | None) -> tuple[ParquetHead, Array | None]:
     """The head; and all columns, shape (columns, rows), of a small record of palpate's own."""
     try:
         state = path.stat()
     except FileNotFoundError:
         raise InputError(f"there is no file {path}; check the path") from None
-    return _head(path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), limits or Limits())
+    return _head(
+        path, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns), limits or ReadingLimits()
+    )
 
 
 @lru_cache(maxsize=_KEPT)
-def _head(path: Path, state: tuple[int, ...], limits: Limits) -> tuple[ParquetHead, Array | None]:
+def _head(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> tuple[ParquetHead, Array | None]:
     arrays, also = read_confined(__name__, path, "Parquet", ReadingBudget(path, limits))
     return msgspec.convert(also, ParquetHead), arrays.get("numbers")
 
@@ -273,13 +275,13 @@ def write_parquet(frame: DataFrame, about: str, path: Path) -> None:
         draft.write_bytes(packed.getbuffer())
 
 
-def read_record(path: str | Path, limits: Limits | None = None) -> Record:
+def read_record(path: str | Path, limits: ReadingLimits | None = None) -> Record:
     """Read back what `write_record` wrote.
 
     Raises:
         InputError: the file is missing, is no Parquet file, or was not written by palpate.
     """
-    path, limits = Path(path), limits or Limits()
+    path, limits = Path(path), limits or ReadingLimits()
     about = stored_about(path, limits)
     if about is None:
         raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")

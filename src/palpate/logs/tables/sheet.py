@@ -1,7 +1,5 @@
 """A file of columns: one value that the function of each format fills."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

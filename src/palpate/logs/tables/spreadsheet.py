@@ -1,7 +1,5 @@
 """Spreadsheets: each sheet is a table with the lines above its rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
 from palpate.files.confined import read_confined
-from palpate.files.limits import LimitError, Limits, ReadingBudget
+from palpate.files.limits import LimitError, ReadingBudget, ReadingLimits
 from palpate.logs.tables.sheet import Cells, Sheet
 from palpate.logs.tables.text import read_text_sheet
 
@@ -96,7 +94,7 @@ def sheets_of(path: Path, budget: ReadingBudget) -> tuple[dict[str, Sheet], dict
     return sheets, left_out
 
 
-def equal_sheets(path: Path, limits: Limits, names: Sequence[str] = ()) -> list[Path]:
+def equal_sheets(path: Path, limits: ReadingLimits, names: Sequence[str] = ()) -> list[Path]:
     """The sheets with the columns that most sheets of a book have, as `BOOK.xlsx/SHEET`: repeats of one test.
 
     Args:
@@ -115,7 +113,7 @@ def equal_sheets(path: Path, limits: Limits, names: Sequence[str] = ()) -> list[
 
 
 @lru_cache(maxsize=_KEPT)
-def _contents(path: Path, state: tuple[int, ...], limits: Limits) -> dict[str, str]:
+def _contents(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> dict[str, str]:
     """The sheets' text by title; `state` tells a changed file from the one that is kept."""
     arrays, _ = read_confined(__name__, path, "a spreadsheet", ReadingBudget(path, limits))
     return {title: content.tobytes().decode() for title, content in arrays.items()}

@@ -13,7 +13,7 @@ from palpate.errors import InputError
 from palpate.identification.causes import Code, cause_of
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification import figure
+from palpate.report.identification import details, figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.words import (
     ADVICE,
@@ -23,10 +23,11 @@ from palpate.report.identification.words import (
     UNIT_WARNINGS,
     UNTOUCHED,
     Source,
+    as_json,
     behind_the_arm,
     by_the_model,
     first_reason,
-    formatted,
+    full_number,
     interval,
     limited_by,
     place_of,
@@ -35,6 +36,7 @@ from palpate.report.identification.words import (
     unit_warnings,
 )
 from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import print_hanging
 from palpate.signals.types import NORMAL
 from palpate.text import printable
@@ -113,6 +115,34 @@ def show(
     print_hanging(printed, console)
 
 
+def answer_of(
+    found: Identification, source: Source, places: Sequence[str], more: str, *, verbose: bool, budget: bool
+) -> CommandAnswer:
+    """The answer of `palpate identify` for one log.
+
+    Args:
+        found: what the log gives.
+        source: the log.
+        places: of the written files.
+        more: options by which all evidence is shown.
+        verbose: whether all evidence is printed.
+        budget: whether the uncertainty budgets are.
+    """
+
+    def display(console: Console) -> None:
+        if not verbose:
+            show(found, source.title, console, source.notes, "   ".join([*places, f"all evidence: {more}"]))
+        else:
+            details.show(found, source.title, console)
+            for line in (*source.notes, *places):
+                console.print(line, soft_wrap=True)
+        if budget:
+            details.show_budgets(found, console)
+
+    file = {"file": source.file, "sha256": source.sha256}
+    return CommandAnswer({"files": [file], **as_json(found, source)}, show=display)
+
+
 def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
     """The lines, with their styles."""
     for text in unit_warnings(found):
@@ -172,7 +202,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
 
 def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
     """The value, what it is and its verdict; below, what it belongs to."""
-    value = "no number" if p.value is None else formatted(p)
+    value = "no number" if p.value is None else full_number(p)
     line = Text(value, style="bold").append(f"   {what}   ").append(mark)
     yield line.append(printable(f"        {name}") if name else "")
     yield Text(printable(f"{' ' * (len(value) + 3)}{detail}"))
@@ -237,7 +267,7 @@ def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
 
 def _interval(p: Parameter, bound: bool) -> str:
     if p.value is not None and (bound or p.verdict is Verdict.IDENTIFIED):
-        return formatted(p)
+        return full_number(p)
     if p.ci95 is None or p.verdict is Verdict.REJECTED:
         return NONE
     low, high = p.ci95
@@ -320,7 +350,7 @@ def _row(name: str, own: Parameter) -> tuple[str, ...]:
 
 
 def _value(own: Parameter) -> str:
-    return "-" if own.value is None else formatted(own)
+    return "-" if own.value is None else full_number(own)
 
 
 def draw(found: Identification) -> Figure:

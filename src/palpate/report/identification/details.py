@@ -15,7 +15,7 @@ from palpate.report.identification.words import (
     CALLED,
     STYLES,
     facts_of,
-    formatted,
+    full_number,
     interval,
     lag_of,
     number,
@@ -71,7 +71,7 @@ def _point(found: Identification, console: Console) -> None:
     if point is None:
         return
     own = point.stiffness
-    value = NONE if own.value is None else formatted(own)
+    value = NONE if own.value is None else full_number(own)
     line = Text.assemble(("working point", "bold"), f": {value}, ", (str(own.verdict), STYLES[own.verdict]))
     line.append(f"; {', '.join(facts_of(found, point))}; from the {point.source}")
     console.print(line)

@@ -13,15 +13,13 @@ from palpate.arrays import Array, Mask
 from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
 from palpate.report import style
 from palpate.report.identification.spectra import band_of, leaving, resting, stretches, white
-from palpate.report.identification.words import MARKS, formatted, model_line, sentence, subtitle
+from palpate.report.identification.words import MARKS, full_number, model_line, sentence, subtitle
 from palpate.report.look.assets import rows_shown, with_peaks
 from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from palpate.identification.result import Identification, Traces
 
 
 _FIT_POINTS = 4800
@@ -32,7 +30,7 @@ _MARGIN = 0.35
 
 def force(axes: Axes, found: Identification, traces: Traces) -> None:
     """Force over time, with the contacts and the model's prediction in them."""
-    style.panel(axes, labelled("force", traces.force_unit), "time [s]")
+    style.panel(axes, axis_label("force", traces.force_unit), "time [s]")
     contacts(axes, found)
     axes.plot(
         *with_peaks(traces.time, traces.force, _FIT_POINTS), color=style.MEASURED, lw=1.0, label="measured"
@@ -47,7 +45,7 @@ def force(axes: Axes, found: Identification, traces: Traces) -> None:
 
 def residual(axes: Axes, found: Identification, traces: Traces) -> None:
     """Residual of the force over time."""
-    style.panel(axes, labelled("misfit", traces.force_unit), "time [s]")
+    style.panel(axes, axis_label("misfit", traces.force_unit), "time [s]")
     contacts(axes, found)
     left = traces.fitted_force - traces.predicted
     for i, piece in enumerate(stretches(traces.fitted_time)):
@@ -73,7 +71,7 @@ def window(found: Identification, traces: Traces) -> tuple[float, float]:
     return max(first, start - margin), min(last, end + margin)
 
 
-def labelled(name: str, unit: str) -> str:
+def axis_label(name: str, unit: str) -> str:
     """The name of an axis with its unit, if there is one."""
     return name if unit == "1" else f"{name} [{unit}]"
 
@@ -138,7 +136,7 @@ def _part(
     unit = found.working_point.stiffness.unit if found.working_point else "1"
     scale, unit = scaled_unit(unit, values[told, 0] if told.any() else values[:, 0])
     value, half = values.T / scale
-    style.panel(axes, labelled(name, unit))
+    style.panel(axes, axis_label(name, unit))
     axes.fill_between(
         frequency, value - half, value + half, where=list(told), color=colour, label="95 %", **_BAND
     )
@@ -191,8 +189,8 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
     scale, unit = length_of(traces)
     style.panel(
         axes,
-        labelled("force", traces.force_unit),
-        labelled("depth from touch" if _touches(found) else "position", unit),
+        axis_label("force", traces.force_unit),
+        axis_label("depth from touch" if _touches(found) else "position", unit),
     )
     x, f = own.loading
     _whole(axes, traces, scale)
@@ -216,14 +214,8 @@ def _whole(axes: Axes, traces: Traces, scale: float) -> None:
     steps = np.diff(t, prepend=t[0])
     gap = steps > _BREAK * max(float(np.median(steps)), float(np.ptp(traces.fitted_time)) / _POINTS)
     position = np.where(gap, np.nan, scale * traces.fitted_position[rows])
-    axes.plot(
-        position,
-        traces.fitted_force[rows],
-        color=style.MEASURED,
-        lw=0.8,
-        alpha=0.7,
-        label="all of the contact",
-    )
+    look: dict[str, Any] = {"color": style.MEASURED, "lw": 0.8, "alpha": 0.7, "label": "all of the contact"}
+    axes.plot(position, traces.fitted_force[rows], **look)
 
 
 def _touches(found: Identification) -> bool:
@@ -254,18 +246,8 @@ def _depth_at(own: Press, tangent: Tangent) -> float:
 
 
 def _ring(axes: Axes, x: float, y: float) -> None:
-    axes.plot(
-        [x],
-        [y],
-        "o",
-        ms=10,
-        mfc="none",
-        mec=style.INK,
-        mew=1.8,
-        label="working point",
-        zorder=5,
-        clip_on=False,
-    )
+    look: dict[str, Any] = {"ms": 10, "mfc": "none", "mec": style.INK, "mew": 1.8, "zorder": 5}
+    axes.plot([x], [y], "o", label="working point", clip_on=False, **look)
 
 
 def _value(found: Identification, name: str) -> float | None:
@@ -348,7 +330,9 @@ def draw(found: Identification, title: str) -> Figure:
 def _head(figure: Any, found: Identification, title: str) -> None:
     """The answer in a sentence, what else is known, and of which log."""
     lines = [(printable(title), 11.5, style.QUIET), (sentence(found), 14, style.INK)]
-    values = [f"{name} {formatted(p)} {MARKS[p.verdict]} {p.verdict}" for name, p in found.parameters.items()]
+    values = [
+        f"{name} {full_number(p)} {MARKS[p.verdict]} {p.verdict}" for name, p in found.parameters.items()
+    ]
     lines += [(model_line(found), 10, style.QUIET), (";  ".join(values), 10, style.INK)]
     lines += [(subtitle(found), 9, style.QUIET)]
     top = 1 - 0.06 / _HEAD

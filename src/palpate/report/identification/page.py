@@ -21,14 +21,14 @@ from palpate.report.identification.words import (
     advice,
     as_json,
     facts_of,
-    formatted,
+    full_number,
     interval,
     limited_by,
-    lost,
     model_line,
     sentence,
     subtitle,
     units_of,
+    work_loss,
 )
 from palpate.report.numbers import plain, quantity, with_half
 from palpate.report.page import data_address, render
@@ -46,7 +46,7 @@ _AS_LARGE = 1.3
 """Times the noise out of contact up to which a misfit is no larger than that."""
 
 
-def untouched(found: Identification, traces: Traces) -> str:
+def no_contact(found: Identification, traces: Traces) -> str:
     """Of a log without a contact."""
     return "The force over the whole log: it never leaves its resting level for long enough."
 
@@ -77,7 +77,7 @@ def press(found: Identification, traces: Traces) -> str:
     force = units_of(found)[0]
     told = ["The slope is the stiffness, the width of the loop the lost work. The ring is the working point."]
     if own.hysteresis_loss is not None:
-        told.append(f"{lost(own.hysteresis_loss)}.")
+        told.append(f"{work_loss(own.hysteresis_loss)}.")
     if own.relaxation is not None:
         r = own.relaxation
         told.append(
@@ -249,7 +249,7 @@ def split(p: Parameter) -> dict[str, Any]:
     """A number, its half-width and its unit, to be written large and less large."""
     if p.value is None:
         return {"value": None, "text": NO_NUMBER, "half": "", "unit": ""}
-    text = formatted(p)
+    text = full_number(p)
     plus, _, unit = text.rpartition(" ") if p.unit != "1" else (text, "", "")
     if p.unit != "1" and " " in p.unit:  # N s/m: two words
         head, _, first = plus.rpartition(" ")
@@ -313,7 +313,7 @@ def _figures(found: Identification) -> list[dict[str, str]]:
     if traces is None:
         return []
     if not len(traces.fitted_time):
-        return [_panel(found, "Force over time", figure.force, untouched, (_WIDE, 260))]
+        return [_panel(found, "Force over time", figure.force, no_contact, (_WIDE, 260))]
     return [
         _panel(found, "Force over time", figure.force, force, (_WIDE, 260)),
         _panel(found, "Misfit over time", figure.residual, residual, (HALF, 260)),

@@ -78,10 +78,10 @@ def spectrum(values: Array, time: Array, cutoff: float = np.inf) -> Spectrum | N
     frequency = np.concatenate([f for f, _ in bins])
     density = np.concatenate([p for _, p in bins])
     seen = frequency <= _SEEN * cutoff if np.isfinite(cutoff) else np.ones(len(frequency), bool)
-    return _banded(frequency[seen], density[seen]) if seen.sum() >= 2 * _FEWEST_BINS else None
+    return _band_means(frequency[seen], density[seen]) if seen.sum() >= 2 * _FEWEST_BINS else None
 
 
-def _banded(frequency: Array, density: Array) -> Spectrum:
+def _band_means(frequency: Array, density: Array) -> Spectrum:
     """Means over bands of a third of an octave, or more where that holds too few bins.
 
     A stretch has as many bins in a band as it is long, so that a plain mean over bins weighs it by its length.

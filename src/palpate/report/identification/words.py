@@ -22,8 +22,6 @@ CALLED = {
     "M": "mass",
     "E": "Young's modulus",
     "K1": "second stiffness",
-    "K2": "quadratic stiffness",
-    "K3": "cubic stiffness",
     "tau": "relaxation time",
     "n": "exponent",
     "mu": "friction coefficient",
@@ -40,7 +38,7 @@ ADVICE = {
     Code.LAG_DAMPING_CONFOUNDED: "Give a measured --lag, or press again with a wider band, as a chirp has it.",
     Code.SERIES_COMPLIANCE: "Measure the position nearer to the surface, or calibrate what lies between more closely.",
     Code.LOW_EXCITATION: "Press faster, deeper or more often; for a mass, shake the probe in contact.",
-    Code.NONLINEAR_STIFFNESS: "Use K only near the mean position, and K2 and K3 with it elsewhere.",
+    Code.NONLINEAR_STIFFNESS: "Use K only near the mean position.",
     Code.HELD_SAMPLES: "None; a log at the sensor's own rate would be as good.",
     Code.MISSING_SAMPLES: "Check the log where readings are missing; give other marks of no reading with --missing.",
     Code.IRREGULAR_TIME: "Log with the sensor's own clock if you can.",
@@ -81,14 +79,14 @@ def sentence(found: Identification) -> str:
     own, where = point.stiffness, place_of(found, point)
     if behind_the_arm(found):
         return (
-            f"The stiffness of surface and arm in series is {formatted(own)} {where}, a lower bound of the surface's:"
+            f"The stiffness of surface and arm in series is {full_number(own)} {where}, a lower bound of the surface's:"
             " give --robot-stiffness."
         )
     limit = limited_by(found)
     by_model = _known_by_model(found)
     if by_model is not None:
         return (
-            by_model if own.value is None else f"{by_model} Without a model it is {formatted(own)} {where}."
+            by_model if own.value is None else f"{by_model} Without a model it is {full_number(own)} {where}."
         )
     if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
         lost = _loss(found, point)
@@ -101,7 +99,7 @@ def sentence(found: Identification) -> str:
             " then this is the stiffness of the probe's own support."
         )
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
-    return f"The stiffness is {formatted(own)}{only} {where}; {_mostly(limit)}."
+    return f"The stiffness is {full_number(own)}{only} {where}; {_mostly(limit)}."
 
 
 def _known_by_model(found: Identification) -> str | None:
@@ -110,7 +108,7 @@ def _known_by_model(found: Identification) -> str | None:
         return None
     K = found.parameters["K"]
     limit = cause_of(next(iter(K.budget), None))
-    return f"By the model {found.model} the stiffness is {formatted(K)}; {_mostly(limit)}."
+    return f"By the model {found.model} the stiffness is {full_number(K)}; {_mostly(limit)}."
 
 
 def _mostly(limit: Cause) -> str:
@@ -151,7 +149,7 @@ def units_of(found: Identification) -> tuple[str, str]:
     return ("1", "1") if any(p.unit == "1" for n, p in found.parameters.items() if n == "K") else ("N", "m")
 
 
-def lost(share: float) -> str:
+def work_loss(share: float) -> str:
     """A sentence about the lost share of the work of a press."""
     if share < 0:
         return f"{-100 * share:.2g} % more work comes back than was put in: the force is probably read late"
@@ -169,7 +167,7 @@ def press_facts(found: Identification) -> list[str]:
     ]
     facts = [f"Slope by force: {', '.join(slopes)}."] if slopes else []
     if press.hysteresis_loss is not None:
-        facts.append(f"{lost(press.hysteresis_loss)}.")
+        facts.append(f"{work_loss(press.hysteresis_loss)}.")
     if press.relaxation is not None:
         own = press.relaxation
         share = f"{100 * own.share:.2g} % of the force relaxes"
@@ -189,7 +187,7 @@ def model_line(found: Identification) -> str:
     if not found.contacts or not found.n:
         return ""
     verdicts = [
-        f"{listed([CALLED.get(name, name) for name in names])} {'is' if len(names) == 1 else 'are'} {verdict}"
+        f"{enumeration([CALLED.get(name, name) for name in names])} {'is' if len(names) == 1 else 'are'} {verdict}"
         for verdict in Verdict
         if (names := [name for name, p in found.parameters.items() if p.verdict is verdict])
     ]
@@ -233,7 +231,7 @@ def number(p: Parameter) -> str:
     return with_half(p.value, (p.ci95[1] - p.ci95[0]) / 2) if p.ci95 else plain(p.value)
 
 
-def formatted(p: Parameter) -> str:
+def full_number(p: Parameter) -> str:
     """The same with its unit."""
     if p.value is None:
         return NO_NUMBER
@@ -255,7 +253,7 @@ def unit(p: Parameter) -> str:
     return "" if p.unit == "1" else p.unit
 
 
-def listed(names: Sequence[str]) -> str:
+def enumeration(names: Sequence[str]) -> str:
     """`a, b and c`."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 

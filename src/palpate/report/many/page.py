@@ -13,7 +13,7 @@ from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
 from palpate.report.identification.figure import LETTERS, WIDE
 from palpate.report.identification.page import HALF, NARROW, TONES, picture, split
-from palpate.report.identification.words import CALLED, Source, facts_of, formatted, interval
+from palpate.report.identification.words import CALLED, Source, facts_of, full_number, interval
 from palpate.report.look.assets import TABLES, scripts
 from palpate.report.many.table import (
     POINT,
@@ -186,7 +186,7 @@ def _log_row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
         "name": row.source.title,
         "sha256": row.source.sha256,
         "error": printable(row.error),
-        "cells": [formatted(p) if p is not None and p.value is not None else "–" for p in values],
+        "cells": [full_number(p) if p is not None and p.value is not None else "–" for p in values],
         "place": ", ".join(facts_of(found, point)) if found and point else "–",
         "model": found.model if found else "–",
         "tone": TONES[point.stiffness.verdict] if point else "fail" if found is None else "warn",
@@ -199,7 +199,7 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
     title = "Stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
     own = quantities(pooled)[name].parameter
     words = (
-        f"Pooled: {formatted(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
+        f"Pooled: {full_number(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
     return picture(title, words, [one(rows, pooled, name, width) for width in (HALF, NARROW)])
@@ -261,4 +261,4 @@ def _row(name: str, own: PooledParameter, pooled: Pooled) -> tuple[str, ...]:
 
 
 def _value(own: PooledParameter) -> str:
-    return "-" if own.parameter.value is None else formatted(own.parameter)
+    return "-" if own.parameter.value is None else full_number(own.parameter)

@@ -25,13 +25,15 @@ from palpate.report.identification.words import (
     Source,
     as_json,
     facts_of,
-    formatted,
+    full_number,
     interval,
     number,
     unit,
+    unit_warnings,
     units_of,
 )
 from palpate.report.numbers import NONE, plain, quantity, si_prefix, with_half
+from palpate.report.page import CommandAnswer
 from palpate.report.terminal import bare_table
 
 POINT = "working point"
@@ -100,10 +102,10 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     limit = cause_of(next(iter(own.budget), None))
     after = point.stiffness.prediction95
     changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
-    by = f", it changes by {' and '.join(map(formatted, changes))}" if changes else ""
+    by = f", it changes by {' and '.join(map(full_number, changes))}" if changes else ""
     again = f", the next press is predicted at {interval(after, own.unit)} (95 %)" if after else ""
     return (
-        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {formatted(own)}{by}{again}, {where};"
+        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {full_number(own)}{by}{again}, {where};"
         f" its uncertainty is mostly due to {limit.described}: {limit.remedy}."
     )
 
@@ -141,6 +143,21 @@ def failures(rows: Sequence[LogRow]) -> str:
 
 _WIDE = 110
 """Letters of a terminal that has room for force, depth and frequency of each log."""
+
+
+def answer_of(rows: Sequence[LogRow], pooled: Pooled, places: Sequence[str]) -> CommandAnswer:
+    """The answer of `palpate identify` for many logs, with the places of the written files."""
+
+    def display(console: Console) -> None:
+        for row in rows:
+            for text in unit_warnings(row.found) if row.found else ():
+                console.print(f"! {row.source.title}: {text}", style="yellow", soft_wrap=True)
+        show(rows, pooled, console)
+        for place in places:
+            console.print(place, soft_wrap=True)
+
+    files = [{"file": row.source.file, "sha256": row.source.sha256} for row in rows]
+    return CommandAnswer({"files": files, **json_of(rows, pooled)}, show=display)
 
 
 def show(rows: Sequence[LogRow], pooled: Pooled, console: Console) -> None:
@@ -199,7 +216,7 @@ def _together(pooled: Pooled) -> Table:
         p = own.parameter
         table.add_row(
             name,
-            NONE if p.value is None else formatted(p),
+            NONE if p.value is None else full_number(p),
             interval(own.prediction95, p.unit) or NONE,
             _between(own),
             f"{len(own.logs)} of {pooled.count}",
@@ -211,7 +228,7 @@ def _together(pooled: Pooled) -> Table:
 def _dependences(pooled: Pooled) -> Table:
     table = bare_table("dependence", "± 95 %", "verdict", wrapped=("dependence",))
     for name, p in slopes(pooled).items():
-        number = interval(p.ci95, p.unit) if p.value is None else formatted(p)
+        number = interval(p.ci95, p.unit) if p.value is None else full_number(p)
         table.add_row(name, number or NONE, Text(str(p.verdict), style=STYLES[p.verdict]))
     return table
 

@@ -15,7 +15,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card
 from palpate.report.identification.page import TONES, split
-from palpate.report.identification.words import CALLED, formatted
+from palpate.report.identification.words import CALLED, full_number
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import quantity
 from palpate.report.page import data_address, render
@@ -149,7 +149,7 @@ def _surface(content: Content) -> list[dict[str, str]]:
                 "colour": name if name in _PARAMETERS else "other",
                 "tone": TONES[p.verdict],
                 "verdict": str(p.verdict),
-                "value": formatted(p) if p.value is not None else "no number",
+                "value": full_number(p) if p.value is not None else "no number",
                 "truth": quantity(known, truth[name]["unit"], digits=4) if known is not None else "–",
                 "off": off,
             }

@@ -156,7 +156,7 @@ def tables(summary: dict[str, Any], found: Identification | None) -> list[Table]
 def answer_of(title: str, summary: dict[str, Any], shown: Sequence[Table]) -> CommandAnswer:
     """The answer of a run, with the tables that its terminal shows."""
     head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    return CommandAnswer(title, f"{head}\n{sentence(summary)}", shown, notes(summary), summary)
+    return CommandAnswer(summary, title, f"{head}\n{sentence(summary)}", shown, notes(summary))
 
 
 def notes(summary: dict[str, Any]) -> list[str]:

@@ -14,7 +14,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import open_file
 from palpate.files.confined import read_confined
-from palpate.files.limits import GB, Limits, ReadingBudget
+from palpate.files.limits import GB, ReadingBudget, ReadingLimits
 
 
 def mujoco() -> Any:
@@ -84,7 +84,7 @@ def check_inertia(name: str, mass: float, moment: Array) -> str:
     )
 
 
-_LIMITS = Limits(
+_LIMITS = ReadingLimits(
     size=GB / 4,
     seconds=25.0,
     what="a model of a robot",

@@ -1,7 +1,5 @@
 """A designed excitation on the terminal: the wave, its predicted uncertainty on each surface, the remedies."""
 
-from __future__ import annotations
-
 from math import ceil, isfinite
 from pathlib import Path
 from typing import Any

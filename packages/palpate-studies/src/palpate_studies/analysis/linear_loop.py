@@ -4,8 +4,6 @@ A loop's motion is a map of flat vectors, and its derivative is that of the benc
 modes are separated from the moving ones.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """From a bench to its linear model: at rest under force, with instruments so fine that all may be differentiated."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Gain, phase and delay margins of the force loop: its response at the input of the measured force."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Metrics of a run: pure functions of its record, by name."""
 
-from __future__ import annotations
-
 from palpate.errors import unknown
 from palpate.plugins import is_plugin
 from palpate_studies.metrics.following import CONTACT_METRICS, FOLLOWING, SURFACE

@@ -1,7 +1,5 @@
 """Metrics of force tracking, of contact and motors, and of the final estimates against the truth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

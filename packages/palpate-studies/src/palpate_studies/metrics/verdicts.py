@@ -1,7 +1,5 @@
 """Claims of the thesis about a run, as numbers as yes or no, and metrics by name, with the user's ``module:name``."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from functools import cache

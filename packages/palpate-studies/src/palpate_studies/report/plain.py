@@ -1,7 +1,5 @@
 """The panels of a study's figures as plain values, from which a page draws them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

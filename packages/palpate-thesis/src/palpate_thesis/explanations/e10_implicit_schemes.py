@@ -1,7 +1,5 @@
 """Explanation 10: schemes that learn an unknown surface implicitly (sec. 2.3), on the arm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple

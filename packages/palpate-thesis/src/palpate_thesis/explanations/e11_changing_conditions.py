@@ -1,7 +1,5 @@
 """Explanation 11: conditions that change: friction with the configuration, a surface with its temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Why M_e comes out negative: every fault of the signals switched on, one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 

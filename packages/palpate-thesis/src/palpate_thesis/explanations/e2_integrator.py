@@ -1,7 +1,5 @@
 """Explanation 2: the neural controller is, to first order, an integral controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Explanation 3: the neural controller's delayed divergence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Explanation 5: left open by the thesis: the best learning rate, layers and neurons, architectures, stability."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

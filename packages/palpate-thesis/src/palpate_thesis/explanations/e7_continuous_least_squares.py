@@ -1,7 +1,5 @@
 """Explanation 7: the continuous least squares that the thesis names as its source, beside its recursive ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Explanation 8: networks that approach the environment and recognise the contact with it (after Fukuda et al.)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

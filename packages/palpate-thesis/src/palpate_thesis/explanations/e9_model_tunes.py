@@ -1,7 +1,5 @@
 """Explanation 9: a network is the model of a nonlinear environment, and its local slopes tune the controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Figure 2.1: Raibert and Craig's hybrid controller, without dynamics, beside the one with dynamics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

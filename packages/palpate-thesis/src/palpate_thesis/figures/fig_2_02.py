@@ -1,7 +1,5 @@
 """Figure 2.2: impedance control; the arm's estimated mass, damper and spring against the target."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures 2.3 and 2.4: one joint under a neural network alone, the direct scheme."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

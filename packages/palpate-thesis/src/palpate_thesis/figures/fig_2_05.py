@@ -1,7 +1,5 @@
 """Figure 2.5: the indirect scheme, a network that tunes the gains of a PID on the force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figure 3.5: spectra of the force signal with and without the 190 Hz analog filter before the sampling."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figure 3.7: gain of the second-order analog low-pass, from its component values."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

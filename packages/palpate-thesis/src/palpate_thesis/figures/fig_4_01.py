@@ -1,7 +1,5 @@
 """Figure 4.1: the end-effector kept perpendicular to the surface, by its angle alone and by all six axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product

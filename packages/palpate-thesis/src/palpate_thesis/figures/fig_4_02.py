@@ -1,7 +1,5 @@
 """Figure 4.2: the force through the switch from position to hybrid control."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

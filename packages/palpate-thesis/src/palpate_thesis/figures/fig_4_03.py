@@ -1,7 +1,5 @@
 """Figure 4.3: the loop of the hybrid controller's block diagram, and how stiff a surface it bears."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Figure 4.4: the noise of the force signal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

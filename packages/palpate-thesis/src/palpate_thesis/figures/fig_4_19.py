@@ -1,7 +1,5 @@
 """Equations 4.19-4.21: decoupled hybrid control with the identified stiffness, as printed and corrected."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

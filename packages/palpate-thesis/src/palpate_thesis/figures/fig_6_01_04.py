@@ -1,7 +1,5 @@
 """Figures 6.1 and 6.4: the first four seconds of least squares, and how fast it settles, on foam and on rubber."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

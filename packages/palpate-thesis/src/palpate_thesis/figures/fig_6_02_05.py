@@ -1,7 +1,5 @@
 """Figures 6.2 and 6.5: least squares some time later, where K_e and f/x can be compared, and the off-line ratios."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figure 6.3: least squares on styrofoam from raw signals; and whether any one foam shows figures 6.1 to 6.3."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product

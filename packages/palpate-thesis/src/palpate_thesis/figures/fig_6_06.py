@@ -1,7 +1,5 @@
 """Figure 6.6: the learning rate of the neural identifier."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

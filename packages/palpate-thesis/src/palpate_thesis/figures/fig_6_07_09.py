@@ -1,7 +1,5 @@
 """Figures 6.7 to 6.9: the neural identifier in the first four seconds, on foam and on rubber, and its error."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figure 6.10: the hybrid controller alone, without integral, on foam."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figures 6.11 to 6.13, 6.16, 6.17: the neural controller follows steps, with a sine on top too, on foam and rubber."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figure 6.14: the neural controller with a small learning rate, minutes later."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Figure 6.15: position along the surface and angle under the neural controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

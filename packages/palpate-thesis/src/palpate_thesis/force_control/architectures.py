@@ -1,7 +1,5 @@
 """Networks of other architectures in the place of the thesis' (sec. 7.2): radial basis functions; a recurrent one."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs with a change in the middle: of the surface, its position, or the desired pose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Panels that the figures of force control are put together from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 

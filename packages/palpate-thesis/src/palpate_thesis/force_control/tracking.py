@@ -1,7 +1,5 @@
 """Common parts of the force-control figures: experiments, criterion of following, varied conditions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """A long run of the neural controller, with its network's weights looked at now and then."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

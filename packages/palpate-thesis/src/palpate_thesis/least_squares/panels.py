@@ -1,7 +1,5 @@
 """The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Common parts of the least-squares figures: presses, their measures, varied conditions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Claims of the thesis about its neural identifier, part by part, each with its threshold and its numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

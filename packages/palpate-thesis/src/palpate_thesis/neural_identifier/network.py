@@ -1,7 +1,5 @@
 """Common parts of the neural-identifier figures: presses, the networks that learn from them, their answers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

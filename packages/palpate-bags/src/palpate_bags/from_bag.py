@@ -1,7 +1,5 @@
 """Fields of a bag's messages in SI units: which clock times them, and one table of rows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,10 +8,11 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
-from palpate.logs.bags import Bag, Stream
 from palpate.logs.roles import POSE, Loaded, check_apart, check_quantity, family, si_unit
 from palpate.signals.samples import fresh_rows
 from palpate.units import split_spec, unit
+from palpate_bags.bag import Bag
+from palpate_bags.reading import Stream
 
 _BLOCKS = 20
 """Parts of a log in each of which the quickest message is looked for: a drift of the clocks shows between them."""

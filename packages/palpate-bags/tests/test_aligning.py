@@ -8,8 +8,8 @@ import pytest
 from palpate.errors import InputError
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import channels_of
-from palpate.logs.from_bag import Timed, align
 from palpate.records import Record
+from palpate_bags.from_bag import Timed, align
 
 
 def timed(time, values, topic="/a"):

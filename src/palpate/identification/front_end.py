@@ -12,7 +12,7 @@ from palpate.identification.filters.sensor_path import PositionNoise, SensorPath
 from palpate.identification.filters.state_variable import Chain, low_passed, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Options, lag_prior
-from palpate.identification.problem.problem import FREE_ROWS, Problem, Rows, Seen, ends, numbered, touching
+from palpate.identification.problem import FREE_ROWS, Memory, Problem, Rows, ends, numbered, touching
 from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass
@@ -22,7 +22,9 @@ _LONG = 0.05
 """Share of a contact that waiting until a filter has forgotten all may cost."""
 
 
-def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options: Options) -> Seen:
+def behind_filter(
+    channels: Channels, chain: Chain, contacts: Contacts, options: Options
+) -> tuple[Problem, Memory]:
     """Both channels behind the chain; a known low-pass of the force is applied to the position too.
 
     Raises:
@@ -45,22 +47,21 @@ def behind_filter(channels: Channels, chain: Chain, contacts: Contacts, options:
     rows, spans = numbered(_rows(channels, chain, contacts, usable), channels)
     origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
-    return Seen(
+    problem = Problem(
         motion=Motion(
             chain, position, rows, contacts.bonded, _noise(position, rows, spans, channels.rounding[0])
         ),
-        origin=origin,
-        force=force,
+        force=force[rows],
         spans=spans,
-        usable=usable,
-        begins=[begin for begin, _ in contacts.spans],
-        memory=memory,
-        free=_free(force, channels, chain, contacts),
         lag=lag,
+        free=_free(force, channels, chain, contacts),
+        origin=origin,
+        contacts=contacts,
         read=force_raw if contacts.payload is None else None,
-        filtered=filtered,
         rounding=channels.rounding[1],
+        filtered=filtered,
     )
+    return problem, Memory(force, usable, [begin for begin, _ in contacts.spans], memory)
 
 
 def _rows(channels: Channels, chain: Chain, contacts: Contacts, usable: Mask) -> list[Rows]:
@@ -153,7 +154,7 @@ def shown(low_pass: LowPass, dt: float) -> bool:
 
 def behind_sensor(
     channels: Channels, low_pass: LowPass, chain: Chain, contacts: Contacts, options: Options
-) -> Seen:
+) -> tuple[Problem, Memory]:
     """Both channels as the sensor samples them.
 
     Raises:
@@ -176,17 +177,17 @@ def behind_sensor(
     lag = lag_prior(options.lag, known, path.period, low_pass.lag, options.mass)
     if contacts.payload is not None:
         force = force - contacts.payload.mass * path.read(position, 2, lag.value, np.arange(len(time)))
-    return Seen(
+    problem = Problem(
         motion=Motion(path, position, rows, contacts.bonded, noise=noise_within(position, whole, spans)),
-        origin=origin,
-        force=force,
+        force=force[rows],
         spans=spans,
-        usable=usable,
-        begins=np.searchsorted(time, [begin for begin, _ in between]).tolist(),
-        memory=int(np.ceil(path.settling / path.period)),
-        free=_free_of_sensor(force, time, contacts, chain, channels),
         lag=lag,
+        free=_free_of_sensor(force, time, contacts, chain, channels),
+        origin=origin,
+        contacts=contacts,
     )
+    begins = np.searchsorted(time, [begin for begin, _ in between]).tolist()
+    return problem, Memory(force, usable, begins, int(np.ceil(path.settling / path.period)))
 
 
 def _usable(clock: SampleClock, position: Array, valid: Mask, path: SensorPath) -> Mask:
@@ -246,21 +247,10 @@ def problem_of(channels: Channels, chain: Chain, contacts: Contacts, options: Op
     """
     low_pass = options.force_filter
     if low_pass is not None and shown(low_pass, channels.raw.dt):
-        seen = behind_sensor(channels, low_pass, chain, contacts, options)
+        problem, memory = behind_sensor(channels, low_pass, chain, contacts, options)
     else:
-        seen = behind_filter(channels, chain, contacts, options)
-    free_standing = not contacts.bonded
-    return Problem(
-        motion=seen.motion,
-        force=seen.force[seen.motion.rows],
-        spans=seen.spans,
-        lag=seen.lag,
-        free=seen.free,
-        touch=touching(seen, contacts.resting) if free_standing else None,
-        approach=touching(seen, contacts.resting, reach=1) if free_standing else None,
-        origin=seen.origin,
-        contacts=contacts,
-        read=seen.read,
-        rounding=seen.rounding,
-        filtered=seen.filtered,
-    )
+        problem, memory = behind_filter(channels, chain, contacts, options)
+    if contacts.bonded:
+        return problem
+    touches, approach = (touching(problem, memory, reach) for reach in (0, 1))
+    return replace(problem, with_touches=touches, with_approach=approach)

@@ -1,7 +1,5 @@
 """The files of a bag read from their beginnings, as far as they are whole."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -17,7 +15,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files.limits import ReadingBudget
-from palpate.logs.bags.scanning import (
+from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
+from palpate_bags.scanning import (
     ZSTD,
     End,
     RawMessage,
@@ -28,7 +27,6 @@ from palpate.logs.bags.scanning import (
     unpack_file,
     unpack_message,
 )
-from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
 
 _SCANS = {Kind.BAG1: scan_bag1, Kind.MCAP: scan_mcap, Kind.SQLITE: scan_sqlite}
 _LATEST = 2**63

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.files.limits import Limits, ReadingBudget
-from palpate.logs.bags.reading import Stream, finder, first_line, leaves, no_field, open_files
-from palpate.logs.bags.scanning import TopicInFile
+from palpate.files.limits import ReadingBudget, ReadingLimits
 from palpate.logs.kinds import Kind
+from palpate_bags.reading import Stream, finder, first_line, leaves, no_field, open_files
+from palpate_bags.scanning import TopicInFile
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -60,12 +60,12 @@ class Bag:
         InputError: nothing of it can be read, or the library that reads bags is not installed.
     """
 
-    def __init__(self, path: Path, kind: Kind, limits: Limits | None = None) -> None:
+    def __init__(self, path: Path, kind: Kind, limits: ReadingLimits | None = None) -> None:
         self.path, self.kind = path, kind
         self._unpacked = TemporaryDirectory()
         try:
             self._files, self.troubles = open_files(
-                path, kind, ReadingBudget(path, limits or Limits()), self._unpacked
+                path, kind, ReadingBudget(path, limits or ReadingLimits()), self._unpacked
             )
             self._types = _types([channel for file in self._files for channel in file.channels.values()])
             self.topics = {topic.name: topic for topic in self._list_topics()}

@@ -8,8 +8,8 @@ import pytest
 from logs.ros_bags import KINDS, pose, storage, wrench, write_bag
 from palpate.errors import InputError
 from palpate.logs import read_log
-from palpate.logs.bags import Bag
 from palpate.logs.kinds import kind_of
+from palpate_bags import Bag
 
 TIME = np.arange(3000) / 1000
 FORCE = np.column_stack([0 * TIME, -TIME, np.sin(5 * TIME)])

@@ -8,8 +8,8 @@ import pytest
 from logs.ros_bags import pose, wrench, write_bag
 from palpate.errors import InputError
 from palpate.logs import read_log
-from palpate.logs.bags import Stream
-from palpate.logs.from_bag import on_one_clock
+from palpate_bags import Stream
+from palpate_bags.from_bag import on_one_clock
 
 TIME = np.arange(2000) / 500
 

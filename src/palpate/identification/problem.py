@@ -1,0 +1,246 @@
+"""The regression problem: position and force behind the same front end, at the rows in contact.
+
+In contact, the place of the surface is only an offset, and the first depths are behind the filter's settling. But a
+contact whose stiffness grows from zero shows its exponent there more than anywhere. Models that are one-sided by
+themselves, with the place of the surface as a parameter, hold before the touch as after it, so nothing has to settle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palpate.arrays import Array, Mask
+from palpate.errors import InputError
+from palpate.identification.causes import Code
+from palpate.identification.contacts import Contacts
+from palpate.identification.filters.sensor_path import position_noise
+from palpate.identification.filters.state_variable import ABOVE_FLOOR, FEWEST_SEGMENT, white_noise
+from palpate.identification.models import Motion
+from palpate.identification.options import Lag
+from palpate.identification.sampling import Channels
+from palpate.signals.samples import periodogram
+
+Rows = NDArray[np.intp]
+
+FREE_ROWS = 64
+"""Rows of a stretch out of contact below which it tells nothing of the force's noise."""
+_FEWEST = 30
+
+
+def numbered(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
+    """The rows of all contacts, and the number of each one's contact.
+
+    Args:
+        contacts: rows of each.
+        channels: which say why rows are lost.
+
+    Raises:
+        InputError: too few rows in contact.
+    """
+    rows = np.concatenate(contacts)
+    if len(rows) < _FEWEST:
+        text = (
+            f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed: log longer or faster"
+        )
+        lost = [w.text for w in channels.warnings if w.code in (Code.SATURATED, Code.MISSING_SAMPLES)]
+        raise InputError(f"{text} ({'; '.join(lost)})" if lost else text)
+    return rows, np.repeat(np.arange(len(contacts)), [len(own) for own in contacts])
+
+
+def ends(channels: Channels, contacts: Contacts) -> list[int]:
+    """The sample after the last of each contact by the raw force; at least half of the filtered one.
+
+    A filter shows contact for a while after the probe has gone, but what it shows then is no contact any more.
+    """
+    if contacts.bonded:
+        return [end for _, end in contacts.spans]
+    clear = max(contacts.threshold, contacts.resting + 4 * white_noise(channels.force))
+    found = []
+    for begin, end in contacts.spans:
+        above = np.flatnonzero(contacts.force_sign * channels.force[begin:end] > clear)
+        middle = begin + (end - begin) // 2
+        found.append(max(begin + int(above[-1]) + 1, middle) if len(above) else end)
+    return found
+
+
+MOST_ROWS = 1 << 16
+"""Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""
+_PIECE = 1 << 14
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Data that the models are fitted to.
+
+    Args:
+        motion: the position, at the rows in contact.
+        force: at these rows, shape (m,).
+        spans: number of the contact that each belongs to, shape (m,).
+        lag: prior.
+        free: the force out of contact behind the same front end, in stretches of rows.
+        origin: position of the surface on the log's own scale [m].
+        contacts: as found.
+        counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
+        read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
+        rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
+            are as white as their noise.
+        filtered: part of the force's lag that the position was sent through beforehand, so that `lag` is the rest [s].
+        with_touches: the same over the rows from shortly before each touch, the force counted from where it rests; None
+            if no touch is in the log.
+        with_approach: the same from as long before each touch as the contact lasts, where there are so many rows.
+    """
+
+    motion: Motion
+    force: Array
+    spans: NDArray[np.intp]
+    lag: Lag
+    free: tuple[Array, ...]
+    origin: float
+    contacts: Contacts
+    counted: bool = False
+    read: Array | None = None
+    rounding: float = 0.0
+    filtered: float = 0.0
+    with_touches: Problem | None = None
+    with_approach: Problem | None = None
+
+    @property
+    def time(self) -> Array:
+        """Of each row [s], shape (m,)."""
+        return self.motion.chain.times(self.motion.rows)
+
+    @cached_property
+    def band(self) -> float:
+        """The frequency below which the probe moved [Hz]; infinite if all contacts are too short."""
+        return highest_motion(self.motion)
+
+    @property
+    def resting(self) -> float:
+        """Zero of the force: its mean out of contact, for rows that hold the touches [N]."""
+        return self.contacts.resting if self.counted else 0.0
+
+    def at(self, rows: Rows, force: Array, spans: Rows) -> Problem:
+        """The same at other rows.
+
+        Args:
+            rows: shape (m,).
+            force: at these, shape (m,).
+            spans: number of the contact that each belongs to, shape (m,).
+        """
+        return replace(self, motion=replace(self.motion, rows=rows, _kept={}), force=force, spans=spans)
+
+    @property
+    def in_contact(self) -> Mask:
+        """Samples of the position between the first and the last row of a contact, shape (n,)."""
+        found = np.zeros(len(self.motion.position), bool)
+        instants = self.motion.instants
+        for number in np.unique(self.spans):
+            own = instants[self.spans == number]
+            found[int(own[0]) : int(np.ceil(own[-1])) + 1] = True
+        return found
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Rows that a front end has, and how long it remembers what was before.
+
+    Args:
+        force: at every row of the front end, shape (n,).
+        usable: rows that remember valid readings alone, shape (n,).
+        begins: first row behind the touch of each contact.
+        length: rows that a disturbance is remembered for.
+    """
+
+    force: Array
+    usable: Mask
+    begins: list[int]
+    length: int
+
+
+def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None:
+    """The problem with the rows before each touch, the force counted from its rest; None if no touch is in the log.
+
+    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
+
+    Args:
+        problem: of the rows in contact.
+        memory: of the front end.
+        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
+    """
+    rows, spans, length = problem.motion.rows, problem.spans, memory.length
+    before, left = [], 0
+    edges = np.flatnonzero(np.diff(spans, prepend=-1))
+    for number, own in zip(spans[edges], np.split(rows, edges[1:]), strict=True):
+        begin, wanted = memory.begins[number], max(length, reach * int(own[-1] - own[0]))
+        first = max(begin - wanted, left + length, length)
+        if first < begin:
+            step = int(own[1] - own[0]) if len(own) > 1 else 1
+            fresh = np.arange(own[0] - step, first - 1, -step)
+            before += [(row, number) for row in fresh if memory.usable[row]]
+        left = int(own[-1])
+    if not before:
+        return None
+    fresh, numbers = np.array(before, dtype=np.intp).T
+    every = np.r_[rows, fresh]
+    order = np.argsort(every)
+    at = every[order]
+    force = memory.force[at] - problem.contacts.resting
+    return replace(problem.at(at, force, np.r_[spans, numbers][order]), counted=True)
+
+
+def reduced(problem: Problem) -> Problem:
+    """The same with so many rows at most, in evenly spaced unbroken pieces."""
+    wider = (None if own is None else reduced(own) for own in (problem.with_touches, problem.with_approach))
+    rows = problem.motion.rows
+    kept = _pieces(len(rows)) if len(rows) > MOST_ROWS else np.ones(len(rows), bool)
+    fewer = problem if kept.all() else problem.at(rows[kept], problem.force[kept], problem.spans[kept])
+    touches, approach = wider
+    return replace(fewer, with_touches=touches, with_approach=approach)
+
+
+def _pieces(count: int) -> Mask:
+    pieces = -(-count // _PIECE)
+    every = -(-pieces // (MOST_ROWS // _PIECE))
+    kept: Mask = (np.arange(count) // _PIECE) % every == 0
+    return kept
+
+
+_CONTACTS = 32
+_APART = 3.0
+_MOST = 0.99
+_TAPER = 0.1
+
+
+def highest_motion(motion: Motion) -> float:
+    """The frequency below which the position moved while it was fitted [Hz]; infinite if all contacts are too short.
+
+    Below it lies 99 % of the energy of the probe's speed in the contacts (the longest, where they are many), as far as
+    that stands above the position's own noise. Where a clean spectrum at last meets its floor is far above that, and no
+    motion.
+    """
+    rows = motion.instants.astype(np.intp)
+    step = np.diff(rows)
+    contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
+    stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
+    told = [stretch for stretch in sorted(stretches, key=len)[-_CONTACTS:] if len(stretch) >= FEWEST_SEGMENT]
+    if not told:
+        return float("inf")
+    spectra = [_energy(stretch) for stretch in told]
+    frequency, energy = (np.concatenate(parts) for parts in zip(*spectra, strict=True))
+    order = np.argsort(frequency, kind="stable")
+    below = np.cumsum(energy[order])
+    least = 1 / max(map(len, told))
+    return max(float(frequency[order][np.searchsorted(below, _MOST * below[-1])]), least) / motion.chain.dt
+
+
+def _energy(position: Array) -> tuple[Array, Array]:
+    """Of the speed in a stretch by frequency [1/sample], where it stands above the noise; both of shape (l,)."""
+    speed = np.diff(position)
+    frequency, power = periodogram(speed, _TAPER)
+    noise = position_noise([position])
+    floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
+    return frequency, np.where(power > ABOVE_FLOOR * floor, power, 0.0) * len(speed) / len(frequency)
