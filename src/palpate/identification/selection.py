@@ -56,14 +56,9 @@ def answer(problem: Problem, model: Model) -> Answer:
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
         return plain
-    found = replace(
-        found,
-        budget={
-            **found.budget,
-            "touch": causes.of_another(found.theta, found.budget, plain.theta, plain.budget),
-        },
-    )
-    return found if found.half_of("K") < plain.half_of("K") else plain
+    apart = causes.of_another(found.theta, found.budget, plain.theta, plain.budget)
+    best = found if found.half_of("K") < plain.half_of("K") else plain
+    return replace(best, budget={**best.budget, "touch": apart})
 
 
 def _with_recovery(found: Answer) -> Answer:
