@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from palpate.identification.tangents import WINDOW, Curve, slopes_at
 
 from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
@@ -18,6 +17,7 @@ from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness,
 from palpate.identification.filters.state_variable import low_pass_once
 from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
+from palpate.identification.steady_press import WINDOW, Curve, slopes_at
 from palpate.identification.uncertainty import Measurement
 
 DT = 1e-3
