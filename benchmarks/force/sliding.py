@@ -13,7 +13,7 @@ palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along pa
 where the force is first held, with the same K_u; `leaderboard` has a row for each.
 `dither`: stiffness along the path. `faults`: steps of 1 mm over 2 mm, up or down, with and without
 `step` in the gains, and no faster than the speed that `palpate tune --slide` prints for a step on the cap (here for K);
-and friction that is 1.5 times as high at rest, from the near start.
+friction that is 1.5 times as high at rest, and friction above mu_max, from the near start.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)
 SLOWLY = "the same, not expected, no faster than the speed printed for it"
 STEPS = {"a step of 1 mm": 0.0, "the same, expected (`--step 1:mm`)": 1e-3, SLOWLY: 0.0}
+AT_REST, ABOVE = "friction at rest 1.5 times that above 10 mm/s", "friction of 0.95 to 1.2, above mu_max"
 SHIPPED = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
 TITLES = SHIPPED | {"servo-ur5e": "UR5e, servos", "servo-iiwa14": "iiwa 14, servos"}
 STARTS = {"touches": "far, three touches", "far": "far", "near": "near"}
@@ -77,6 +78,8 @@ def drawn(arm, rng, start, fault=None, widest=np.inf):
         gains = replace(gains, slide=replace(gains.slide, speed=speed, step=STEPS[fault]))
         more = {"height": rng.choice([-1e-3, 1e-3]), "period": 0.8 * speed}
         shape, heading, path = "step", 0.0, "line"
+    elif fault == ABOVE:
+        mu = rng.uniform(0.95, 1.2)
     elif fault is not None:
         more = {"sticking": 1.5 * mu, "creep": 0.01}
     ground = ground_of(shape, R, K, friction=mu, **({"period": 2.2 * R} | more))
@@ -228,9 +231,9 @@ def dither(args):
 
 
 def faults(args):
-    """Steps and friction at rest."""
+    """Steps, friction at rest, and friction above its bound."""
     rows = []
-    for fault in (*STEPS, "friction at rest 1.5 times that above 10 mm/s"):
+    for fault in (*STEPS, AT_REST, ABOVE):
         for arm in args.arms:
             rng, found = np.random.default_rng(args.seed + 1), []
             for _ in range(args.slides):

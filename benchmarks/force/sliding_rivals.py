@@ -1,8 +1,9 @@
 """Simple forms of other laws of a slide, which take over from the sliding law when the force is held.
 
 They keep its normal of that moment and its K_u. `fixed normal` turns neither; `normal from velocity` makes it
-perpendicular to the way of the last 40 ms; `fzi-like` moves the tip by the force error as a vector; `admittance` has a
-mass of three lags.
+perpendicular to the way of the last 40 ms; `fzi-like` moves the tip by the force error as a vector, along the surface
+against a spring of K_u to a target that moves as asked, without which friction would hold the tip; `admittance` has
+a mass of three lags.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from palpate.force.sliding.slide_state import (
 
 FIXED, FROM_VELOCITY, FZI, ADMITTANCE = 1.0, 2.0, 3.0, 4.0
 FILTERED, LAST = SIZE, SIZE + 3
-"""Places behind the law's state: the low-passed position, the last velocity."""
+"""Places behind the law's state: the low-passed position, or that of the target; the last velocity."""
 
 
 @part
@@ -54,7 +55,8 @@ def rival_step(law, kind, s, desired, force, position, direction):
     """A tick of a rival: velocity [m/s]."""
     c, n, filtered = law.press, vector_at(s, NORMAL), vector_at(s, FILTERED)
     moved = position - filtered
-    put_vector(s, FILTERED, filtered + 0.05 * c.tick / 2e-3 * moved)
+    if kind != FZI:
+        put_vector(s, FILTERED, filtered + 0.05 * c.tick / 2e-3 * moved)
     if kind == FROM_VELOCITY and sqrt(moved @ moved) > 5e-4:
         along = unit(moved, n)
         n = unit(n - 0.05 * (n @ along) * along, n)
@@ -62,8 +64,10 @@ def rival_step(law, kind, s, desired, force, position, direction):
     flat = direction - (direction @ n) * n
     across = (law.speed / max(sqrt(flat @ flat), 0.1)) * flat
     g = gain(c, s[BOUND])
-    if kind == FZI:  # the whole vector of force error moves the tip, and motion is superposed
-        return g * (desired * n - force) + across + 0.5 * g * (force - (force @ n) * n)
+    if kind == FZI:  # the whole force error, and a spring to a target that moves along, move the tip
+        put_vector(s, FILTERED, filtered + c.tick * across)
+        behind = s[BOUND] * (filtered - position)
+        return g * (desired * n - force + behind - (behind @ n) * n)
     if kind == ADMITTANCE:  # M dv/dt + B v = F_d - f.n with B = 1/g and M/B of three lags
         press = vector_at(s, LAST) @ n
         return (press + c.tick / (3.0 * c.theta) * (g * (desired - force @ n) - press)) * n + across

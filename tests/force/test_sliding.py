@@ -197,6 +197,24 @@ def test_a_slide_without_friction_is_held_on_a_soft_surface() -> None:
         assert figures_of(simulate(gains, ground, ways, into=into, seed=seed), gains, ground).worst < 1.15
 
 
+@pytest.mark.parametrize("arm", ["ur5e", "fr3"])
+def test_friction_above_the_bound_is_said_and_costs_a_quarter_of_the_force(arm: str) -> None:
+    """A refuted normal that was taken from the force, off by all of the friction, pressed with 1.7 F."""
+    gains, ground = tuned(arm, slope=0.04), ground_of("waves", 0.2, 2e4, friction=1.05)
+    rows = simulate(gains, ground, directions("back", 3.0, gains.arm.rate, 0.03, 0.03))
+    refuted = np.flatnonzero(rows[:, 14] == places.REFUTED)
+    assert len(refuted)
+    assert rows[:, 0].max() < 1.25 * gains.force
+    assert rows[refuted, 7].max() < np.radians(20.0) < np.arctan(1.15)
+
+
+def test_the_rival_that_yields_along_the_surface_slides() -> None:
+    gains, ground = tuned("fr3", 20.0, 0.01, slope=0.04), ground_of("plane", 0.2, 3e3, friction=0.5)
+    ways = directions("line", 4.0, gains.arm.rate, 0.01, 0.1)
+    rows = simulate(gains, ground, ways, control=RIVALS["fzi-like"])
+    assert np.ptp(rows[rows[:, 13] > 0.0, 1]) > 0.8 * 0.04
+
+
 def test_a_confined_state_moves_the_others_as_their_covariance_says() -> None:
     s = np.zeros(COVARIANCE + STATES * STATES + 1)
     begin(s, 15.0, 0.1, 10.0, 5e3, 0.1, 0.35, 0.3, 0.1)

@@ -15,8 +15,9 @@ from palpate.identification.evidence.press import press_of
 from palpate.identification.evidence.slope import Loading, slope_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
 from palpate.identification.filters.state_variable import low_pass_once
-from palpate.identification.options import Options
+from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
+from palpate.identification.steady_press import WINDOW, Curve, slopes_at
 from palpate.identification.uncertainty import Measurement
 
 DT = 1e-3
@@ -364,3 +365,16 @@ def test_a_way_in_as_short_as_the_filter_is_held_against_its_readings():
     assert found.working_point.source == "press"
     low, high = found.working_point.stiffness.ci95
     assert low < truth < high
+
+
+def test_rows_between_two_readings_tell_nothing_of_a_press():
+    """A spring of 1 kN/m by 50 readings a second in 1000 rows: where rows count, two intervals of five miss it."""
+    rng = np.random.default_rng(0)
+    fresh, rows = np.linspace(0.0, 1.0, 51), np.linspace(0.0, 1.0, 1001)
+    holds = []
+    for _ in range(40):
+        force = np.interp(rows, fresh, 10.0 * fresh + 0.1 * rng.normal(size=len(fresh)))
+        curve = Curve(rows, 0.01 * rows, force, 0.0 * rows, True, 0.05)
+        own = slopes_at([curve], WINDOW, Lag()).stiffness
+        holds.append(abs(own.value - 1000.0) < own.half)
+    assert sum(holds) >= 34

@@ -32,7 +32,7 @@ from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from foreign.logs import CELLS, Cell, make_log
+from foreign.logs import CELLS, WORLD_CELLS, Cell, make_log
 from foreign.scoring import Score, record_of, score
 from foreign.tables import HEAD, line, markdown, summary, tables
 from palpate.identification import identify
@@ -44,6 +44,9 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=3, help="logs of each cell")
     parser.add_argument("--seed", type=int, default=0, help="of the first log of each cell")
     parser.add_argument("--cells", default="", help="regular expression: SURFACE/NUISANCE/any")
+    parser.add_argument(
+        "--worlds", action="store_true", help="causes that are no sensor's noise, instead of the nuisances"
+    )
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
     parser.add_argument("--json", type=Path, help="write every score and every table there")
     parser.add_argument("--markdown", action="store_true", help="print the tables as a document has them")
@@ -55,7 +58,7 @@ def main() -> None:
     if asked.show:
         show(asked.show, asked.save_log)
         return
-    cells = [cell for cell in CELLS if re.search(asked.cells, str(cell))]
+    cells = [cell for cell in (WORLD_CELLS if asked.worlds else CELLS) if re.search(asked.cells, str(cell))]
     if not cells:
         parser.error(f"no cell matches {asked.cells!r}; there are {CELLS[0]}, {CELLS[1]}, ...")
     if asked.trials < 1:
@@ -63,6 +66,7 @@ def main() -> None:
     scores = judged(cells, range(asked.seed, asked.seed + asked.trials), asked.workers)
     command = f"benchmarks/identification/foreign/judge.py --trials {asked.trials} --seed {asked.seed}"
     command += f" --cells '{asked.cells}'" if asked.cells else ""
+    command += " --worlds" if asked.worlds else ""
     every = tables(scores)
     if asked.markdown:
         print(markdown(scores))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foreign import worlds
 from foreign.motions import BY_FORCE, MOTIONS, course, drifting, tracked
 from foreign.recording import BEGIN, Recording, recorded
 from foreign.surfaces import SURFACES, Surface, Touched, press, random_surface, touch
@@ -48,6 +49,7 @@ class Plan:
         starts: air, rest or midst.
         leaves: whether the log goes on until the probe is in free motion again.
         moving: how far the surface's height wanders, over the depth.
+        breathing: how far it rises and falls every few seconds, over the depth.
         repeats: by how much the force of one stretch differs from the next's, relative.
     """
 
@@ -59,6 +61,7 @@ class Plan:
     starts: str = "air"
     leaves: bool = True
     moving: float = 0.0
+    breathing: float = 0.0
     repeats: float = 0.0
 
 
@@ -119,7 +122,7 @@ def planned(cell: Cell, rng: Rng) -> Plan:
         if cell.motion != "any":
             plan = replace(plan, motion=cell.motion)
         return plan
-    plan = NUISANCES[cell.nuisance](plan, rng)
+    plan = (NUISANCES | WORLDS)[cell.nuisance](plan, rng)
     return plan if cell.motion == "any" else replace(plan, motion=cell.motion)
 
 
@@ -166,7 +169,10 @@ def log_of_plan(plan: Plan, rng: Rng, cell: Cell, seed: int) -> Log:
     still = way.by_force or not plan.moving
     height = np.zeros_like(x) if still else drifting(t, plan.moving * deep, rng)
     touched = replace(touched, force=touched.force * _repeats(t, plan.repeats, rng))
+    touched = replace(touched, force=plan.recording.world.felt(x, touched.force))
     height = height + float(rng.uniform(-0.05, 0.3))
+    if plan.breathing:
+        height = height + plan.breathing * deep * np.sin(2 * np.pi * float(rng.uniform(0.15, 0.4)) * t)
     span = _cut(plan, way.base, way.begin, way.end, t[-1], rng)
     return written(plan, Pressed(dt, x, a, height, touched, span), rng, cell, seed)
 
@@ -186,7 +192,13 @@ def written(plan: Plan, pressed: Pressed, rng: Rng, cell: Cell, seed: int) -> Lo
     if isfinite(r.series) and "series_stiffness" not in plan.told:
         truth = _through(r.series, truth)
     late = _LATER * (r.whole_lag - r.lag) if "force_filter" not in plan.told else 0.0
-    lag = r.whole_lag - (r.hold_position - 1) / r.rate, r.whole_lag + late + (r.hold_force - 1) / r.rate
+    early, later = r.world.lag
+    between = 0.5 / r.position_rate if r.position_rate else 0.0
+    lag = (
+        r.whole_lag + early - between - (r.hold_position - 1) / r.rate,
+        r.whole_lag + later + between + late + (r.hold_force - 1) / r.rate,
+    )
+    truth["K"] = truth["K"][0], truth["K"][1] + r.world.spring
     return Log(
         cell, seed, plan, times[rows] - times[rows][0], position[rows], newton[rows], dict(plan.told), truth,
         defined, lag, dense,
@@ -404,6 +416,113 @@ NUISANCES: dict[str, Callable[[Plan, Rng], Plan]] = {
     "moving": _moving,
     "glued": _glued,
 }
+
+
+def _world(plan: Plan, world: worlds.World) -> Plan:
+    return _record(plan, world=world)
+
+
+def _share(low: float, high: float, rng: Rng) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _deep(plan: Plan) -> float:
+    return plan.surface.depth_of(plan.largest)
+
+
+def _averaged(plan: Plan, rng: Rng) -> Plan:
+    width = _share(0.02, 0.1, rng)
+    plan = plan if rng.uniform() < 0.5 else _record(plan, rate=round(float(rng.choice([1, 2])) / width))
+    return _world(plan, worlds.averaged(width))
+
+
+def _summing(plan: Plan, rng: Rng) -> Plan:
+    return _world(_tell(plan, lag=None), worlds.moving_average(_share(0.005, 0.03, rng)))
+
+
+def _merged(plan: Plan, rng: Rng) -> Plan:
+    return _tell(_record(plan, position_rate=float(rng.choice([50, 100, 125]))), lag=None)
+
+
+def _position_end(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.at_end(float(rng.uniform(0.5, 0.9))))
+
+
+def _decaying(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.decaying(_share(3, 60, rng)))
+
+
+def _creeping(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.creeping(_share(0.002, 0.02, rng), _share(1, 20, rng)))
+
+
+def _guided(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.guided(_share(0.02, 0.15, rng), _deep(plan) * _share(0.005, 0.04, rng)))
+
+
+def _breathing(plan: Plan, rng: Rng) -> Plan:
+    return replace(_moves(plan, rng, "dither", "sine", "multisine"), breathing=_share(0.02, 0.3, rng))
+
+
+def _short(plan: Plan, rng: Rng) -> Plan:
+    return _record(plan, rate=float(rng.uniform(8, 25)))
+
+
+def _sticky(plan: Plan, rng: Rng) -> Plan:
+    return _world(
+        plan, worlds.sticky(plan.largest * _share(0.02, 0.2, rng), _deep(plan) * _share(0.02, 0.3, rng))
+    )
+
+
+def _cabled(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.cabled(plan.largest / _deep(plan) * _share(0.005, 0.05, rng)))
+
+
+def _humming(plan: Plan, rng: Rng) -> Plan:
+    size, phase = plan.largest * _share(0.003, 0.05, rng), float(rng.uniform(0, 6))
+    return _world(plan, worlds.humming(size, float(rng.choice([50, 60])), phase))
+
+
+def _playing(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.playing(_deep(plan) * _share(0.005, 0.1, rng)))
+
+
+def _late_position(plan: Plan, rng: Rng) -> Plan:
+    return _world(_tell(plan, lag=None), worlds.late_position(_share(0.001, 0.008, rng)))
+
+
+def _networked(plan: Plan, rng: Rng) -> Plan:
+    return _world(_tell(plan, lag=None), worlds.networked(_share(0.002, 0.02, rng), rng))
+
+
+def _two_clocks(plan: Plan, rng: Rng) -> Plan:
+    return _world(_tell(plan, lag=None), worlds.two_clocks(_share(1e-4, 2e-3, rng)))
+
+
+def _ringing(plan: Plan, rng: Rng) -> Plan:
+    return _world(plan, worlds.ringing(_share(30, 150, rng), _share(0.01, 0.1, rng)))
+
+
+WORLDS: dict[str, Callable[[Plan, Rng], Plan]] = {
+    "averaged": _averaged,
+    "summing": _summing,
+    "merged": _merged,
+    "position-end": _position_end,
+    "decaying": _decaying,
+    "creeping": _creeping,
+    "guided": _guided,
+    "breathing": _breathing,
+    "short": _short,
+    "sticky": _sticky,
+    "cabled": _cabled,
+    "humming": _humming,
+    "playing": _playing,
+    "late-position": _late_position,
+    "networked": _networked,
+    "two-clocks": _two_clocks,
+    "ringing": _ringing,
+}
 MIXED = tuple(name for name in NUISANCES if name not in ("clean", "glued"))
 CELLS = tuple(Cell(s, n) for s in SURFACES for n in (*NUISANCES, "mixture"))
+WORLD_CELLS = tuple(Cell(s, n) for s in SURFACES for n in WORLDS)
 assert set(BY_FORCE) <= set(MOTIONS)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
+
+from foreign.worlds import World
 
 Array = NDArray[np.float64]
 
@@ -33,6 +35,9 @@ class Recording:
         hold_force, hold_position: rows that share one reading.
         jitter: of the instants of the rows, in periods, stamped truly; stamp_noise: of the stamps alone, in periods.
         stamp_count: what stamps are rounded to [s].
+        position_rate: rows get the reading of the position that is nearest in time, of so many a second; 0 for each
+            its own.
+        world: another cause of error.
     """
 
     rate: float = 1000.0
@@ -54,6 +59,8 @@ class Recording:
     jitter: float = 0.0
     stamp_noise: float = 0.0
     stamp_count: float = 0.0
+    position_rate: float = 0.0
+    world: World = field(default_factory=World, repr=False)
 
     @property
     def whole_lag(self) -> float:
@@ -107,18 +114,23 @@ def recorded(
     span = (len(x) - 4) * dt
     rows = int((span - 0.03) * r.rate)
     times = BEGIN + (np.arange(rows) + r.jitter * rng.uniform(-0.5, 0.5, rows)) / r.rate
-    felt = r.low_passed(force + r.payload * acceleration, dt)
+    position, felt = r.world.seen(x + force / r.series, force, dt)
+    felt = r.low_passed(felt + r.payload * acceleration, dt)
     read_at = _held(times, r.hold_force, rng)
-    newton = at_times(felt, read_at - r.lag, dt)
+    newton = at_times(felt, read_at - r.lag - r.world.late(read_at)[0], dt)
     newton = newton + r.bias + r.drift * _bend(times / span, rng)
-    newton = newton + _held_values(_noise(r, rows, rng), r.hold_force, read_at)
+    newton = newton + _held_values(_noise(r, rows, rng), read_at)
     hit = rng.uniform(size=rows) < r.spikes
     newton = np.where(hit, newton + rng.normal(size=rows) * 0.5 * np.ptp(newton), newton)
     newton = _rounded(np.clip(newton, -r.range, r.range), r.force_count)
-    position = x + force / r.series
     seen_at = _held(times, r.hold_position, rng)
-    metre = at_times(position, seen_at, dt)
-    metre = metre + _held_values(r.position_noise * rng.normal(size=rows), r.hold_position, seen_at)
+    if r.position_rate:
+        first = float(rng.uniform(0, 1 / r.position_rate))
+        seen_at = first + np.round((times - first) * r.position_rate) / r.position_rate
+    metre = at_times(position, seen_at - r.world.late(seen_at)[1], dt)
+    metre = metre + _held_values(r.position_noise * rng.normal(size=rows), seen_at)
+    if r.world.end < 1:
+        metre = np.minimum(metre, metre.min() + r.world.end * np.ptp(metre))
     stamps = times - times[0] + r.stamp_noise * rng.uniform(-0.5, 0.5, rows) / r.rate
     return _rounded(stamps, r.stamp_count), _rounded(metre, r.position_count), newton
 
@@ -131,9 +143,7 @@ def _held(times: Array, count: int, rng: np.random.Generator) -> Array:
     return times[np.maximum((np.arange(len(times)) + first) // count * count - first, 0)]
 
 
-def _held_values(noise: Array, count: int, read_at: Array) -> Array:
-    if count == 1:
-        return noise
+def _held_values(noise: Array, read_at: Array) -> Array:
     _, first, back = np.unique(read_at, return_index=True, return_inverse=True)
     return noise[first][back]
 

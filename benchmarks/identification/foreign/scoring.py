@@ -227,19 +227,23 @@ def _untold_arm(log: Log) -> float:
 def working_truth(log: Log, source: str, frequency: float | None, force: float) -> Range | None:
     """The true stiffness at a working point [N/m], from the press without sensors; None where it has none.
 
-    An arm in series that is not told may be in it or not, and so may the inertia of a payload.
+    An arm in series that is not told may be in it or not, and so may the inertia of a payload, a cable beside the
+    surface and the friction of a guide.
     """
     dense, surface, arm = log.dense, log.plan.surface, _untold_arm(log)
+    world = log.plan.recording.world
+    inertia = 0.0
     if source == "octave" and frequency:
         own = octave_stiffness(dense, frequency)
         if surface.linear:
             own = (dynamic_stiffness(surface, frequency, 0.0, 0.0).real,) * 2
-        if own is not None:
-            inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
-            ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
-            return min(ends), max(ends)
-    slope = press_stiffness(surface, dense, force)
-    return None if slope is None else (slope[0] / (1 + slope[0] / arm), slope[1])
+        inertia = (2 * np.pi * frequency) ** 2 * log.plan.recording.payload
+    else:
+        own = press_stiffness(surface, dense, force)
+    if own is None:
+        return None
+    ends = [z - more for k in own for z in (k, k / (1 + k / arm)) for more in (0.0, inertia)]
+    return min(ends) * (1 - world.friction), max(ends) * (1 + world.friction) + world.spring
 
 
 def _working_point(log: Log, found: Any) -> tuple[Answer, ...]:

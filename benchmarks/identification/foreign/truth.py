@@ -115,35 +115,41 @@ def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) 
 
     A loading is a contact's first advance to its peak force; a log without one has the slope of its unloading. Two
     slopes are as true as each other: of the force as it was, and of the force without what is no spring (damper, mass,
-    friction), on the same way.
+    friction), on the same way. Of a surface that yields so are those of each contact alone: its second is stiffer.
     """
-    short, low, high = dense.thinned(1000.0), 0.4, 0.95
+    short, low, high, largest = dense.thinned(1000.0), 0.4, 0.95, None
     if force is not None:
-        share = min(force / float(short.force.max() or 1.0), 1 - ABOUT)
+        largest = float(short.force.max() or 1.0)
+        share = min(force / largest, 1 - ABOUT)
         low, high = max(share - ABOUT, 0.0), max(share + ABOUT, 2 * ABOUT)
     v = np.gradient(short.depth, short.dt)
     slow = surface.scaled(B=0.0, D=0.0, M=0.0, Fc=0.0)
     calm = touch(slow, short.depth, v, np.gradient(v, short.dt), short.dt).force
     edges = np.flatnonzero(np.diff(np.concatenate([[0], short.contact.view(np.int8), [0]])))
     forces = short.force, calm
-    told = [s for force in forces if (s := _slope_in(short.depth, force, edges, low, high)) is not None]
+    levels = low, high, largest
+    told = [s for f in forces if (s := _slope_in(short.depth, f, edges, *levels)) is not None]
     if not told:
         back = len(short.depth) - edges[::-1]
-        told = [
-            s for f in forces if (s := _slope_in(short.depth[::-1], f[::-1], back, low, high)) is not None
-        ]
+        told = [s for f in forces if (s := _slope_in(short.depth[::-1], f[::-1], back, *levels)) is not None]
+    if told and surface["Kp"]:
+        alone = [_slope_in(short.depth, f, own, *levels) for f in forces for own in edges.reshape(-1, 2)]
+        told += [s for s in alone if s is not None]
     return (min(told), max(told)) if told else None
 
 
-def _slope_in(depth: Array, force: Array, edges: NDArray[np.intp], low: float, high: float) -> float | None:
+def _slope_in(
+    depth: Array, force: Array, edges: NDArray[np.intp], low: float, high: float, largest: float | None
+) -> float | None:
     """Of one force over the depth, a level for each loading that goes half as deep as the deepest.
 
     Args:
         depth: shape (n,) [m].
         force: shape (n,) [N].
         edges: first row, and past the last, of one contact after the other, shape (2 c,).
-        low: share of a loading's largest force at which it begins.
+        low: share of the largest force at which it begins.
         high: the same of its end.
+        largest: that force [N]; None for each loading's own.
     """
     xx = xf = 0.0
     spans = list(zip(edges[::2], edges[1::2], strict=True))
@@ -153,11 +159,12 @@ def _slope_in(depth: Array, force: Array, edges: NDArray[np.intp], low: float, h
         x, f = depth[begin:end], force[begin:end]
         if np.ptp(x) < 0.5 * deepest:
             continue
-        top = int(np.argmax(f >= high * f.max())) + 1
+        most = largest or float(f.max())
+        top = int(np.argmax(f >= high * most)) + 1
         x, f = x[:top], f[:top]
         if len(x) < 5:
             continue
-        below = np.flatnonzero(f < low / high * f.max())
+        below = np.flatnonzero(f < low * most)
         first = int(below[-1]) + 1 if len(below) else 0
         x, f = x[first:], f[first:]
         xx += float(((x - x.mean()) ** 2).sum())

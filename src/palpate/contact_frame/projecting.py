@@ -7,6 +7,7 @@ own mass and compliance are removed.
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
@@ -291,6 +292,7 @@ def identify_contact(
     spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
     in_space = FORCE[0] in record.columns
     if in_space:
+        whole = record
         record = project(record, frame or ContactFrame())
         spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
     elif inertia is not None and wrong_sign(inertia):
@@ -310,7 +312,32 @@ def identify_contact(
         found = _mistaken(found)
     about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     record = replace(record, meta={**record.meta, "arm": about})
-    return with_arm(found, arm, tolerance, from_pose=in_space), record
+    found = with_arm(found, arm, tolerance, from_pose=in_space)
+    slid = _slide(whole, frame or ContactFrame(), arm, tolerance, calibration, found) if in_space else None
+    return slid or found, record
+
+
+def _slide(
+    record: Record,
+    frame: ContactFrame,
+    arm: ArmDynamics,
+    tolerance: float,
+    calibration: float,
+    press: Identification,
+) -> Identification | None:
+    """The identification of a slide, by `palpate-slide`; None of a press that shows its stiffness, and of no slide."""
+    K = press.parameters.get("K")
+    if K is not None and K.verdict is Verdict.IDENTIFIED:
+        return None
+    for entry in entry_points(group="palpate.slides"):
+        found: Identification | None = entry.load()(
+            signals_of(record, frame), frame, arm, tolerance, calibration
+        )
+        if found is not None and (
+            found.parameters["mu"].value is not None or Code.NO_CONTACT.word in press.codes
+        ):
+            return found
+    return None
 
 
 def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:

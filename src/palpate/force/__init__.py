@@ -1,14 +1,21 @@
-"""Force control that certifies itself: gains, the proof of where they are stable, and a law that stays inside."""
+"""Force control that certifies itself: gains, the proof of where they are stable, and a law that stays inside.
 
-from palpate.force.arm import Arm, load_arm
-from palpate.force.certificate import Certificate
-from palpate.force.certifying import certify
-from palpate.force.force_loop import ForceLoop
-from palpate.force.gains import Gains, load_gains
-from palpate.force.known_surface import Known, known_from
-from palpate.force.sliding.sliding_loop import SlidingLoop
-from palpate.force.sliding.turning_tool import TurningTool
-from palpate.force.tuning import Tuning, tune
+Its names are looked up when they are first used: what reads an arm's file waits for no proof.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from palpate.force.arm import Arm, load_arm
+    from palpate.force.certificate import Certificate
+    from palpate.force.certifying import certify
+    from palpate.force.force_loop import ForceLoop
+    from palpate.force.gains import Gains, load_gains
+    from palpate.force.known_surface import Known, known_from
+    from palpate.force.sliding.sliding_loop import SlidingLoop
+    from palpate.force.sliding.turning_tool import TurningTool
+    from palpate.force.tuning import Tuning, tune
 
 __all__ = [
     "Arm",
@@ -25,3 +32,23 @@ __all__ = [
     "load_gains",
     "tune",
 ]
+
+_HOME = {
+    "arm": ("Arm", "load_arm"),
+    "certificate": ("Certificate",),
+    "certifying": ("certify",),
+    "force_loop": ("ForceLoop",),
+    "gains": ("Gains", "load_gains"),
+    "known_surface": ("Known", "known_from"),
+    "sliding.sliding_loop": ("SlidingLoop",),
+    "sliding.turning_tool": ("TurningTool",),
+    "tuning": ("Tuning", "tune"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOME.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(f"{__name__}.{module}"), name)
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -19,13 +19,10 @@ class Slide(Table):
     slope: Annotated[float, Meta(gt=0, le=0.5)] = 0.12
     """Standard deviation of the given direction against the surface's normal, each way [rad]."""
     radius: Positive = 0.1
-    """Smallest radius of curvature of the surface [m]."""
+    """Smallest radius R of curvature of the surface [m]: the curvature's standard deviation before any was seen is 1/R,
+    and its noise along the path 1/R^3 [1/m^3]."""
     ratio: Annotated[float, Meta(gt=0, le=2)] = 0.85
     """Tangential over normal stiffness of the contact; 2 (1 - nu)/(2 - nu) of two spheres (Mindlin, 1949)."""
-    turning: Positive = 1000.0
-    """Noise of the curvature along the path, 1/R^3 [1/m^3]."""
-    curvature: Positive = 10.0
-    """Standard deviation of the curvature before any was seen [1/m]."""
     acceleration: Positive = 0.4
     """Of the tip along the surface [m/s^2]."""
     step: Annotated[float, Meta(ge=0, le=0.1)] = 0.0

@@ -19,6 +19,7 @@ from palpate.identification.estimators.fit import Fit
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
+from palpate.signals.types import NORMAL
 
 Linear = TypeVar("Linear", Answer, Fit)
 """Parameters with their covariance."""
@@ -50,19 +51,23 @@ def without_series(found: Linear, series: float, series_std: float) -> Linear:
     return found.through(jacobian, new).with_cause("series stiffness", moved)
 
 
-def without_swing(found: Linear, share: float, share_std: float) -> Linear:
+def without_swing(found: Linear, share: float, share_std: float, band: float) -> Linear:
     """Parameters of the surface where a tip of mass m swings on the arm's k: its Z/(1 + m s^2/k) was identified.
 
-    To the second order of the frequency M is M_a + K m/k, K and B are as they were.
+    To the second order of the frequency M is M_a + K m/k, K and B are as they were. The next orders make B_a and M_a
+    too large by m omega^2/k of each at most, which is their half-width by this cause.
 
     Args:
         found: with the stiffness in series taken out.
         share: m/k [s^2].
         share_std: standard deviation of that [s^2].
+        band: frequency below which the probe moved [Hz].
     """
     jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
     moved = missed @ found.theta - found.theta
-    return found.through(jacobian, jacobian @ found.theta).with_cause("tip's mass", moved)
+    most = min(share * (2 * np.pi * band) ** 2, 1.0) / NORMAL
+    beyond = most * found.theta * np.isin(found.names, ("B", "M"))
+    return found.through(jacobian, jacobian @ found.theta).with_cause("tip's mass", np.hypot(moved, beyond))
 
 
 def _swinging(names: tuple[str, ...], share: float) -> Array:

@@ -112,8 +112,8 @@ def identify(
         choice = replace(choice, answer=in_series.without_series(choice.answer, series_stiffness, series_std))
         holds = in_series.without_series(holds, series_stiffness, series_std)
     if series_mass is not None:
-        choice = replace(choice, answer=in_series.without_swing(choice.answer, *options.swing))
-        holds = in_series.without_swing(holds, *options.swing)
+        choice = replace(choice, answer=in_series.without_swing(choice.answer, *options.swing, problem.band))
+        holds = in_series.without_swing(holds, *options.swing, problem.band)
     if contacts.payload is not None:
         choice = replace(choice, answer=in_series.with_payload(choice.answer, contacts.payload.std))
     parameters, told = verdicts(choice, holds, evidence[2], terms)

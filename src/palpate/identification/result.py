@@ -219,6 +219,21 @@ class Traces(Compared):
 
 
 @dataclass(frozen=True)
+class SlideFound:
+    """A slide along the surface, as `palpate-slide` finds it in a log.
+
+    Args:
+        sentence: the answer.
+        facts: sentences on normal and stiffness.
+        values: the same and the places of the path, as plain values.
+    """
+
+    sentence: str
+    facts: tuple[str, ...]
+    values: dict[str, Any]
+
+
+@dataclass(frozen=True)
 class LagFound:
     """How much later the force is read than the position.
 
@@ -256,6 +271,7 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
         depth: penetration that K, B and K1 belong to, of a model in which they grow with it [m]; else None.
         inputs: input quantities of the uncertainties, by cause.
         correlation: of the estimates of K, B and M, each pair by its names.
+        slide: where the tip slides; parameters are then mu and K.
     """
 
     model: str
@@ -277,6 +293,7 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
     depth: float | None = None
     inputs: dict[str, Input] = field(default_factory=dict, repr=False)
     correlation: dict[str, float] = field(default_factory=dict, repr=False)
+    slide: SlideFound | None = field(default=None, repr=False)
 
     def __getattr__(self, name: str) -> Parameter:
         """A parameter by its name: `found.K`."""
@@ -321,6 +338,7 @@ class Identification(Result, shown_by="palpate.report.identification.answer"):
             "working_point": self.working_point.to_json() if self.working_point else None,
             "dynamic_stiffness": [octave.to_json() for octave in self.dynamic_stiffness],
             "press": self.press.to_json() if self.press else None,
+            "slide": self.slide.values if self.slide else None,
             "contacts": [{"start_s": start, "end_s": end} for start, end in self.contacts],
             "lag_s": None if self.lag is None else asdict(self.lag),
             "fit": {"r2": _plain(self.r2), "rmse_N": _plain(self.rmse), "n": self.n},

@@ -37,6 +37,8 @@ from palpate.identification.problem import Problem
 from palpate.identification.result import Comparison
 
 _ROUNDS = 12
+_STARTS = 9
+"""Lags at most that a search may begin from."""
 _FOUND = 0.25
 """Share of its deviation by which a surface, a lag or a nonlinear parameter may still move: it adds a sixteenth to the
 variance."""
@@ -54,14 +56,9 @@ def answer(problem: Problem, model: Model) -> Answer:
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
         return plain
-    found = replace(
-        found,
-        budget={
-            **found.budget,
-            "touch": causes.of_another(found.theta, found.budget, plain.theta, plain.budget),
-        },
-    )
-    return found if found.half_of("K") < plain.half_of("K") else plain
+    apart = causes.of_another(found.theta, found.budget, plain.theta, plain.budget)
+    best = found if found.half_of("K") < plain.half_of("K") else plain
+    return replace(best, budget={**best.budget, "touch": apart})
 
 
 def _with_recovery(found: Answer) -> Answer:
@@ -85,12 +82,17 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution
     if problem.lag.std > 0 and not model.nonlinear:  # its column needs parameters that are roughly right
         exact = Linearisation.of(replace(problem, lag=replace(problem.lag, std=0.0)), model, segments, {})
         about = dict(zip(exact.names, estimate(exact.system).theta.tolist(), strict=True))
-    best = _descent(Linearisation.of(problem, model, segments, about))
+    starts = _starts(Linearisation.of(problem, model, segments, about))
+    best, _ = min((_descent(start) for start in starts), key=lambda found: found[1])
     return best, estimate(best.system)
 
 
-def _descent(start: Linearisation) -> Linearisation:
-    """The likeliest linearisation: the columns are formed again about what is found until it rests."""
+def _descent(start: Linearisation) -> tuple[Linearisation, float]:
+    """Form the columns again about what is found until it rests.
+
+    Returns:
+        The likeliest linearisation, and its misfit.
+    """
     best = local = start
     places, least = list(local.searched), np.inf
     for _ in range(_ROUNDS if places else 0):
@@ -108,7 +110,34 @@ def _descent(start: Linearisation) -> Linearisation:
         local = Linearisation.of(
             start.problem, start.model, start.segments, best.moved(theta, step), best.use
         )
-    return best
+    return best, least
+
+
+def _starts(local: Linearisation) -> list[Linearisation]:
+    """Lags within two deviations of the prior that are likelier than their neighbours, a radian of the motion away.
+
+    Nearer to each other no two lags fit, one by taking a mass or a damping for the other.
+    """
+    problem, lag = local.problem, local.problem.lag
+    reach = 2 * lag.std
+    count = 1 + int(np.ceil(4 * np.pi * reach * problem.band)) if np.isfinite(problem.band) else 0
+    if lag.std == 0 or count < 3:  # all of them are about where it starts
+        return [local]
+    fixed = {name: value for name, value in local.at.items() if name != LAG}
+    tried, misfits = [], [np.inf]
+    for at in np.linspace(lag.value - reach, lag.value + reach, min(count, _STARTS)):
+        about = fixed | {LAG: float(at)}
+        other = Linearisation.of(problem, local.model, local.segments, about, local.use)
+        here = held(other.system, other.searched)
+        misfits.append(other.misfit(here))
+        tried.append(dict(zip(other.names, here.theta.tolist(), strict=True)))
+    return [
+        Linearisation.of(problem, local.model, local.segments, tried[i], local.use)
+        for i, (before, own, after) in enumerate(
+            zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
+        )
+        if own < before and own <= after
+    ]
 
 
 def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:

@@ -161,6 +161,7 @@ class Curve:
         time, depth, force: shape (n,) [s], [m], [N].
         drift: what was removed from the force, shape (n,) [N].
         loads: whether it is a loading.
+        readings: fresh ones of the slower channel in a row, one at most.
     """
 
     time: Array
@@ -168,6 +169,7 @@ class Curve:
     force: Array
     drift: Array
     loads: bool
+    readings: float
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -271,7 +273,9 @@ def curves_of(
             ends = [float(np.median(own)) for own in np.array_split(force, 5)]
             time = channels.time[there]
             gone = np.zeros(len(time)) if drift is None else np.interp(time, drift.times, drift.levels)
-            curves.append(Curve(time, position, force, gone, ends[-1] > ends[0]))
+            curves.append(
+                Curve(time, position, force, gone, ends[-1] > ends[0], min(channels.rate * channels.dt, 1.0))
+            )
     whole = max((own.reach[1] - own.reach[0] for own in curves), default=0.0)
     return [own for own in curves if own.reach[1] - own.reach[0] > whole / 2]
 
@@ -339,10 +343,10 @@ def _within(curve: Curve, low: float, high: float) -> _Window | None:
     first = int(np.argmax(force > low))
     above = np.flatnonzero(force > high)
     last = int(above[0]) if len(above) else len(force)
-    if last - first < _FEWEST:
+    count = min(_MOST, int((last - first) * curve.readings))  # rows between two readings tell nothing more
+    if count < _FEWEST:
         return None
     rows = slice(first, last) if curve.loads else slice(len(force) - last, len(force) - first)
-    count = min(_MOST, last - first)
     edges = np.linspace(0, last - first, count + 1).astype(np.intp)
     parts = curve.time, curve.depth, curve.force, curve.drift
     time, x, f, gone = (np.add.reduceat(part[rows], edges[:-1]) / np.diff(edges) for part in parts)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate._jit.typing_rules import TypingRules
-from palpate_native.source import comment_text, home_of, place_of, refuse
+from palpate_native.source import comment_text, home_of, place_of, refuse, syntax_of
 from palpate_native.statements import FunctionBody
 from palpate_native.structs import Structs, c_name, initial, plain
 
@@ -52,23 +52,23 @@ class Translation:
         Raises:
             OutsideSubset: it has something that the subset has not.
         """
+        from numba.core.errors import NumbaError
+
         key = (function, tuple(plain(kind) for kind in kinds))
         if key not in self._functions:
-            body = self._functions[key] = FunctionBody(self, *key, plain(self.rules.result(*key)))
             try:
+                body = self._functions[key] = FunctionBody(self, *key, plain(self.rules.result(*key)))
                 names = [self.structs.name(kind) for kind in (*key[1], body.result)]
                 name = re.sub(r"\._*(\w*?)_*$", r"_\1", function.__qualname__.rpartition("<locals>.")[2])
                 body.name = self._claim(c_name(name), names[0])
                 text = body.text()
-            except KeyError as error:
-                fault, remedy = f"a value of type {error.args[0]}", "use numbers, truths, parts, float arrays"
-                refuse(function, body.tree, fault, remedy)
-            says = (
-                comment_text(inspect.cleandoc(function.__doc__ or "")),
-                place_of(function, function.__code__.co_firstlineno),
-            )
-            lines = "\n\n".join(filter(None, says)).split("\n")
-            comment = "\n".join(f" * {line}".rstrip() for line in lines).removeprefix(" * ")
+            except (KeyError, NumbaError) as error:
+                kind = f"type {error.args[0]}" if isinstance(error, KeyError) else "no type that Numba infers"
+                remedy = "use numbers, truths, parts, float arrays"
+                refuse(function, syntax_of(function), f"a value of {kind}", remedy)
+            doc = comment_text(inspect.cleandoc(function.__doc__ or ""))
+            says = f"{doc}\n\n{place_of(function, function.__code__.co_firstlineno)}".lstrip()
+            comment = "\n".join(f" * {line}".rstrip() for line in says.split("\n")).removeprefix(" * ")
             self.definitions.append(f"/* {comment} */\n{text}")
         return self._functions[key]
 

@@ -287,6 +287,10 @@ def test_no_tick_differs_by_other_compilers_and_processors(compiler, name, reque
         ("raises_to", "** 0.5 for a root"),
         ("prints_into", "a number or a truth"),
         ("walks_over", "count with range"),
+        ("names_an_argument", "all its arguments in order"),
+        ("writes_on_the_way", "alone in a statement"),
+        ("adds_a_text", "no type that Numba infers"),
+        ("goes_on", "continue has no C"),
     ],
 )
 def test_a_law_outside_the_subset_is_refused_with_file_line_and_remedy(function, says):
@@ -336,6 +340,49 @@ def walks_over(x):
     return total
 
 
+@law
+def product(x, y=2.0):
+    """A law with a default."""
+    return x * y
+
+
+@law
+def names_an_argument(x):
+    """A law that names an argument of another."""
+    return product(x, y=3.0)
+
+
+@law
+def puts(a, x):
+    """A law that writes to an array."""
+    a[0] = x
+    return x
+
+
+@law
+def writes_on_the_way(x):
+    """A law with a call that writes, in an expression that reads: C has no order of the two."""
+    a = np.zeros(2)
+    b = a
+    return puts(b, x) + a[0]
+
+
+@law
+def adds_a_text(x):
+    """A law that Numba refuses."""
+    return x + "N"
+
+
+@law
+def goes_on(x):
+    """A law with a statement that the subset has not."""
+    for _ in range(3):
+        if x > 1.0:
+            continue
+        x = x + 1.0
+    return x
+
+
 @needs_compiler
 def test_the_operators_of_python_are_those_of_c(tmp_path):
     """Remainder, quotient and extremes of Python by numbers of either sign, zeros and numbers that are none."""
@@ -377,6 +424,22 @@ def test_the_operators_of_python_are_those_of_c(tmp_path):
     for (name, a, b), line in zip(cases, lines, strict=True):
         ours, theirs = compiled[name](a, b), float("nan") if "nan" in line else float.fromhex(line)
         assert ours.hex() == theirs.hex() or (ours != ours and theirs != theirs), (name, a, b)
+
+
+@needs_compiler
+def test_the_quotients_of_whole_numbers_are_those_of_c(tmp_path):
+    """Remainder and quotient of Python by whole numbers of either sign."""
+    from palpate_native.translation import OPERATORS
+
+    cases = [(a, b) for a in range(-7, 8) for b in (-7, -3, -2, -1, 1, 2, 3, 7)]
+    functions = "\n".join(OPERATORS[name, "int64_t"] for name in ("modulo", "floored"))
+    calls = "".join(
+        f"    if (modulo({a}, {b}) != {a % b} || floored({a}, {b}) != {a // b}) return 1;\n" for a, b in cases
+    )
+    text = f"#include <stdint.h>\n{functions}\nint main(void) {{\n{calls}    return 0;\n}}\n"
+    (tmp_path / "whole.c").write_text(text)
+    subprocess.run(["cc", "-std=c99", "whole.c", "-o", "whole"], cwd=tmp_path, check=True)
+    subprocess.run([tmp_path / "whole"], check=True)
 
 
 def spelled(x):

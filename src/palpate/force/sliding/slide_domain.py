@@ -48,7 +48,7 @@ def _slope(gains: Gains, stiffness: float) -> float:
     if slide.touches == 0.0:
         return slide.slope
     unsure = gains.arm.sensor.noise / stiffness
-    return min(float(slope_of_touches(slide.touches, unsure, slide.turning)), slide.slope)
+    return min(float(slope_of_touches(slide.touches, unsure, slide.radius**-3)), slide.slope)
 
 
 def obeys(terms: dict[str, float]) -> bool:

@@ -33,7 +33,6 @@ from palpate.force.sliding.slide_state import (
     ALL,
     ALONG,
     AWAY,
-    AXIS,
     BOUND,
     DIRECTION,
     EDGE,
@@ -46,10 +45,8 @@ from palpate.force.sliding.slide_state import (
     LOST,
     MOVE,
     NORMAL,
-    ORIGIN,
     PACE,
     PHASE,
-    POSITION,
     PRESS,
     PRESSING,
     READ_AT,
@@ -69,6 +66,10 @@ from palpate.force.sliding.slide_state import (
     VELOCITY,
     beside,
     cross,
+    followed_tip,
+    halt,
+    halt_along,
+    into_cone,
     press_again,
     put_vector,
     unit,
@@ -256,35 +257,9 @@ def slide_from(law, s, n, size, stiffness, relative, slope, mu, mu_std):
 
 
 @law
-def halt(s, n, trouble):
-    """Stops the tip, with a normal along which the force is controlled until the slide goes on."""
-    s[HALT], s[TROUBLE] = 1.0, trouble
-    halt_along(s, n)
-
-
-@law
-def halt_along(s, n):
-    """The tip stands along the surface, with a normal along which the force is controlled."""
-    put_vector(s, NORMAL, n)
-    put_vector(s, EDGE, beside(n))
-    put_vector(s, VELOCITY, ZERO3)
-
-
-@law
 def friction_bound(law, s):
     """Largest friction that the estimate of it admits, at rest too."""
     return min(AT_REST * s[MU] + GATE * sqrt(max(variance(s, MU, MU), 0.0)), law.mu_max)
-
-
-@law
-def into_cone(n, force, friction):
-    """The normal next to n from which the force is off by the angle of friction at most."""
-    normal = force @ n
-    pull = force - normal * n
-    ratio = sqrt(pull @ pull) / normal
-    if ratio <= friction:
-        return n
-    return unit(n + (ratio - friction) / (1.0 + ratio * friction) / (ratio * normal) * pull, n)
 
 
 @law
@@ -346,7 +321,7 @@ def command(law, s, desired, force, direction):
         put_vector(s, VELOCITY, ZERO3)
         return ZERO3
     if size > 0.3 * desired and normal < size * cone_of(law):
-        n = unit(force, n)
+        n = into_cone(n, force, law.mu_max) if normal > CROOKED * size else unit(force, n)
         halt(s, n, REFUTED)
     s[LOSS] = s[LOSS] + 1.0 if normal < max(c.level, 0.05 * desired) else 0.0
     if s[LOSS] * c.tick > 2.0 * c.theta:
@@ -360,6 +335,9 @@ def command(law, s, desired, force, direction):
     likely = 2.0 * sqrt(max(variance(s, FORCE, FORCE), 0.0))
     if s[TROUBLE] == FINE and abs(s[FORCE] - desired) + likely > BAND * desired:
         s[TROUBLE], s[SLOW] = AWAY, min(s[SLOW], HALF)
+    # friction above mu_max, within the margin of the cone
+    if s[TROUBLE] == FINE and felt - normal > GATE * c.noise:
+        s[TROUBLE] = AWAY
     press = gain(c, s[BOUND]) * (desired - felt)
     press = min(max(press, -c.speed), c.approach if s[LOSS] > 0.0 else c.speed)
     if s[HALT] > 0.0:
@@ -367,7 +345,7 @@ def command(law, s, desired, force, direction):
         if s[HALT] * c.tick > law.lead:
             relative = sqrt(variance(s, STIFF, STIFF)) / s[STIFF]
             stepped = s[TROUBLE] == STEPPED
-            mu, mu_std = s[MU] if stepped else LIKELY[0], AFTER[1] if stepped else LIKELY[1]
+            mu, mu_std = s[MU] if stepped else law.mu_max, AFTER[1] if stepped else LIKELY[1]
             slide_from(law, s, n, normal, stiffness_of(s), relative, AFTER[0], mu, mu_std)
             s[SLOW] = HALF
         return press * n
@@ -408,27 +386,3 @@ def cone_of(law):
     """Cosine of the widest angle between force and normal that friction admits."""
     slip = 1.0 / sqrt(1.0 + law.mu_max * law.mu_max)
     return slip * (1.0 - CONE * CONE / 2.0) - law.mu_max * slip * CONE
-
-
-@law
-def followed_tip(c, s, position):
-    """The position as the sensor's low-pass saw it [m]; the state goes on by a tick."""
-    if s[TICKS] == 0.0:
-        put_vector(s, ORIGIN, position)
-        put_vector(s, POSITION, ZERO3)
-        return position
-    origin, q = vector_at(s, ORIGIN), vector_at(s, POSITION)
-    p = position - origin
-    put_vector(s, POSITION, p)
-    x = axis(c, s, AXIS, q.x, p.x)
-    y = axis(c, s, AXIS + 3, q.y, p.y)
-    z = axis(c, s, AXIS + 6, q.z, p.z)
-    return Vec3(x, y, z) + origin
-
-
-@law
-def axis(c, s, at, before, now):
-    """One axis through the sensor's low-pass."""
-    z = c.E @ vector_at(s, at) + before * c.e0 + now * c.e1
-    put_vector(s, at, z)
-    return c.c @ z + c.d * now

@@ -40,8 +40,8 @@ SLIDING_TROUBLES = TROUBLES | {
     STEPPED: "the force jumped: a step, an edge or a hole in the surface; the tip stops until the force is held again, "
     "then slides on at half the speed (give the height of steps that are expected as --step)",
     JERKS: "the force turns in jerks, as in stick-slip: friction and normal are less certain than shown",
-    AWAY: "the force may be off by more than a tenth: a step or an edge, friction that changes, or a normal that "
-    "is not yet known; slide more slowly",
+    AWAY: "the force may be off by more than a tenth: a step or an edge, friction that changes or is above "
+    "mu_max, or a normal that is not yet known; slide more slowly",
     LOST: "contact was lost: the tip stopped sliding, and approaches again",
     FRAMES: "the force is not along the direction into the surface: force and position need the same axes, those of "
     "the base; the tip was held",
@@ -147,3 +147,53 @@ def press_again(law, s, n, trouble):
     put_vector(s, VELOCITY, ZERO3)
     put_state(s[LAW:SAFETY], law.press.start())
     put_guard(s[SAFETY:], QUIET)
+
+
+@law
+def halt(s, n, trouble):
+    """Stops the tip, with a normal along which the force is controlled until the slide goes on."""
+    s[HALT], s[TROUBLE] = 1.0, trouble
+    halt_along(s, n)
+
+
+@law
+def halt_along(s, n):
+    """The tip stands along the surface, with a normal along which the force is controlled."""
+    put_vector(s, NORMAL, n)
+    put_vector(s, EDGE, beside(n))
+    put_vector(s, VELOCITY, ZERO3)
+
+
+@law
+def followed_tip(c, s, position):
+    """The position as the sensor's low-pass saw it [m]; the state goes on by a tick."""
+    if s[TICKS] == 0.0:
+        put_vector(s, ORIGIN, position)
+        put_vector(s, POSITION, ZERO3)
+        return position
+    origin, q = vector_at(s, ORIGIN), vector_at(s, POSITION)
+    p = position - origin
+    put_vector(s, POSITION, p)
+    x = axis(c, s, AXIS, q.x, p.x)
+    y = axis(c, s, AXIS + 3, q.y, p.y)
+    z = axis(c, s, AXIS + 6, q.z, p.z)
+    return Vec3(x, y, z) + origin
+
+
+@law
+def axis(c, s, at, before, now):
+    """One axis through the sensor's low-pass."""
+    z = c.E @ vector_at(s, at) + before * c.e0 + now * c.e1
+    put_vector(s, at, z)
+    return c.c @ z + c.d * now
+
+
+@law
+def into_cone(n, force, friction):
+    """The normal next to n from which the force is off by the angle of friction at most."""
+    normal = force @ n
+    pull = force - normal * n
+    ratio = sqrt(pull @ pull) / normal
+    if ratio <= friction:
+        return n
+    return unit(n + (ratio - friction) / (1.0 + ratio * friction) / (ratio * normal) * pull, n)

@@ -54,7 +54,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
     arm = gains.arm
     return Sliding(
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
-        ratio=slide.ratio, turning=slide.turning, curvature=slide.curvature, speed=slide.speed,
+        ratio=slide.ratio, turning=slide.radius**-3, curvature=1.0 / slide.radius, speed=slide.speed,
         acceleration=slide.acceleration, lead=lead_of(gains), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
         encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
     )  # fmt: skip

@@ -175,6 +175,8 @@ def _scaling(normal: Array, cov: Array) -> Array:
 def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
     """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
 
+    The less precise of the two errs by the difference beside what both err by (Hausman, 1978).
+
     Args:
         theta: of the answer, shape (p,).
         budget: of the answer.
@@ -182,7 +184,7 @@ def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Sp
         others: its budget.
     """
     own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
-    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.maximum(less - own, 0.0))
+    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.abs(less - own))
     return Spread(np.maximum(apart, 0.0) ** 2)
 
 

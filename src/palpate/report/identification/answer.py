@@ -148,7 +148,11 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
     for text in unit_warnings(found):
         yield Text(printable(f"! {text}"), style="bold yellow")
     point = found.working_point
-    if not found.contacts or point is None:
+    if found.slide is not None:
+        yield Text(printable(f"{name}: {found.slide.sentence}"), style="bold")
+        yield from (Text(printable(fact)) for fact in found.slide.facts)
+        yield from _rows(found)
+    elif not found.contacts or point is None:
         reason = (
             f": {first_reason(found)}" if not found.contacts else ": no stretch in contact is long enough"
         )

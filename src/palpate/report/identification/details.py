@@ -43,7 +43,9 @@ def show(found: Identification, name: str, console: Console) -> None:
     _point(found, console)
     for fact in press_facts(found):
         console.print(Text(fact))
-    if found.n:
+    for fact in found.slide.facts if found.slide else ():
+        console.print(Text(fact))
+    if found.n and not found.slide:
         console.print(Text(_fit(found)))
     console.print(_parameters(found))
     if found.resonance:

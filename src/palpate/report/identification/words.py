@@ -24,6 +24,7 @@ CALLED = {
     "K1": "second stiffness",
     "tau": "relaxation time",
     "n": "exponent",
+    "mu": "friction coefficient",
     "Fc": "Coulomb friction",
     "x0": "place of the surface",
 }
@@ -67,7 +68,9 @@ UNTOUCHED = "Nothing is touched in this log"
 
 
 def sentence(found: Identification) -> str:
-    """The stiffness, its place, its largest cause of uncertainty, and the next step."""
+    """The stiffness, its place, its largest cause of uncertainty, and the next step; of a slide its friction."""
+    if found.slide is not None:
+        return found.slide.sentence
     if not found.contacts:
         return f"{UNTOUCHED}: {first_reason(found)}."
     point = found.working_point
@@ -196,6 +199,8 @@ def subtitle(found: Identification) -> str:
     """The fit and what it is worth, in one line."""
     if not found.n:
         return "no contact"
+    if found.slide is not None:
+        return " ".join(found.slide.facts)
     count = len(found.contacts)
     force = units_of(found)[0]
     parts = [

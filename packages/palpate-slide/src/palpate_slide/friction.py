@@ -1,0 +1,463 @@
+"""The answer on a slide in a log: friction, normal, and stiffness along the path, each with an interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array, Mask
+from palpate.contact_frame.signals_in_base import ArmDynamics, BaseSignals, ContactFrame, Unloaded
+from palpate.identification import Code, Identification, Parameter, Verdict, Warn
+from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
+from palpate.identification.result import LagFound, SlideFound
+from palpate.identification.uncertainty import student
+from palpate_slide.from_log import (
+    BLOCKS,
+    SHAPE,
+    Fit,
+    SlideFit,
+    SlideWindows,
+    course_of,
+    freed_of,
+    with_length,
+)
+
+PAYLOAD = 20.0
+"""Standard deviation of a weight of which nothing is known [N]: robots carry tools of some kilograms."""
+BY_CHANCE = 1e-3
+"""How probable a dependence on speed may be by chance."""
+LACKS = 0.5
+"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain."""
+CONTRARY = 0.05
+"""Share of the windows in which friction may seem to push, against its noise."""
+ASKEW = np.radians(30.0)
+"""Angle between the normal by the force and that of the path's own plane, at most."""
+PART = 2.5
+"""Length of a part of a slide for which a stiffness is estimated [s]."""
+FAINT = 0.15
+"""Share of noise in the variance of the force's rate, above which it does not show a stiffness."""
+CHI2_95 = 2.4477
+"""Radius of the 95 % of two normal numbers of variance 1."""
+PLACES = 200
+"""Places of the path in the answer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coefficient:
+    """Friction with its interval, all speeds together and by class.
+
+    Args:
+        value, half: mean over the windows, and half-width of its 95 % interval.
+        low, high: interval that holds it at all speeds.
+        table: speed of a class [m/s], mu and half-width, shape (j, 3); one row if friction does not depend on it.
+    """
+
+    value: float
+    half: float
+    low: float
+    high: float
+    table: Array
+
+
+def slide_in(
+    signals: BaseSignals, frame: ContactFrame, arm: ArmDynamics, tolerance: float, calibration: float
+) -> Identification | None:
+    """The identification of a slide; None of a log in which the tip does not slide.
+
+    Args:
+        signals: wrench and pose over time.
+        frame: as declared by the user.
+        arm: whose own stiffness is taken out of K, if it is known.
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+    """
+    freed = freed_of(signals, frame)
+    course = None if freed is None else course_of(signals, freed, frame)
+    if freed is None or course is None:
+        return None
+    fit = _problem(course, freed, np.zeros(len(course.time), int), frame)
+    found, length, beside = with_length(fit)
+    share, slips = course.share(length)
+    rows = slips if found.slips else np.ones(len(slips), bool)
+    mu = _coefficient(course, freed, frame, (fit, found, length, beside), rows)
+    known = bool(freed.free.any()) or frame.payload is not None
+    if known:
+        K, parts = _stiffness(course, found, beside[:, 0], length, arm, tolerance, calibration)
+    else:
+        K, parts = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_ZERO), np.zeros((0, 5))
+    normal, cone = _normals(course, fit, found, mu, share)
+    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), known, found.slips, tolerance)
+    warnings = () if known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),)
+    lag = LagFound(
+        USUAL_LAG + found.lag,
+        float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1])),
+        0.0,
+        "prior",
+    )
+    inside = np.flatnonzero(freed.inside)
+    start, end = (float(signals.time[i] - signals.time[0]) for i in (inside[0], inside[-1]))
+    return Identification(
+        model="slide",
+        parameters={"mu": own, "K": K},
+        contacts=((start, end),),
+        lag=replace(lag, bound=1.96 * lag.std),
+        r2=float("nan"),
+        rmse=float(np.sqrt(np.mean((found.angle[rows] * course.noise[rows]) ** 2))),
+        n=int(rows.sum()),
+        warnings=warnings,
+        slide=_answer(course, mu, own, normal, cone, parts, length),
+    )
+
+
+_NO_ZERO = (
+    "no free motion in the log: the zero of the force is unknown, and friction with it; begin the log before the tip"
+    " touches, or give --payload"
+)
+
+
+def _problem(course: SlideWindows, freed: Unloaded, classes: Array, frame: ContactFrame) -> Fit:
+    """The least-squares problem, with what free motion leaves unknown of bias and weight."""
+    usual = float(np.median(np.linalg.norm(course.force, axis=1)))
+    known = bool(freed.free.any()) or frame.payload is not None
+    bias = max(freed.load.std, 1e-3) if known else usual
+    weight = freed.load.weight_std if freed.load.separable else PAYLOAD
+    turns = float(np.abs(course.turned[1] - np.eye(3)).max()) > 0.02
+    std = [
+        USUAL_LAG_STD,
+        *[bias] * 3,
+        *([max(weight, 1e-3)] * 3 if turns and not frame.gravity_compensated else []),
+    ]
+    return Fit(course, classes, np.array(std), 0.0)
+
+
+def _classes(speed: Array, rows: Mask) -> Array:
+    """Octaves of the speed, those with few windows joined to the next, shape (m,)."""
+    low = float(np.quantile(speed[rows], 0.02))
+    own = np.clip(np.floor(np.log2(np.maximum(speed / low, 1.0))), 0, 9).astype(int)
+    names, kept = np.zeros(10, int), 0
+    many = np.bincount(own[rows], minlength=10)
+    total = 0
+    for octave in range(10):
+        names[octave] = kept
+        total += int(many[octave])
+        if total >= 3 * BLOCKS and many[octave + 1 :].sum() >= 3 * BLOCKS:
+            kept, total = kept + 1, 0
+    found: Array = names[own]
+    return found
+
+
+def _coefficient(
+    course: SlideWindows,
+    freed: Unloaded,
+    frame: ContactFrame,
+    fitted: tuple[Fit, SlideFit, float, Array],
+    rows: Mask,
+) -> Coefficient:
+    fit, found, length, beside = fitted
+    share, slips = course.share(length)
+    t = student(BLOCKS - 1)
+    spread = float(np.abs(beside[:, 1] - found.mu[0]).max())
+    if (
+        len(found.load) > 3 and not freed.load.separable
+    ):  # with a weight that turns, or without: both answers count
+        still = Fit(course, fit.classes, fit.prior[:4], fit.lag).solve(share, slips)
+        spread = float(np.hypot(spread, still.mu[0] - found.mu[0]))
+    # What the model leaves beyond the noise is as slow as the path, and may be of friction as a whole.
+    size = np.linalg.norm(course.force[rows], axis=1)
+    left = float(np.median(np.abs(found.angle[rows] * course.noise[rows] / size))) * 1.4826
+    own = float(np.median(course.noise[rows] / size))
+    spread = float(np.hypot(spread, np.sqrt(max(left**2 - own**2, 0.0))))
+    lacks = LACKS * float(np.mean(1.0 - share[rows, 0]))
+
+    def half(values: Array, stds: Array, spread: float) -> Array:
+        return np.sqrt((t * stds) ** 2 + (2.0 * lacks * values) ** 2 + spread**2)
+
+    whole = half(found.mu, np.sqrt(np.diag(found.covariance)[:1]), spread)
+    value, wide = float(found.mu[0]), float(whole[0])
+    one = np.array([[float(np.median(course.speed[rows])), value, wide]])
+    alike = Coefficient(value, wide, value - wide, value + wide, one)
+    classes = _classes(course.speed, rows)
+    j = int(classes.max()) + 1
+    if j == 1 or not found.slips:
+        return alike
+    by = _problem(course, freed, classes, frame).solve(share, slips)
+    if not by.slips:
+        return alike
+    D = np.diff(np.eye(j), axis=0)
+    step, C = D @ by.mu, D @ by.covariance[:j, :j] @ D.T
+    from scipy.special import fdtrc
+
+    wald = float(step @ np.linalg.solve(C, step)) / (j - 1)
+    if fdtrc(j - 1, BLOCKS - j, wald) > BY_CHANCE:
+        return alike
+    halves = half(by.mu, np.sqrt(np.diag(by.covariance)[:j]), spread)
+    weight = np.bincount(classes[rows], minlength=j) / rows.sum()
+    speeds = np.array([np.mean(course.speed[rows & (classes == i)]) for i in range(j)])
+    mean = float(weight @ by.mu)
+    std = float(np.sqrt(weight @ by.covariance[:j, :j] @ weight))
+    wide = float(half(np.array([mean]), np.array([std]), spread)[0])
+    return Coefficient(
+        mean, wide, float((by.mu - halves).min()), float((by.mu + halves).max()),
+        np.column_stack([speeds, by.mu, halves]),
+    )  # fmt: skip
+
+
+def _verdict(mu: Coefficient, wrong: str, known: bool, slips: bool, tolerance: float) -> Parameter:
+    ends = (max(mu.value - mu.half, 0.0), mu.value + mu.half)
+    if not known:
+        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, _NO_ZERO)
+    if not slips:
+        why = "the contact sticks along most of the path: slide farther one way"
+        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, why)
+    if wrong:
+        return Parameter(None, None, None, "1", Verdict.REJECTED, wrong)
+    speeds = "" if len(mu.table) == 1 else ", the mean; it depends on the speed"
+    why = f"95 %: {ends[0]:.3g} to {ends[1]:.3g}{speeds}"
+    good = mu.half <= tolerance * mu.value
+    return Parameter(
+        mu.value if good else None, mu.half / 1.96 if good else None, ends, "1",
+        Verdict.IDENTIFIED if good else Verdict.NOT_IDENTIFIABLE, why,
+    )  # fmt: skip
+
+
+def _contradiction(course: SlideWindows, fit: Fit, found: SlideFit, normal: Array, rows: Mask) -> str:
+    """Why force and motion do not belong together; empty if they do."""
+    _, _, F = fit.psi(found.lag, found.load)
+    psi = np.arctan(found.mu[0]) + found.angle * course.noise / np.linalg.norm(F, axis=1)
+    axes = "are force and position in the same axes (--wrench-frame)?"
+    if found.mu[0] < -0.02:
+        return f"friction would push the tip on: say the other --force-sign; {axes}"
+    contrary = float(np.mean(psi[rows] < -np.radians(3.0)))
+    if contrary > CONTRARY:
+        return f"friction would push the tip on in {100 * contrary:.0f} % of the path: {axes}"
+    spread, directions = np.linalg.eigh(np.cov(course.place.T))
+    if spread[1] > 0.05 * spread[2] and spread[0] < 0.05 * spread[1]:
+        mean = normal.mean(axis=0)
+        off = float(np.arccos(min(abs(directions[:, 0] @ mean) / np.linalg.norm(mean), 1.0)))
+        if off > ASKEW:
+            return (
+                f"the force stands {np.degrees(off):.0f} deg off the normal of the path's own plane, friction taken"
+                f" off: {axes}"
+            )
+    return ""
+
+
+def _normals(
+    course: SlideWindows, fit: Fit, found: SlideFit, mu: Coefficient, share: Array
+) -> tuple[Array, Array]:
+    """Normals into the surface along the path, shape (m, 3), and the radii of their 95 % cones [rad], shape (m,)."""
+    _, _, F = fit.psi(found.lag, found.load)
+    size = np.linalg.norm(F, axis=1)
+    pull = mu.value * share[:, 2:]
+    N = size / np.sqrt(1.0 + np.einsum("ij,ij->i", pull, pull))
+    normal = F / N[:, None] - pull
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    j = len(found.mu) + 2
+    load = np.sqrt(np.max(np.diag(found.covariance)[j : j + 3]))
+    own = np.hypot(course.noise * np.maximum(found.scale, 1.0), load) / size
+    own = np.hypot(own, 0.5 * (SHAPE - 1.0) * mu.value * np.sqrt(share[:, 1]))
+    return normal, CHI2_95 * np.hypot(own, mu.half / (2.0 * (1.0 + mu.value**2)))
+
+
+def _stiffness(
+    course: SlideWindows,
+    found: SlideFit,
+    lengths: Array,
+    length: float,
+    arm: ArmDynamics,
+    tolerance: float,
+    calibration: float,
+) -> tuple[Parameter, Array]:
+    """K of the whole slide, and places, K and half-width of its parts, shape (k, 5).
+
+    The tip dips below the surface by the rate of the normal force over K: |v| (psi - atan mu c) is
+    d|F|/dt cos(atan mu)/K, each side seen through the same window. A lag of the force adds the rate of that. The
+    length of relaxation counts, as friction lags a force that changes.
+    """
+    none = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_DITHER)
+    places: Array = np.zeros((0, 5))
+    dips = {x: _dips(course, found, x) for x in (length, lengths.min(), lengths.max())}
+    main = dips[length]
+    if len(main.dip) < 4 * BLOCKS:
+        return none, places
+    whole = _ratio(main, BLOCKS)
+    if whole is None:
+        return none, places
+    others = [one[0] for x, d in dips.items() if x != length and (one := _ratio(d, BLOCKS)) is not None]
+    spread = max((abs(K / whole[0] - 1.0) for K in others), default=0.0)
+    rows = []
+    for i in np.unique(main.part):
+        own = main.of(main.part == i)
+        one = _ratio(own, 8) if len(own.dip) > 32 else None
+        if one is not None:
+            K, half = _surface(one[0], float(np.hypot(one[1], spread * one[0])), arm, calibration)
+            rows += [(*own.place.mean(axis=0), K, half)] if 0.0 < half < 0.5 * K else []
+    places = np.array(rows).reshape(-1, 5)
+    K, half = _surface(whole[0], float(np.hypot(whole[1], spread * whole[0])), arm, calibration)
+    if not (0.0 < half <= tolerance * K):
+        return none, places
+    why = f"95 %: {K - half:.4g} to {K + half:.4g} N/m, by the changes of the force along the path"
+    if arm.stiffness is None:
+        why += "; as the position shows it (--robot-stiffness takes out the arm's own)"
+    return Parameter(K, half / 1.96, (K - half, K + half), "N/m", Verdict.IDENTIFIED, why), places
+
+
+@dataclass(frozen=True, eq=False)
+class Dips:
+    """How fast the tip dips, and the rate of the force.
+
+    Args:
+        dip: |v| (psi - atan mu c) [m/s], shape (n,).
+        columns: |v|, rate of the normal force [N/s], and its rate, shape (n, 3).
+        part: of the slide, shape (n,).
+        place: [m], shape (n, 3).
+        noise: variance of the rate by the sensor's noise [N^2/s^2].
+    """
+
+    dip: Array
+    columns: Array
+    part: Array
+    place: Array
+    noise: float
+
+    def of(self, rows: Mask) -> Dips:
+        """Those of some rows."""
+        return Dips(self.dip[rows], self.columns[rows], self.part[rows], self.place[rows], self.noise)
+
+
+def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
+    """The dips of a slide whose friction relaxes on a length [m]."""
+    s = course.smooth
+    speed = np.linalg.norm(s.velocity, axis=1)
+    mu = float(found.mu[0])
+    share, slips = course.shares(length)
+    F = course.sign * s.force - _load_along(course, found)
+    along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(speed, 1e-12)
+    size = np.linalg.norm(F, axis=1)
+    psi = np.arctan2(along, np.sqrt(np.maximum(size**2 - along**2, 1e-12)))
+    model = np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
+    u = np.linspace(-1.0, 1.0, s.longer + 2)[1:-1]
+    kernel = (1.0 - u**2) / np.sum(1.0 - u**2)  # least squares' slope is the rate seen through it
+    dip = np.convolve(np.where(slips, speed * (psi - model), 0.0), kernel, "same")
+    carried = np.convolve(np.where(slips, speed, 0.0), kernel, "same")
+    rate = np.einsum("ij,ij->i", F, course.sign * s.rate) / np.maximum(size, 1e-9) / np.sqrt(1.0 + mu**2)
+    whole = np.convolve(slips, np.ones(s.longer), "same") > s.longer - 0.5
+    rows = np.flatnonzero(whole)[:: max(s.longer // 4, 1)]
+    part = np.floor((s.time[rows] - s.time[rows[0]]) / PART) if len(rows) else s.time[rows]
+    columns = np.column_stack([carried, rate, np.gradient(rate, s.step)])[rows]
+    noise = s.noise**2 * 12.0 / (s.longer**3 * s.step**2) / (1.0 + mu**2)
+    return Dips(dip[rows], columns, part, s.place[rows], noise)
+
+
+_NO_DITHER = (
+    "the force changes too little or too slowly along the path to show it: dither it by a tenth, at a hertz"
+)
+
+
+def _load_along(course: SlideWindows, found: SlideFit) -> Array:
+    """Rest of bias and weight, on the grid, shape (n, 3)."""
+    s, b = course.smooth, found.load
+    turned = course.rotations_of(s.time)
+    off: Array = np.einsum("nij,j->ni", turned, b[:3])
+    if len(b) > 3:
+        off = off + b[3:] - turned @ course.rest.T @ b[3:]
+    return off
+
+
+def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:
+    """1/slope of a dip over a rate, and the half-width of its interval [N/m]; None where noise makes the rate.
+
+    Each part has a friction of its own. What noise adds to the rate's variance is taken off, and half of it counts.
+    """
+    dip, columns, part, noise = dips.dip, dips.columns, dips.part, dips.noise
+    if len(dip) < 2 * blocks:
+        return None
+    own = np.column_stack([columns[:, 0] * (part == i) for i in np.unique(part)] + [columns[:, 1:]])
+    rest = own[:, :-2]
+    rate = columns[:, 1] - rest @ np.linalg.lstsq(rest, columns[:, 1], rcond=None)[0]
+    faint = noise / max(float(np.mean(rate**2)), 1e-300)
+    if faint > FAINT:
+        return None
+    theta = np.linalg.lstsq(own, dip, rcond=None)[0]
+    split = np.array_split(np.arange(len(dip)), blocks)
+    left = []
+    for gone in split:
+        kept = np.ones(len(dip), bool)
+        kept[gone] = False
+        left.append(np.linalg.lstsq(own[kept], dip[kept], rcond=None)[0][-2])
+    slope = float(theta[-2])
+    std = float(np.sqrt((blocks - 1) / blocks * np.sum((np.array(left) - np.mean(left)) ** 2)))
+    slope /= 1.0 - faint
+    if not slope > 0.0:
+        return None
+    wide = float(np.hypot(student(blocks - 1) * std / slope, 0.5 * faint))
+    return 1.0 / slope, wide / slope
+
+
+def _surface(K: float, half: float, arm: ArmDynamics, calibration: float) -> tuple[float, float]:
+    """The surface's own stiffness and half-width, the arm's taken out where it is known [N/m]."""
+    half = float(np.hypot(half, 1.96 * calibration * K))
+    if arm.stiffness is None or not arm.stiffness[0] > K:
+        return K, half
+    series, std = arm.stiffness
+    own = K / (1.0 - K / series)
+    return own, float(np.hypot(half, 1.96 * std * (K / series) ** 2)) / (1.0 - K / series) ** 2
+
+
+def _answer(
+    course: SlideWindows,
+    mu: Coefficient,
+    own: Parameter,
+    normal: Array,
+    cone: Array,
+    parts: Array,
+    length: float,
+) -> SlideFound:
+    """The slide in words and numbers."""
+    mean = normal.mean(axis=0)
+    mean /= np.linalg.norm(mean)
+    turns = float(np.degrees(np.arccos(np.clip(normal @ mean, -1.0, 1.0)).max()))
+    wide = float(np.degrees(np.median(cone)))
+    if own.value is None:
+        why = own.reason if own.reason.endswith("?") else f"{own.reason}."
+        first = f"The tip slides, but the log does not give its friction: {why}"
+    elif len(mu.table) > 1:
+        each = ", ".join(f"{m:.3g} ± {h:.1g} at {1e3 * v:.2g} mm/s" for v, m, h in mu.table)
+        first = f"The tip slides, and friction depends on the speed: mu = {each}."
+    else:
+        first = f"The tip slides: mu = {mu.value:.3g} ± {mu.half:.1g}."
+    if own.verdict is Verdict.REJECTED:
+        return SlideFound(first, (), {"friction": None, "path_m": course.path})
+    towards = ", ".join(f"{x + 0.0:.3f}" for x in mean)
+    facts = [
+        f"Normal into the surface ({towards}) in the base, 95 % cone {wide:.2g} deg, turns by {turns:.2g} deg.",
+        f"Path {1e3 * course.path:.3g} mm.",
+    ]
+    if len(parts):
+        low, high = parts[:, 3].min(), parts[:, 3].max()
+        facts.append(f"Stiffness along the path at {len(parts)} places: {low:.4g} to {high:.4g} N/m.")
+    every = max(len(normal) // PLACES, 1)
+    known = own.value is not None
+    ends = [mu.value - mu.half, mu.value + mu.half]
+    table = [dict(zip(("speed_m_s", "mu", "half"), row, strict=True)) for row in mu.table.tolist()]
+    keys = ("x", "y", "z", "stiffness", "half")
+    at, normals, cones = (
+        course.place[::every].tolist(),
+        normal[::every].tolist(),
+        np.degrees(cone[::every]).tolist(),
+    )
+    values: dict[str, Any] = {
+        "friction": {"value": mu.value, "ci95": ends} if known else None,
+        "by_speed": table if known else [],
+        "normal": {"mean": mean.tolist(), "cone95_deg": wide, "turns_deg": turns},
+        "path_m": course.path,
+        "relaxation_m": length,
+        "stiffness": [dict(zip(keys, row, strict=True)) for row in parts.tolist()],
+        "places": [
+            {"x": p[0], "y": p[1], "z": p[2], "normal": n, "cone95_deg": c}
+            for p, n, c in zip(at, normals, cones, strict=True)
+        ],
+    }
+    return SlideFound(first, tuple(facts), values)

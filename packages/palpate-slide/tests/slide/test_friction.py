@@ -1,0 +1,105 @@
+"""Friction from a log of a slide that another simulator made."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from oracles.wiped_surface import Wipe, WipeLog, any_wipe, wipe
+from palpate.cli import main
+from palpate.contact_frame import ContactFrame, identify_contact
+from palpate.identification import Identification, Verdict
+from palpate.records import Record
+
+UNITS = {"time": "s", "force": "N", "position": "m", "quaternion": "1"}
+WORLD = Wipe(seed=1, shape="bowl", path="back", mu=0.4, dither=0.1, seconds=8.0, rate=250.0, force_rate=250.0)
+
+
+def found_in(log: WipeLog, **frame) -> Identification:
+    units = {name: UNITS[name.partition("_")[0]] for name in log.columns}
+    return identify_contact(
+        Record(log.columns, units, {}), ContactFrame(**{"wrench_frame": "tool", **frame})
+    )[0]
+
+
+@pytest.mark.parametrize("action", [True, False])
+def test_friction_and_sign_are_those_of_the_world(action):
+    log = wipe(replace(WORLD, action=action))
+    found = found_in(log)
+    mu = found.parameters["mu"]
+    assert mu.verdict is Verdict.IDENTIFIED
+    assert mu.ci95[0] < 0.4 < mu.ci95[1]
+    assert mu.ci95[1] - mu.ci95[0] < 0.04
+    normal = log.normal[log.inside].mean(0)
+    assert normal / np.linalg.norm(normal) @ found.slide.values["normal"]["mean"] > np.cos(np.radians(2.0))
+
+
+def test_a_speed_on_which_friction_depends_is_a_table():
+    log = wipe(replace(WORLD, path="scribble", stribeck=0.8, creep=0.02, seconds=15.0, stiffness=5e4))
+    table = found_in(log).slide.values["by_speed"]
+    assert len(table) > 1
+    assert table[0]["mu"] - table[0]["half"] > table[-1]["mu"]
+
+
+def test_without_free_motion_the_zero_of_the_force_is_unknown():
+    found = found_in(wipe(replace(WORLD, free=0.0, bias=1.0, path="scribble")))
+    mu = found.parameters.get("mu")
+    assert mu is None or (mu.value is None and "no free motion" in mu.reason)
+
+
+def test_force_and_position_in_other_axes_are_refused():
+    mu = found_in(wipe(WORLD), wrench_frame="base").parameters.get("mu")
+    assert mu is None or mu.value is None
+
+
+def test_a_press_is_no_slide():
+    log = wipe(WORLD)
+    t = log.columns["time"]
+    n = np.array([0.0, 0.0, -1.0])
+    deep = np.clip(np.minimum(t - 1.0, t[-1] - 1.0 - t), -0.01, 0.002)
+    columns = {"time": t} | {
+        name: values + 0.01 * np.random.default_rng(0).standard_normal(len(t))
+        for name, values in zip(
+            ("force_x", "force_y", "force_z"), np.outer(n, 5e3 * np.maximum(deep, 0.0)), strict=True
+        )
+    }
+    columns |= dict(zip(("position_x", "position_y", "position_z"), np.outer(n, deep), strict=True))
+    record = Record(columns, {name: UNITS[name.partition("_")[0]] for name in columns}, {})
+    found, _ = identify_contact(record, ContactFrame(wrench_frame="base"))
+    assert found.slide is None
+    assert "K" in found.parameters
+
+
+def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    log = wipe(WORLD)
+    columns = {n: v * (1e3 if n.startswith("position") else 1.0) for n, v in log.columns.items()}
+    rows = "\n".join(",".join(f"{v:.8g}" for v in row) for row in np.column_stack(list(columns.values())))
+    (tmp_path / "slide.csv").write_text(",".join(columns) + "\n" + rows + "\n")
+    options = [
+        "--time", "time:s", "--wrench", "force_x:N,force_y:N,force_z:N", "--wrench-frame", "tool", "--pose",
+        "position_x:mm,position_y:mm,position_z:mm,quaternion_x,quaternion_y,quaternion_z,quaternion_w",
+    ]  # fmt: skip
+    assert main(["identify", "slide.csv", *options]) == 0
+    assert capsys.readouterr().out.startswith("slide.csv: The tip slides: mu = 0.4")
+    assert main(["identify", "slide.csv", *options, "--report", "page.html", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["parameters"]["mu"]["verdict"] == "identified"
+    assert {"friction", "by_speed", "normal", "places", "stiffness"} <= set(answer["slide"])
+    assert "The tip slides" in (tmp_path / "page.html").read_text()
+
+
+@pytest.mark.long
+def test_friction_holds_over_many_worlds():
+    held, known = 0, 0
+    for seed in range(7000, 7030):
+        log = wipe(any_wipe(seed, free=1.5, turns=False, weight=0.0, stribeck=0.0))
+        found = found_in(log)
+        if found.slide is not None and (ends := found.parameters["mu"].ci95):
+            known += 1
+            held += ends[0] < log.world.mu < ends[1]
+    assert known >= 20
+    assert held >= 0.8 * known
