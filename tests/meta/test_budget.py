@@ -32,7 +32,7 @@ LARGEST = {
     "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2279, tokens=14829),
     "packages/palpate-export/src/palpate_export": Weight(files=8, lines=1936, tokens=12408),
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
-    "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2501, tokens=19133),
+    "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2507, tokens=19629),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1305, tokens=9043),
     "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2704, tokens=23675),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3168, tokens=18712),

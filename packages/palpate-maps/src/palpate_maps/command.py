@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 MAP = Group("The map", sort_key=2)
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "csv": (".csv",), "ply": (".ply",), "mcap": (".mcap",)}
 """Of the files of a map, by option."""
+PLACES = "places.csv"
+"""Table of the places of a slide with dither and of `palpate press --map`, in their folders: a line each."""
 POLL = 0.5
 """Time between two looks for presses [s]."""
 
@@ -238,7 +240,7 @@ def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Know
 
 
 def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses:
-    from palpate_maps.presses import read_logs, read_table
+    from palpate_maps.presses import merge_presses, read_logs, read_table
 
     if places.table is not None:
         if places.place is not None:
@@ -255,7 +257,12 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
             return progress.track(paths, description="identifying")
 
         named = places.place.split(",") if places.place else ()
-        return read_logs(gather_logs(logs), one.identifier, named, places.each_contact, track)
+        tables = [log / PLACES for log in logs if (log / PLACES).is_file()]
+        rest = [log for log in logs if log / PLACES not in tables]
+        parts = [replace(part, line=0.0 * part.stiffness) for part in (read_table(table) for table in tables)]
+        if rest:
+            parts.append(read_logs(gather_logs(rest), one.identifier, named, places.each_contact, track))
+        return merge_presses(parts)
 
 
 def _write(result: MapResult, output: OutputOptions, name: str, live: bool = False) -> None:
@@ -315,7 +322,7 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
                     write_text(phantom.page, page.page(result, title, command(), live=True))
 
             result = palpate_phantom(question, surface, phantom.presses, request, show, grow)
-        result.write_presses(fresh / "places.csv")
+        result.write_presses(fresh / PLACES)
         result.write_csv(fresh / "map.csv")
         write_json(fresh / "summary.json", with_author({"command": command(), **result.to_json()}))
         for path in filter(None, (fresh / "report.html", phantom.page)):

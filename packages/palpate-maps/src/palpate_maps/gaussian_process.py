@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError, cho_solve, cholesky, eigh, solve_triangula
 from scipy.linalg.lapack import dpotri
 from scipy.optimize import brentq, minimize
 from scipy.spatial.distance import cdist, pdist, squareform
-from scipy.stats import norm
+from scipy.stats import invgamma, norm
 
 from palpate.arrays import Array, Mask
 
@@ -37,6 +37,8 @@ Z95 = float(norm.isf(LEVEL / 2.0))
 """Half-width of a normal distribution's central 95 % over its standard deviation."""
 ROUNDING = 1e-3
 """Share of the variance that rounding to single precision may take: a twentieth of a per cent of an interval."""
+FREEDOMS = (2.0, 3.0, 4.0, 6.0, 10.0, 30.0)
+"""Degrees of freedom of Student's distributions, from tails of no variance to the normal one."""
 LEAST_WEIGHT = 0.02
 """Of a set of parameters that counts; `benchmarks/maps/coverage.py` prints the same coverage without this bound."""
 
@@ -137,12 +139,13 @@ class Conditioned:
             self.places[:count], self.values[:count], self.noise[:count], self.parameters, line
         )
 
-    def leave_one_out(self) -> Array:
-        """Deviation of each value from what the others foretell, by its standard deviation (n,) (section 5.4.2)."""
+    def leave_one_out(self) -> tuple[Array, Array]:
+        """Deviation of each value from the prediction of the others, and its variance, (n,) each (section 5.4.2)."""
         inverse = cho_solve((self.factor, True), np.eye(len(self.values)), check_finite=False)
         w = inverse.sum(axis=0)
         inverse -= np.outer(w, w) / w.sum()
-        return (inverse @ self.values) / np.sqrt(np.diag(inverse))
+        variance = 1.0 / np.diag(inverse)
+        return (inverse @ self.values) * variance, variance
 
 
 @dataclass(frozen=True)
@@ -273,20 +276,30 @@ class GaussianProcess:
         return float(np.sqrt(self.weights @ [node.parameters.shared**2 for node in self.nodes]))
 
     @cached_property
-    def z95(self) -> float:
-        """Half-width of the central 95 % over the standard deviation, for fields that are not normal, as beside edges.
+    def next_z95(self) -> float:
+        """Half-width of a next value's central 95 % over its standard deviation, for fields that are not normal.
 
         The quantile of the deviations of values left out and of one unseen (conformal prediction; Vovk et al. 2005),
         among which the normal distribution counts as so many values as have one outside; at least that of the normal
         distribution, since values that scatter less than they state tell nothing of the field between them.
         """
-        found, normal = np.abs(self.likeliest.leave_one_out()), 1.0 / LEVEL
+        errors, variance = self.likeliest.leave_one_out()
+        found, normal = np.abs(errors) / np.sqrt(variance), 1.0 / LEVEL
         allowed = LEVEL * (normal + len(found) + 1.0) - 1.0
 
         def excess(z: float) -> float:
             return float(2.0 * normal * norm.sf(z) + np.sum(found > z)) - allowed
 
         return max(Z95, float(brentq(excess, 0.0, max(5.0, *found))))
+
+    @cached_property
+    def z95(self) -> float:
+        """That of the field itself, whose deviations the noise hides where presses are many."""
+        node = self.likeliest
+        errors, variance = node.leave_one_out()
+        p = node.parameters
+        noise = node.noise**2 + p.repeat**2 + p.shared**2
+        return max(self.next_z95, student95(errors, np.maximum(variance - noise, 0.0), noise))
 
     @cached_property
     def _reduction(self) -> Reduction:
@@ -319,6 +332,36 @@ class GaussianProcess:
         parts = [places[first : first + size] for first in range(0, len(places), size)]
         mean, variance = np.concatenate([np.empty((2, 0)), *map(moments, parts)], axis=1)
         return mean, variance
+
+
+def student95(errors: Array, field: Array, noise: Array) -> float:
+    """Half-width of a field's central 95 % over its standard deviation, if its deviations are Student's.
+
+    A deviation has the variance s field + t noise, where s and t are of the inverse gamma distributions of two Student
+    distributions. Their degrees of freedom, of prior alike at `FREEDOMS`, and the scale of s, whose logarithm has a
+    normal prior of standard deviation .5, are averaged over their posterior; the mean of t is 1.
+
+    Args:
+        errors: deviations of values left out (n,).
+        field: variance of the field in each (n,).
+        noise: variance of the noise in each (n,).
+    """
+    s, scales = np.exp(np.linspace(-4.0, 6.0, 31)), np.exp(np.linspace(-1.5, 1.5, 13))[:, None]
+    shape = np.array(FREEDOMS)[:, None, None] / 2.0
+    of_field, of_noise = (
+        each.reshape(-1, len(s)) / each.sum(axis=-1).reshape(-1, 1)
+        for each in (
+            s * invgamma.pdf(s, shape, scale=shape * scales),
+            s * invgamma.pdf(s, shape[1:], scale=shape[1:] - 1.0),
+        )
+    )
+    variance = field[:, None, None] * s[:, None] + noise[:, None, None] * s
+    density = np.exp(-0.5 * errors[:, None, None] ** 2 / variance) / np.sqrt(variance)
+    evidence = np.log(of_field @ density @ of_noise.T + 1e-300).sum(axis=0)
+    evidence -= 0.5 * np.tile(np.log(scales) / 0.5, (len(FREEDOMS), 1)) ** 2
+    posterior = np.exp(evidence - evidence.max()).sum(axis=1)
+    mixture = posterior / posterior.sum() @ of_field
+    return float(brentq(lambda z: 2.0 * mixture @ norm.sf(z / np.sqrt(s)) - LEVEL, 0.0, 100.0))
 
 
 def fit(places: Array, values: Array, noise: Array, line: Array | None = None) -> GaussianProcess:

@@ -69,6 +69,12 @@ def warnings(result: MapResult) -> list[str]:
     if wrong := result.map.disagreeing():
         named = ", ".join(result.presses.names[i] for i in wrong[:5])
         lines.append(f"their neighbours contradict {named}: press there again")
+    unequal = len(np.unique(result.map.places, axis=0)) == len(result.map)
+    if unequal and result.repeat > np.median(result.map.half / result.map.stiffness):
+        lines.append(
+            f"no place was pressed twice: roughness finer than the presses' spacing counts as their scatter, "
+            f"± {_short(100.0 * result.repeat)} %, and not as the surface's; press a few places again to part them"
+        )
     lines += [f"no map of {name}: {why}" for name, why in result.unmapped.items()]
     return lines
 

@@ -34,7 +34,8 @@ class Prediction:
         next_std: of the value that a next press would state, alike (n,).
         common: standard deviation of the error that all presses share, alike.
         logarithmic: whether the four are of the logarithm.
-        z95: half-width of the 95 % intervals over the standard deviation.
+        z95: half-width of the surface's 95 % interval over its standard deviation.
+        next_z95: that of a next press.
     """
 
     mean: Array
@@ -43,6 +44,7 @@ class Prediction:
     common: float
     logarithmic: bool = True
     z95: float = Z95
+    next_z95: float = Z95
 
     @property
     def value(self) -> Array:
@@ -67,7 +69,7 @@ class Prediction:
     @property
     def next95(self) -> Array:
         """95 % interval of what a next press states (n, 2) [N/m]; it shares the error common to all."""
-        return self._interval(self.z95 * self.next_std)
+        return self._interval(self.next_z95 * self.next_std)
 
     def exceeds(self, threshold: float) -> Array:
         """Probability that the field is above a threshold (n,)."""
@@ -193,8 +195,8 @@ class FieldMap:
             )
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
-        z95 = self.process.z95
-        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, z95)
+        z95 = (self.process.z95, self.process.next_z95)
+        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, *z95)
 
     def next(
         self,
@@ -260,7 +262,8 @@ class FieldMap:
     def disagreeing(self) -> list[int]:
         """Presses that their neighbours contradict: of such a deviation n presses have one in 20 maps by chance."""
         bound = norm.ppf(1.0 - 0.025 / len(self))
-        return [int(i) for i in np.flatnonzero(np.abs(self.process.likeliest.leave_one_out()) > bound)]
+        errors, variance = self.process.likeliest.leave_one_out()
+        return [int(i) for i in np.flatnonzero(np.abs(errors) > bound * np.sqrt(variance))]
 
     def grid(self, count: int = 10_000) -> Grid:
         """A grid of some `count` places over the hull of the presses."""

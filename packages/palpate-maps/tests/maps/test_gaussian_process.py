@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist, pdist
 
-from palpate_maps.gaussian_process import Conditioned, Hyperparameters, fit, loss
+from palpate_maps.gaussian_process import Conditioned, Hyperparameters, fit, loss, student95
 
 RNG = np.random.default_rng(3)
 PLACES = RNG.uniform(0.0, 0.1, (25, 2))
@@ -56,7 +56,9 @@ def test_a_value_left_out_is_foretold_as_by_the_process_of_the_others():
         others = Conditioned(PLACES[rest], VALUES[rest], NOISE[rest], PARAMETERS)
         mean, variance = others.reduction.predict(cdist(PLACES[rest], PLACES[i : i + 1]))
         std = np.sqrt(variance[0] + NOISE[i] ** 2 + PARAMETERS.repeat**2)
-        assert process.leave_one_out()[i] == pytest.approx((VALUES[i] - mean[0]) / std, rel=1e-6)
+        errors, variances = process.leave_one_out()
+        assert errors[i] == pytest.approx(VALUES[i] - mean[0], rel=1e-6)
+        assert np.sqrt(variances[i]) == pytest.approx(std, rel=1e-6)
 
 
 def test_parts_of_a_prediction_are_those_of_the_whole():
@@ -93,9 +95,23 @@ def test_intervals_are_wider_than_normal_ones_where_the_field_jumps():
     places, noise = rng.uniform(0.0, 0.1, (80, 2)), np.full(80, 0.03)
     plain = fit(places, 5.0 * places[:, 0] + noise * rng.normal(size=80), noise)
     jump = fit(places, (np.hypot(*(places - 0.05).T) < 0.015) + noise * rng.normal(size=80), noise)
-    assert plain.z95 == pytest.approx(1.96, abs=0.1)
-    assert jump.z95 > 2.2
-    assert np.mean(np.abs(jump.likeliest.leave_one_out()) < jump.z95) >= 0.94
+    assert plain.next_z95 == pytest.approx(1.96, abs=0.1)
+    assert jump.next_z95 > 2.2
+    assert jump.z95 >= jump.next_z95
+    assert plain.z95 < 2.5  # few presses tell little of the tails
+    errors, variance = jump.likeliest.leave_one_out()
+    assert np.mean(np.abs(errors) < jump.next_z95 * np.sqrt(variance)) >= 0.94
+
+
+def test_the_width_of_an_interval_is_that_of_the_deviations():
+    """Normal and Student's deviations, behind normal noise of half their variance."""
+    rng = np.random.default_rng(4)
+    field, noise = np.ones(800), np.full(800, 0.5)
+    behind = np.sqrt(0.5) * rng.normal(size=800)
+    assert student95(rng.normal(size=800) + behind, field, noise) == pytest.approx(1.96, rel=0.1)
+    heavy = rng.standard_t(3, size=800)
+    assert student95(heavy + behind, field, noise) == pytest.approx(3.18, rel=0.15)
+    assert student95(1.5 * rng.normal(size=800) + behind, field, noise) == pytest.approx(2.94, rel=0.1)
 
 
 def test_an_error_that_lines_share_is_not_taken_for_the_field():

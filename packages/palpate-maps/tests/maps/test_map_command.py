@@ -355,6 +355,35 @@ def test_a_column_of_lines_and_a_folder_of_presses_are_read(table, tmp_path, cap
     ]
 
 
+def test_folders_with_a_table_of_places_are_lines(table, tmp_path, capsys):
+    """Results of slides and of `palpate press --map`; places of two and of three coordinates are of two frames."""
+    rows = table.read_text(encoding="utf-8").splitlines(keepends=True)
+    for name, part in (("one", rows[1:20]), ("two", rows[20:])):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "places.csv").write_text("".join([rows[0], *part]), encoding="utf-8")
+    folders = [str(tmp_path / name) for name in ("one", "two", "space")]
+    assert main(["map", *folders[:2], "--json", "--next", "0"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert len(answer["places"]) == len(rows) - 1
+    assert answer["line_half"] > 0.0
+    (tmp_path / "space").mkdir()
+    (tmp_path / "space" / "places.csv").write_text("x,y,z,K,half\n0,0,0,1000,10\n", encoding="utf-8")
+    assert main(["map", *folders]) == 2
+    assert "two coordinates and some three" in capsys.readouterr().err
+
+
+def test_presses_that_scatter_more_than_they_state_are_asked_for_repeats(table, tmp_path, capsys):
+    rows = table.read_text(encoding="utf-8").splitlines()
+    vain = [f"{row.rsplit(',', 1)[0]},0.001" for row in rows[1:]]
+    path = tmp_path / "vain.csv"
+    path.write_text("\n".join([rows[0], *vain]), encoding="utf-8")
+    assert main(["map", "--table", str(path), "--next", "0"]) == 0
+    assert "no place was pressed twice" in capsys.readouterr().out
+    path.write_text("\n".join([rows[0], *vain, vain[7]]), encoding="utf-8")
+    assert main(["map", "--table", str(path), "--next", "0"]) == 0
+    assert "no place was pressed twice" not in capsys.readouterr().out
+
+
 def test_places_in_two_frames_are_refused():
     parts = [
         Presses(np.zeros((1, 3)), np.ones(1), np.ones(1), [f"{arm}.bag"], frames={arm: f"{arm}.bag"})
