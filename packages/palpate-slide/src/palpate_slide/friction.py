@@ -38,6 +38,8 @@ PART = 2.5
 """Length of a part of a slide for which a stiffness is estimated [s]."""
 FAINT = 0.15
 """Share of noise in the variance of the force's rate, above which it does not show a stiffness."""
+TANGENTIAL = (2.0 / 3.0 / SHAPE, SHAPE)
+"""Tangential over normal stiffness of a contact: 2 (1 - nu)/(2 - nu) (Mindlin 1949), within `SHAPE`."""
 CHI2_95 = 2.4477
 """Radius of the 95 % of two normal numbers of variance 1."""
 PLACES = 200
@@ -278,15 +280,15 @@ def _stiffness(
     """
     none = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_DITHER)
     places: Array = np.zeros((0, 5))
-    dips = {x: _dips(course, found, x) for x in (length, lengths.min(), lengths.max())}
-    main = dips[length]
-    if len(main.dip) < 4 * BLOCKS:
-        return none, places
-    whole = _ratio(main, BLOCKS)
+    main = _dips(course, found, length)
+    whole = _ratio(main, BLOCKS) if len(main.dip) >= 4 * BLOCKS else None
     if whole is None:
         return none, places
-    others = [one[0] for x, d in dips.items() if x != length and (one := _ratio(d, BLOCKS)) is not None]
-    spread = max((abs(K / whole[0] - 1.0) for K in others), default=0.0)
+    usual = float(np.median(np.linalg.norm(course.force, axis=1)))
+    tied = abs(float(found.mu[0])) * usual / whole[0] / np.array(TANGENTIAL)
+    ends = min(lengths.min(), tied.min()), max(lengths.max(), tied.max())
+    others = [_ratio(_dips(course, found, float(x)), BLOCKS) for x in ends]
+    spread = max(float("inf") if one is None else abs(one[0] / whole[0] - 1.0) for one in others)
     rows = []
     for i in np.unique(main.part):
         own = main.of(main.part == i)
