@@ -46,13 +46,21 @@ def test_a_speed_on_which_friction_depends_is_a_table():
 
 def test_without_free_motion_the_zero_of_the_force_is_unknown():
     found = found_in(wipe(replace(WORLD, free=0.0, bias=1.0, path="scribble")))
-    mu = found.parameters.get("mu")
-    assert mu is None or (mu.value is None and "no free motion" in mu.reason)
+    for own in (found.parameters["mu"], found.parameters["K"]):
+        assert own.value is None
+        assert "no free motion" in own.reason
 
 
 def test_force_and_position_in_other_axes_are_refused():
-    mu = found_in(wipe(WORLD), wrench_frame="base").parameters.get("mu")
-    assert mu is None or mu.value is None
+    mu = found_in(wipe(WORLD), wrench_frame="base").parameters["mu"]
+    assert mu.verdict is Verdict.REJECTED
+    assert "--wrench-frame" in mu.reason
+
+
+def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
+    found = found_in(wipe(any_wipe(215, free=1.5)))  # one length gives 42 % too much, known to 10 %
+    assert found.parameters["mu"].verdict is Verdict.IDENTIFIED
+    assert found.parameters["K"].verdict is Verdict.NOT_IDENTIFIABLE
 
 
 def test_a_press_is_no_slide():
@@ -94,12 +102,16 @@ def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatc
 
 @pytest.mark.long
 def test_friction_holds_over_many_worlds():
-    held, known = 0, 0
+    held, known, stiff = 0, 0, []
     for seed in range(7000, 7030):
         log = wipe(any_wipe(seed, free=1.5, turns=False, weight=0.0, stribeck=0.0))
         found = found_in(log)
         if found.slide is not None and (ends := found.parameters["mu"].ci95):
             known += 1
             held += ends[0] < log.world.mu < ends[1]
+            if span := found.parameters["K"].ci95:
+                stiff.append(span[0] < log.world.stiffness < span[1])
     assert known >= 20
     assert held >= 0.8 * known
+    assert len(stiff) >= 3
+    assert np.mean(stiff) >= 0.8
