@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from oracles.wiped_surface import Wipe, WipeLog, any_wipe, wipe
 from palpate.cli import main
@@ -100,18 +101,29 @@ def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatc
     assert "The tip slides" in (tmp_path / "page.html").read_text()
 
 
+def cone_held(found: Identification, log: WipeLog) -> float:
+    """Share of the path whose cone holds the normal."""
+    places = found.slide.values["places"]
+    at = np.array([[p[axis] for axis in "xyz"] for p in places])
+    true = log.normal[log.inside][cKDTree(log.place[log.inside]).query(at)[1]]
+    off = np.arccos(np.clip(np.einsum("ij,ij->i", [p["normal"] for p in places], true), -1.0, 1.0))
+    return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
+
+
 @pytest.mark.long
 def test_friction_holds_over_many_worlds():
-    held, known, stiff = 0, 0, []
+    held, known, stiff, cones = 0, 0, [], []
     for seed in range(7000, 7030):
         log = wipe(any_wipe(seed, free=1.5, turns=False, weight=0.0, stribeck=0.0))
         found = found_in(log)
         if found.slide is not None and (ends := found.parameters["mu"].ci95):
             known += 1
             held += ends[0] < log.world.mu < ends[1]
+            cones.append(cone_held(found, log))
             if span := found.parameters["K"].ci95:
                 stiff.append(span[0] < log.world.stiffness < span[1])
     assert known >= 20
     assert held >= 0.8 * known
     assert len(stiff) >= 3
     assert np.mean(stiff) >= 0.8
+    assert np.mean(cones) >= 0.9
