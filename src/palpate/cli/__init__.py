@@ -1,7 +1,5 @@
 """The command line: reads arguments, prints, exits with a code; no arithmetic."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

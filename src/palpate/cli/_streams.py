@@ -1,7 +1,5 @@
 """Standard output and standard error, even if closed, full, or with a limited encoding; and palpate's own alone."""
 
-from __future__ import annotations
-
 import codecs
 import errno
 import faulthandler

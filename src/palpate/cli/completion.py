@@ -1,7 +1,5 @@
 """`palpate completion`: a shell's completion script for palpate's commands, options and files."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from palpate.cli._program import program

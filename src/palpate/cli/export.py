@@ -1,7 +1,5 @@
 """`palpate export`: an identified surface as the contact of a simulator's scene, or a law as C."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points

@@ -1,7 +1,5 @@
 """`palpate speed`: time of one tick of the closed loop on this machine."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from cyclopts import Parameter

@@ -1,7 +1,5 @@
 """Parts of commands, for those of other distributions too: output, progress, the answer as JSON."""
 
-from __future__ import annotations
-
 from palpate.cli._program import command, option_of, print_answer, print_result
 from palpate.cli._terminal import (
     COMPILING,

@@ -314,7 +314,10 @@ def identify_contact(
     record = replace(record, meta={**record.meta, "arm": about})
     found = with_arm(found, arm, tolerance, from_pose=in_space)
     slid = _slide(whole, frame or ContactFrame(), arm, tolerance, calibration, found) if in_space else None
-    return slid or found, record
+    if slid is None:
+        return found, record
+    meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
+    return slid, replace(record, meta=meta)
 
 
 def _slide(

@@ -1,7 +1,5 @@
 """A result as a page shows it: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import ceil, floor, inf, isfinite, log10

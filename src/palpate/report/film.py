@@ -1,7 +1,5 @@
 """Parts of a film: an SVG that moves by itself, in the pages' colours by light and by dark."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Every public value in one line, and for a notebook: what it is, not the arrays that it holds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """An arm of `palpate.robots` that presses in space, a few ticks at a time, with numbers that change while it runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

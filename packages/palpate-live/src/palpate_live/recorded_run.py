@@ -1,7 +1,5 @@
 """The record of a run or a log, as it is played again: the arm of a run moves, and its truth is known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The bench, a few ticks at a time, with numbers that change while it runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -4,8 +4,6 @@ It takes seconds, so it is worked out by a process of its own (`python -m palpat
 each line in, answers as JSON lines out, the last of each with `"more": false`.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -3,8 +3,6 @@
 A log or a run's record is played again at the pace at which it was taken.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 

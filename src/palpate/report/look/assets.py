@@ -4,8 +4,6 @@ A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2
 quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_look.py` measures both.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
