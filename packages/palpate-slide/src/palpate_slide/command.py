@@ -213,6 +213,11 @@ def slide(
     from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
+    if not any(asked.into[1:]):
+        raise InputError(
+            "--normal is along the base's x, in which the path begins: the tip would not slide; give the direction into"
+            " the surface"
+        )
     if wire.wire is not None or wire.recover is not None:
         return _slide_over(asked, wire, limits, json)
     for part in (wire, limits):

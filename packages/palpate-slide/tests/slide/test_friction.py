@@ -110,6 +110,13 @@ def cone_held(found: Identification, log: WipeLog) -> float:
     return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
 
 
+def test_a_normal_along_the_path_is_refused_in_one_line(capsys):
+    assert main(["slide", "--arm", "ur5e", "--force", "15:N", "--normal", "-1,0,0"]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "--normal is along the base's x" in said
+    assert "\n" not in said
+
+
 @pytest.mark.long
 def test_friction_holds_over_many_worlds():
     held, known, stiff, cones = 0, 0, [], []
