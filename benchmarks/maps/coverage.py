@@ -225,7 +225,7 @@ def cost() -> str:
     least, processor, product = np.min(times, axis=0)
     return (
         f"10,000 places and the next press, 100 presses: {1e3 * least:.0f} ms, {1e3 * processor:.0f} ms of processor "
-        f"time in two threads, {least / product:.1f} times a product of two matrices of 1000 x 1000 (least of 60 each)"
+        f"time, {least / product:.1f} times a product of two matrices of 1000 x 1000 (least of 60 each)"
     )
 
 
