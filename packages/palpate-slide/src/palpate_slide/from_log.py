@@ -141,6 +141,9 @@ def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
     n = max(round(0.05 / step), 3)
     kernel = np.ones(n) / n
     mean = np.column_stack([np.convolve(axis, kernel, "valid") for axis in raw[there].T])
+    chance = 6.0 * _noise(raw[there]) / np.sqrt(n)
+    if np.linalg.norm(mean - np.median(mean, axis=0), axis=1).max() <= chance:
+        return None
     place = signals.place[there][n // 2 :][: len(mean)]
     rotations = signals.rotations[there][n // 2 :][: len(mean)]
     free = np.zeros(len(mean), bool)
@@ -148,12 +151,10 @@ def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
         own, at, R = mean[::turned], place[::turned], rotations[::turned]
         level = np.median(own[: max(round(0.2 / step), 10)], axis=0)
         far = np.linalg.norm(own - level, axis=1)
-        limit = max(QUIET * float(np.quantile(far, 0.9)), 6.0 * _noise(raw[there]) / np.sqrt(n))
+        limit = max(QUIET * float(np.quantile(far, 0.9)), chance)
         left = np.flatnonzero(far > limit)
         end = int(left[0]) if len(left) else 0
-        quiet = max(
-            6.0 * _noise(raw[there]) / np.sqrt(n), 3.0 * float(np.median(far[: max(round(0.2 / step), 10)]))
-        )
+        quiet = max(chance, 3.0 * float(np.median(far[: max(round(0.2 / step), 10)])))
         while end and far[end] > quiet:
             end -= 1
         if end * step < 0.2 or end < FEWEST:
