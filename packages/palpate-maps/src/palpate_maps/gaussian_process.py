@@ -294,7 +294,7 @@ class GaussianProcess:
 
     @cached_property
     def z95(self) -> float:
-        """That of the field itself, whose deviations the noise hides where presses are many."""
+        """Half-width of the field's own central 95 % over its standard deviation; many presses' noise hides it."""
         node = self.likeliest
         errors, variance = node.leave_one_out()
         p = node.parameters
