@@ -13,6 +13,8 @@ from palpate.identification import Code, Identification, Parameter, Verdict, War
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 from palpate.identification.result import LagFound, SlideFound
 from palpate.identification.uncertainty import student
+from palpate.records import Record
+from palpate_slide.against_press import advantage
 from palpate_slide.from_log import (
     BLOCKS,
     SHAPE,
@@ -64,9 +66,15 @@ class Coefficient:
 
 
 def slide_in(
-    signals: BaseSignals, frame: ContactFrame, arm: ArmDynamics, tolerance: float, calibration: float
+    signals: BaseSignals,
+    frame: ContactFrame,
+    arm: ArmDynamics,
+    tolerance: float,
+    calibration: float,
+    press: Identification,
+    along: Record,
 ) -> Identification | None:
-    """The identification of a slide; None of a log in which the tip does not slide.
+    """The identification of a slide; None of a press; that of the press without its K, where the log tells neither.
 
     Args:
         signals: wrench and pose over time.
@@ -74,43 +82,71 @@ def slide_in(
         arm: whose own stiffness is taken out of K, if it is known.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
         calibration: relative standard deviation of the scales of force and position together.
+        press: what the log says if it is one of a press.
+        along: the record along the normal of that press.
     """
     freed = freed_of(signals, frame)
     course = None if freed is None else course_of(signals, freed, frame)
+    claims = press.parameters["K"].verdict is Verdict.IDENTIFIED
+    again = freed is not None and course is None and freed.free.any() and claims
+    if again:  # what looks like free motion may be a slide, and its touch friction that begins
+        freed = freed_of(signals, frame, touches=False)
+        course = None if freed is None else course_of(signals, freed, frame)
     if freed is None or course is None:
         return None
     fit = _problem(course, freed, np.zeros(len(course.time), int), frame)
-    found, length, beside = with_length(fit)
+    fitted = fit, *with_length(fit)
+    better = advantage(course, fitted[1], fitted[2], freed, press, along.meta["contact_frame"])
+    certain = student(BLOCKS - 1)
+    if better < (certain if again else -certain):
+        return None
+    found = None
+    if (fitted[1].slips or not course.known) and not again and (better > certain or not claims):
+        found = _identification(signals, frame, arm, (tolerance, calibration), freed, course, fitted)
+    if claims:
+        return found or replace(press, parameters=press.parameters | {"K": _unclear(press.parameters["K"])})
+    shown = found is not None and found.parameters["mu"].value is not None
+    return found if shown or Code.NO_CONTACT.word in press.codes else None
+
+
+def _identification(
+    signals: BaseSignals,
+    frame: ContactFrame,
+    arm: ArmDynamics,
+    wide: tuple[float, float],
+    freed: Unloaded,
+    course: SlideWindows,
+    fitted: tuple[Fit, SlideFit, float, Array],
+) -> Identification:
+    """That of a slide, with tolerance and calibration."""
+    fit, found, length, beside = fitted
     share, slips = course.share(length)
     rows = slips if found.slips else np.ones(len(slips), bool)
-    mu = _coefficient(course, freed, frame, (fit, found, length, beside), rows)
-    known = bool(freed.free.any()) or frame.payload is not None
-    if known:
-        K, parts = _stiffness(course, found, beside[:, 0], length, arm, tolerance, calibration)
+    mu = _coefficient(course, freed, frame, fitted, rows)
+    if course.known:
+        K, parts = _stiffness(course, found, beside[:, 0], length, arm, *wide)
     else:
         K, parts = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_ZERO), np.zeros((0, 5))
     normal, cone = _normals(course, fit, found, mu, share)
-    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), known, found.slips, tolerance)
-    warnings = () if known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),)
-    lag = LagFound(
-        USUAL_LAG + found.lag,
-        float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1])),
-        0.0,
-        "prior",
-    )
-    inside = np.flatnonzero(freed.inside)
-    start, end = (float(signals.time[i] - signals.time[0]) for i in (inside[0], inside[-1]))
+    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), course.known, wide[0])
+    std = float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1]))
+    inside = signals.time[freed.inside]
     return Identification(
         model="slide",
         parameters={"mu": own, "K": K},
-        contacts=((start, end),),
-        lag=replace(lag, bound=1.96 * lag.std),
+        contacts=((float(inside[0]), float(inside[-1])),),
+        lag=LagFound(USUAL_LAG + found.lag, std, 1.96 * std, "prior"),
         r2=float("nan"),
         rmse=float(np.sqrt(np.mean((found.angle[rows] * course.noise[rows]) ** 2))),
         n=int(rows.sum()),
-        warnings=warnings,
+        warnings=() if course.known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),),
         slide=_answer(course, mu, own, normal, cone, parts, length),
     )
+
+
+def _unclear(K: Parameter) -> Parameter:
+    why = "the tip may slide: force and motion fit a slide as well as a press; give --payload, or press at one place"
+    return replace(K, value=None, std=None, verdict=Verdict.NOT_IDENTIFIABLE, reason=why)
 
 
 _NO_ZERO = (
@@ -122,8 +158,7 @@ _NO_ZERO = (
 def _problem(course: SlideWindows, freed: Unloaded, classes: Array, frame: ContactFrame) -> Fit:
     """The least-squares problem, with what free motion leaves unknown of bias and weight."""
     usual = float(np.median(np.linalg.norm(course.force, axis=1)))
-    known = bool(freed.free.any()) or frame.payload is not None
-    bias = max(freed.load.std, 1e-3) if known else usual
+    bias = max(freed.load.std, 1e-3) if course.known else usual
     weight = freed.load.weight_std if freed.load.separable else PAYLOAD
     turns = float(np.abs(course.turned[1] - np.eye(3)).max()) > 0.02
     std = [
@@ -206,13 +241,10 @@ def _coefficient(
     )  # fmt: skip
 
 
-def _verdict(mu: Coefficient, wrong: str, known: bool, slips: bool, tolerance: float) -> Parameter:
+def _verdict(mu: Coefficient, wrong: str, known: bool, tolerance: float) -> Parameter:
     ends = (max(mu.value - mu.half, 0.0), mu.value + mu.half)
     if not known:
         return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, _NO_ZERO)
-    if not slips:
-        why = "the contact sticks along most of the path: slide farther one way"
-        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, why)
     if wrong:
         return Parameter(None, None, None, "1", Verdict.REJECTED, wrong)
     speeds = "" if len(mu.table) == 1 else ", the mean; it depends on the speed"
@@ -334,15 +366,12 @@ def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
     s = course.smooth
     speed = np.linalg.norm(s.velocity, axis=1)
     mu = float(found.mu[0])
-    share, slips = course.shares(length)
-    F = course.sign * s.force - _load_along(course, found)
-    along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(speed, 1e-12)
+    _, slips = course.shares(length)
+    F, left = course.friction_angle(found, length)
     size = np.linalg.norm(F, axis=1)
-    psi = np.arctan2(along, np.sqrt(np.maximum(size**2 - along**2, 1e-12)))
-    model = np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
     u = np.linspace(-1.0, 1.0, s.longer + 2)[1:-1]
     kernel = (1.0 - u**2) / np.sum(1.0 - u**2)  # least squares' slope is the rate seen through it
-    dip = np.convolve(np.where(slips, speed * (psi - model), 0.0), kernel, "same")
+    dip = np.convolve(np.where(slips, speed * left, 0.0), kernel, "same")
     carried = np.convolve(np.where(slips, speed, 0.0), kernel, "same")
     rate = np.einsum("ij,ij->i", F, course.sign * s.rate) / np.maximum(size, 1e-9) / np.sqrt(1.0 + mu**2)
     whole = np.convolve(slips, np.ones(s.longer), "same") > s.longer - 0.5
@@ -356,16 +385,6 @@ def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
 _NO_DITHER = (
     "the force changes too little or too slowly along the path to show it: dither it by a tenth, at a hertz"
 )
-
-
-def _load_along(course: SlideWindows, found: SlideFit) -> Array:
-    """Rest of bias and weight, on the grid, shape (n, 3)."""
-    s, b = course.smooth, found.load
-    turned = course.rotations_of(s.time)
-    off: Array = np.einsum("nij,j->ni", turned, b[:3])
-    if len(b) > 3:
-        off = off + b[3:] - turned @ course.rest.T @ b[3:]
-    return off
 
 
 def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:

@@ -107,14 +107,14 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
 
     longer = max(rows, round(RATE / step) // 2 * 2 + 1)
     rate, bend = (savgol_filter(force, longer, 2, deriv=k, delta=step, axis=0) for k in (1, 2))
-    at = signals.rotations[_nearest(time, grid)]
+    at = signals.rotations[nearest(time, grid)]
     level, rate, bend = (np.einsum("nij,nj->ni", at, values) for values in (of(force, 0), rate, bend))
     level -= freed.load.weight
     edge = np.convolve(inside, np.ones(rows), "same") > rows - 0.5
     return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, bend, grain, noise, edge)
 
 
-def _nearest(time: Array, at: Array) -> NDArray[np.intp]:
+def nearest(time: Array, at: Array) -> NDArray[np.intp]:
     """Rows that are nearest to some times, shape (n,)."""
     later = np.searchsorted(time, at).clip(1, len(time) - 1)
     found: NDArray[np.intp] = later - (at - time[later - 1] < time[later] - at)
@@ -123,11 +123,11 @@ def _nearest(time: Array, at: Array) -> NDArray[np.intp]:
 
 QUIET = 0.1
 """Share of the contact's force within which a force in free motion stays."""
-ALONG = 0.7
-"""Cosine of the angle between the approach and the force after it, at least: a slide has less, or rests."""
+ALONG = np.sqrt(0.5)
+"""Cosine of the angle between the approach and the force after it, at least: rather along it than across."""
 
 
-def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
+def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) -> Unloaded | None:
     """Rows in free motion and in contact of a slide, and the load by the first; None if the force is always alike.
 
     A slide's force does not follow the position, so that a press' contact detection does not see it. Here free motion
@@ -147,26 +147,29 @@ def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
     place = signals.place[there][n // 2 :][: len(mean)]
     rotations = signals.rotations[there][n // 2 :][: len(mean)]
     free = np.zeros(len(mean), bool)
-    for turned in (1, -1):
+    brief = max(round(0.2 / step), n)
+    for turned in (1, -1) if touches else ():
         own, at, R = mean[::turned], place[::turned], rotations[::turned]
-        level = np.median(own[: max(round(0.2 / step), 10)], axis=0)
+        level = np.median(own[:brief], axis=0)
         far = np.linalg.norm(own - level, axis=1)
-        limit = max(QUIET * float(np.quantile(far, 0.9)), chance)
-        left = np.flatnonzero(far > limit)
-        end = int(left[0]) if len(left) else 0
-        quiet = max(chance, 3.0 * float(np.median(far[: max(round(0.2 / step), 10)])))
+        usual = float(np.quantile(far, 0.9))
+        met = end = int(np.argmax(far > 0.5 * usual))
+        quiet = max(chance, min(3.0 * float(np.median(far[:brief])), QUIET * usual))
         while end and far[end] > quiet:
             end -= 1
-        if end * step < 0.2 or end < FEWEST:
+        if end < max(brief, FEWEST):
             continue
         after = R[end] @ (np.median(own[end : end + max(round(0.5 / step), n)], axis=0) - level)
-        came = at[end] - at[max(end - max(round(0.2 / step), n), 0)]
-        size = float(np.linalg.norm(came) * np.linalg.norm(after))
-        # A tip that rests in contact and then slides feels friction along its way at once, within its length.
-        moved = float(np.linalg.norm(at[: end + 1] - at[end], axis=1).max()) > SHORTEST
-        if not moved or abs(came @ after) < ALONG * size:
-            continue
-        free[::turned] |= np.arange(len(own)) < end - n
+        came, went = at[end] - at[end - brief], at[min(met + brief, len(at) - 1)] - at[met]
+        along = abs(came @ after) > ALONG * float(np.linalg.norm(came) * np.linalg.norm(after))
+        # The force comes on a shorter way than it stayed away on, and the tip does not turn back, as friction would.
+        away = float(np.linalg.norm(at[: end + 1] - at[end], axis=1).max())
+        if (
+            along
+            and away > max(SHORTEST, float(np.linalg.norm(at[met] - at[end])))
+            and came @ went > -0.5 * (came @ came)
+        ):
+            free[::turned] |= np.arange(len(own)) < end - n
     rows = np.flatnonzero(there)[n // 2 :][: len(mean)]
     whole = np.zeros(len(time), bool)
     whole[rows[free]] = True
@@ -189,7 +192,8 @@ def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
     size = np.linalg.norm(load.taken_off(mean, rotations), axis=1)
     usual = float(np.median(size[~free])) if (~free).any() else 0.0
     inside = np.zeros(len(time), bool)
-    inside[rows[~free & (size > 0.3 * usual)]] = True
+    known = whole.any() or frame.payload is not None
+    inside[rows[~free & ((size > 0.3 * usual) | (not known))]] = True
     return Unloaded(force, there, inside, whole, load)
 
 
@@ -212,7 +216,8 @@ class SlideWindows:
         force, rate, bend: as of `Smooth`, from the tip on the surface, shape (m, 3).
         turned: rotation of the tool, and that against the middle of the free rows, shape (m, 3, 3).
         rows: of the smooth signals.
-        smooth, moves: whence the windows are, and where the tip moves on.
+        smooth, moves, slides: whence the windows are, and where the tip moves on, and across the force.
+        known: whether the zero of the force is, by free motion or a payload file.
         turns, rest: times and rotations of the log's rows, and the tool's rotation in free motion.
         sign: of the sensor's reading against the force on the surface.
         noise: standard deviation of psi times the force [N], shape (m,).
@@ -230,6 +235,8 @@ class SlideWindows:
     rows: NDArray[np.intp]
     smooth: Smooth
     moves: Mask
+    slides: Mask
+    known: bool
     turns: tuple[Array, Array]
     rest: Array
     sign: float
@@ -249,9 +256,18 @@ class SlideWindows:
         found, slips = self.shares(length)
         return found[self.rows], slips[self.rows]
 
-    def rotations_of(self, time: Array) -> Array:
-        """Rotations of the tool at times, shape (n, 3, 3)."""
-        return self.turns[1][_nearest(self.turns[0], time)]
+    def friction_angle(self, found: SlideFit, length: float) -> tuple[Array, Array]:
+        """On the grid, force on the surface [N], shape (n, 3), and the residual of psi but for the spring [rad]."""
+        s, b = self.smooth, found.load
+        turned = self.turns[1][nearest(self.turns[0], s.time)]
+        F = self.sign * s.force - np.einsum("nij,j->ni", turned, b[:3])
+        if len(b) > 3:
+            F -= b[3:] - turned @ self.rest.T @ b[3:]
+        along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(np.linalg.norm(s.velocity, axis=1), 1e-12)
+        psi = np.arctan2(along, np.sqrt(np.maximum(np.einsum("ij,ij->i", F, F) - along**2, 1e-12)))
+        share, _ = self.shares(length)
+        mu = float(found.mu[0])
+        return F, psi - np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
 
 
 def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> SlideWindows | None:
@@ -272,19 +288,20 @@ def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Sli
     work = float(np.einsum("ij,ij->", s.force[moves], s.velocity[moves]))
     sign = {"action": 1.0, "reaction": -1.0, None: 1.0 if work >= 0.0 else -1.0}[frame.force_sign]
     across = np.linalg.norm(np.cross(s.force, way), axis=1)
-    slides = moves & (across > SLIDES * size)
+    known = bool(freed.free.any()) or frame.payload is not None
+    slides = moves & ((across > SLIDES * size) | (not known))
     path = float(speed[slides].sum() * s.step)
     if path < SHORTEST or path < 0.5 * float(speed[moves].sum() * s.step):
         return None
     rows = np.flatnonzero(slides)
     rows = rows[:: max(s.rows // 2, len(rows) // MOST, 1)]
-    rotations = signals.rotations[_nearest(signals.time, s.time[rows])]
+    rotations = signals.rotations[nearest(signals.time, s.time[rows])]
     rest = signals.rotations[freed.free].mean(axis=0) if freed.free.any() else rotations.mean(axis=0)
     force = s.noise * np.sqrt(2.25 / s.rows)
     noise = np.hypot(force, size[rows] * blur / speed[rows])
     return SlideWindows(
         s.time[rows], speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
-        sign * s.bend[rows], (rotations, rotations @ rest.T), rows, s, moves,
+        sign * s.bend[rows], (rotations, rotations @ rest.T), rows, s, moves, slides, known,
         (signals.time, signals.rotations), rest, sign, noise, path,
     )  # fmt: skip
 
