@@ -57,7 +57,11 @@ def advantage(
 
 
 def _left_by_press(
-    course: SlideWindows, freed: Unloaded, press: Identification, about: dict[str, Any], rows: NDArray[np.intp]
+    course: SlideWindows,
+    freed: Unloaded,
+    press: Identification,
+    about: dict[str, Any],
+    rows: NDArray[np.intp],
 ) -> Array:
     """Residual of a press [N], shape (n, 3); each contact, and free motion, begins from a force of its own."""
     s = course.smooth

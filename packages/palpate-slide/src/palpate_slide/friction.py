@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,20 +48,14 @@ PLACES = 200
 """Places of the path in the answer."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coefficient:
-    """Friction with its interval, all speeds together and by class.
+class Coefficient(NamedTuple):
+    """Friction over the windows, the half-width of its 95 % interval, and by class of speeds.
 
-    Args:
-        value, half: mean over the windows, and half-width of its 95 % interval.
-        low, high: interval that holds it at all speeds.
-        table: speed of a class [m/s], mu and half-width, shape (j, 3); one row if friction does not depend on it.
+    The table's rows are speed [m/s], mu and half-width, shape (j, 3); one if friction does not depend on speed.
     """
 
     value: float
     half: float
-    low: float
-    high: float
     table: Array
 
 
@@ -105,7 +99,8 @@ def slide_in(
         found = _identification(signals, frame, arm, (tolerance, calibration), freed, course, fitted)
     if claims:
         return found or replace(press, parameters=press.parameters | {"K": _unclear(press.parameters["K"])})
-    shown = found is not None and found.parameters["mu"].value is not None
+    mu = None if found is None else found.parameters["mu"]
+    shown = mu is not None and (mu.value is not None or (mu.ci95 is not None and better > certain))
     return found if shown or Code.NO_CONTACT.word in press.codes else None
 
 
@@ -214,7 +209,7 @@ def _coefficient(
     whole = half(found.mu, np.sqrt(np.diag(found.covariance)[:1]), spread)
     value, wide = float(found.mu[0]), float(whole[0])
     one = np.array([[float(np.median(course.speed[rows])), value, wide]])
-    alike = Coefficient(value, wide, value - wide, value + wide, one)
+    alike = Coefficient(value, wide, one)
     classes = _classes(course.speed, rows)
     j = int(classes.max()) + 1
     if j == 1 or not found.slips:
@@ -235,10 +230,7 @@ def _coefficient(
     mean = float(weight @ by.mu)
     std = float(np.sqrt(weight @ by.covariance[:j, :j] @ weight))
     wide = float(half(np.array([mean]), np.array([std]), spread)[0])
-    return Coefficient(
-        mean, wide, float((by.mu - halves).min()), float((by.mu + halves).max()),
-        np.column_stack([speeds, by.mu, halves]),
-    )  # fmt: skip
+    return Coefficient(mean, wide, np.column_stack([speeds, by.mu, halves]))
 
 
 def _verdict(mu: Coefficient, wrong: str, known: bool, tolerance: float) -> Parameter:
@@ -323,7 +315,8 @@ def _stiffness(
     spread = max(float("inf") if one is None else abs(one[0] / whole[0] - 1.0) for one in others)
     rows = []
     for i in np.unique(main.part):
-        own = main.of(main.part == i)
+        at = main.part == i
+        own = Dips(main.dip[at], main.columns[at], main.part[at], main.place[at], main.noise)
         one = _ratio(own, 8) if len(own.dip) > 32 else None
         if one is not None:
             K, half = _surface(one[0], float(np.hypot(one[1], spread * one[0])), arm, calibration)
@@ -338,16 +331,11 @@ def _stiffness(
     return Parameter(K, half / 1.96, (K - half, K + half), "N/m", Verdict.IDENTIFIED, why), places
 
 
-@dataclass(frozen=True, eq=False)
-class Dips:
-    """How fast the tip dips, and the rate of the force.
+class Dips(NamedTuple):
+    """How fast the tip dips, |v| (psi - atan mu c) [m/s], shape (n,), and the rate of the force.
 
-    Args:
-        dip: |v| (psi - atan mu c) [m/s], shape (n,).
-        columns: |v|, rate of the normal force [N/s], and its rate, shape (n, 3).
-        part: of the slide, shape (n,).
-        place: [m], shape (n, 3).
-        noise: variance of the rate by the sensor's noise [N^2/s^2].
+    The columns are |v|, rate of the normal force [N/s], and its rate, shape (n, 3); then parts of the slide, shape
+    (n,), places [m], shape (n, 3), and the variance of the rate by the sensor's noise [N^2/s^2].
     """
 
     dip: Array
@@ -355,10 +343,6 @@ class Dips:
     part: Array
     place: Array
     noise: float
-
-    def of(self, rows: Mask) -> Dips:
-        """Those of some rows."""
-        return Dips(self.dip[rows], self.columns[rows], self.part[rows], self.place[rows], self.noise)
 
 
 def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
@@ -441,7 +425,9 @@ def _answer(
     mean /= np.linalg.norm(mean)
     turns = float(np.degrees(np.arccos(np.clip(normal @ mean, -1.0, 1.0)).max()))
     wide = float(np.degrees(np.median(cone)))
-    if own.value is None:
+    if own.value is None and own.ci95 is not None:
+        first = f"The tip slides: mu is at most {own.ci95[1]:.3g}."
+    elif own.value is None:
         why = own.reason if own.reason.endswith("?") else f"{own.reason}."
         first = f"The tip slides, but the log does not give its friction: {why}"
     elif len(mu.table) > 1:

@@ -173,21 +173,12 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
     rows = np.flatnonzero(there)[n // 2 :][: len(mean)]
     whole = np.zeros(len(time), bool)
     whole[rows[free]] = True
-    if whole.sum() >= FEWEST:
-        read, at_rest = raw[whole], signals.rotations[whole]
-        weighs = not frame.gravity_compensated
-        load = (
-            load_of(read, at_rest, weighs=weighs)
-            if frame.payload is None
-            else known_load(read, at_rest, frame.payload)
-        )
+    whole &= whole.sum() >= FEWEST
+    read, at_rest = raw[whole], signals.rotations[whole]
+    if frame.payload is not None:
+        load = known_load(read, at_rest, frame.payload)
     else:
-        whole &= False
-        load = (
-            no_load()
-            if frame.payload is None
-            else known_load(raw[whole], signals.rotations[whole], frame.payload)
-        )
+        load = load_of(read, at_rest, weighs=not frame.gravity_compensated) if whole.any() else no_load()
     force = load.taken_off(raw, signals.rotations)
     size = np.linalg.norm(load.taken_off(mean, rotations), axis=1)
     usual = float(np.median(size[~free])) if (~free).any() else 0.0
