@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.force import Gains
     from palpate_slide.ground import Ground
-    from palpate_slide.jointed_arm import JointedArm
+    from palpate_slide.jointed_arm import HeldTip, JointedArm
 
 SHORTEST = 0.003
 """Path that is one [m]."""
@@ -67,13 +67,19 @@ class SlideOptions(SlideLimits):
     normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
+    turn: values.Length | None = None
+    """Keeps the tool perpendicular to the surface, about the centre of its spherical tip: how far that is behind the
+    tool's point, as 20:mm or 0:mm. A flat tool's moment is not covered."""
+    payload: Path | None = None
+    "File of palpate payload, whose weight is taken off in every orientation of the tool; for --turn."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
     """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
     which palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
-    "own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms)."
+    """own: a tip with the arm's lags in each axis, or with --turn the arm's joints; mujoco: the arm's joints
+    (extra: arms)."""
     seed: Annotated[int, WHOLE, _SIMULATED] = 0
     "Of the sensor's noise."
 
@@ -133,11 +139,33 @@ class SlideOptions(SlideLimits):
     def joints(self) -> JointedArm:
         """The arm with its joints, for MuJoCo's physics."""
         from palpate.press.engines import ENGINES
+        from palpate.robots.serial.loading import mujoco
         from palpate_slide.jointed_arm import jointed_arm
 
         if self.physics not in ENGINES:
             raise unknown("physics", self.physics, ENGINES)
+        if self.physics == "mujoco":
+            mujoco()
         return jointed_arm(self.arm)
+
+    @property
+    def tool(self) -> HeldTip | None:
+        """The tool that is kept perpendicular; None for one that does not turn."""
+        from palpate.contact_frame import load_payload
+        from palpate.press.tool import held_tool
+        from palpate_slide.jointed_arm import HeldTip
+
+        if self.turn is None:
+            if self.payload is not None:
+                raise InputError("--payload is for a tool that turns; add --turn, as 20:mm")
+            return None
+        if self.dither:
+            raise InputError("--dither needs a tool that does not turn; leave out --turn")
+        back = self.turn.si
+        if not 0.0 <= back <= 0.5:
+            raise InputError(f"--turn must be from 0 to 500 mm, got {1e3 * back:g} mm")
+        weight = held_tool(None if self.payload is None else load_payload(self.payload)).weight
+        return HeldTip(back, (weight.x, weight.y, weight.z))
 
     @property
     def into(self) -> tuple[float, ...]:
@@ -146,7 +174,7 @@ class SlideOptions(SlideLimits):
 
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
-        if self.physics == "own":
+        if self.physics == "own" and self.turn is None:
             from palpate_slide.dither import dither_frequency
             from palpate_slide.world import simulate
 
@@ -154,10 +182,11 @@ class SlideOptions(SlideLimits):
             return simulate(gains, ground, ways, into=self.into, seed=self.seed, dither=share)
         if self.dither:
             raise InputError("--dither needs --physics own; leave out --physics mujoco")
-        return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
+        how: dict[str, Any] = {"seed": self.seed, "physics": self.physics, "tool": self.tool}
+        return self.joints.slide(gains, ground, ways, into=self.into, **how)
 
     def tuned_gains(self) -> Gains:
-        """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
+        """Gains for the slide; for an arm with joints with the mass of its tip."""
         from msgspec.structs import replace as msgspec_replace
 
         from palpate.force import load_arm, load_gains
@@ -169,7 +198,8 @@ class SlideOptions(SlideLimits):
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
-        gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
+        point = self.physics == "own" and self.turn is None
+        gains = gains_for(load_arm(self.arm) if point else self.joints.inner, wanted)
         return self.gains_with(gains, abs(self.radius))
 
 
@@ -223,6 +253,7 @@ def slide(
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
     check_share(asked.dither)
+    tool = asked.tool
     gains = asked.tuned_gains()
     slide_numbers = numbers_of(gains)
     ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
@@ -234,7 +265,7 @@ def slide(
         rows = asked.run(gains, ground, ways)
         head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
         summary: dict[str, Any] = with_author(
-            {"command": printable(command()), **head, **summarise(rows, gains, ground)}
+            {"command": printable(command()), **head, **summarise(rows, gains, ground, tool is not None)}
         )
         summary["along"] = None
         if asked.dither:
@@ -270,7 +301,8 @@ def _watch(asked: SlideOptions) -> int:
     ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
     ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
     return show_live(
-        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed), ServedOptions()
+        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed, asked.tool),
+        ServedOptions(),
     )
 
 
