@@ -83,9 +83,10 @@ def test_turning_is_about_the_centre_of_the_tip() -> None:
 
 def test_neither_turning_nor_the_tools_point_passes_its_limit() -> None:
     """On tools long and short, readings and rotations at random, a limit lowered on the way."""
-    gains, rng = replace(
-        gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9)
-    ), np.random.default_rng(1)
+    gains, rng = (
+        replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9)),
+        np.random.default_rng(1),
+    )
     fastest = 0.0
     for back in (0.0, 0.02, 0.5):
         tool = TurningTool(SlidingLoop(gains), centre=(0.0, 0.0, -back))
@@ -97,7 +98,9 @@ def test_neither_turning_nor_the_tools_point_passes_its_limit() -> None:
             for k in range(200):
                 R = turned(DOWN, np.array([400.0, 0.0, 0.0]) + rng.normal(0.0, 30.0, 3))
                 way = np.array([1e-5 * k, 0.0, 0.0]) - R @ np.array([0.0, 0.0, -back])
-                twist = tool.update(rng.normal(0.0, 0.02, 3) + [0.0, 0.0, -10.0], way, R, rng.normal(size=3))
+                twist = tool.update(
+                    np.array([0.0, 0.0, -10.0]) + rng.normal(0.0, 0.02, 3), way, R, rng.normal(size=3)
+                )
                 assert np.linalg.norm(twist[:3]) <= most * (1.0 + 1e-9)
                 assert np.linalg.norm(twist[3:]) <= FASTEST * (1.0 + 1e-9)
                 tip = twist[:3] + np.cross(twist[3:], R @ np.array([0.0, 0.0, -back]))

@@ -135,6 +135,11 @@ class SlideOptions(SlideLimits):
             raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
         return radius
 
+    @property
+    def has_no_joints(self) -> bool:
+        """Whether the arm is a tip with lags in each axis."""
+        return self.physics == "own" and self.turn is None
+
     @cached_property
     def joints(self) -> JointedArm:
         """The arm with its joints, for MuJoCo's physics."""
@@ -159,13 +164,10 @@ class SlideOptions(SlideLimits):
             if self.payload is not None:
                 raise InputError("--payload is for a tool that turns; add --turn, as 20:mm")
             return None
-        if self.dither:
-            raise InputError("--dither needs a tool that does not turn; leave out --turn")
         back = self.turn.si
         if not 0.0 <= back <= 0.5:
             raise InputError(f"--turn must be from 0 to 500 mm, got {1e3 * back:g} mm")
-        weight = held_tool(None if self.payload is None else load_payload(self.payload)).weight
-        return HeldTip(back, (weight.x, weight.y, weight.z))
+        return HeldTip(back, held_tool(load_payload(self.payload) if self.payload else None).weight)
 
     @property
     def into(self) -> tuple[float, ...]:
@@ -174,16 +176,17 @@ class SlideOptions(SlideLimits):
 
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
-        if self.physics == "own" and self.turn is None:
+        if self.has_no_joints:
             from palpate_slide.dither import dither_frequency
             from palpate_slide.world import simulate
 
             share = (self.dither, dither_frequency(gains))
             return simulate(gains, ground, ways, into=self.into, seed=self.seed, dither=share)
         if self.dither:
-            raise InputError("--dither needs --physics own; leave out --physics mujoco")
-        how: dict[str, Any] = {"seed": self.seed, "physics": self.physics, "tool": self.tool}
-        return self.joints.slide(gains, ground, ways, into=self.into, **how)
+            raise InputError("--dither needs an arm without joints; leave out --physics mujoco and --turn")
+        return self.joints.slide(
+            gains, ground, ways, into=self.into, seed=self.seed, physics=self.physics, tool=self.tool
+        )
 
     def tuned_gains(self) -> Gains:
         """Gains for the slide; for an arm with joints with the mass of its tip."""
@@ -198,8 +201,7 @@ class SlideOptions(SlideLimits):
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
-        point = self.physics == "own" and self.turn is None
-        gains = gains_for(load_arm(self.arm) if point else self.joints.inner, wanted)
+        gains = gains_for(load_arm(self.arm) if self.has_no_joints else self.joints.inner, wanted)
         return self.gains_with(gains, abs(self.radius))
 
 
@@ -253,13 +255,15 @@ def slide(
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
     check_share(asked.dither)
+    if live:
+        asked = replaced(asked, physics="mujoco", path="circle", seconds=1.0)
     tool = asked.tool
     gains = asked.tuned_gains()
-    slide_numbers = numbers_of(gains)
-    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
-    ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
+    speed = numbers_of(gains).speed
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, speed, asked.extent)
+    ground = asked.ground(ways, speed, gains.arm.rate)
     if live:
-        return _watch(replaced(asked, physics="mujoco"))
+        return _watch(asked, gains, ground)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
@@ -285,11 +289,8 @@ def slide(
     return 0 if summary["end"] == "held" else 1
 
 
-def _watch(asked: SlideOptions) -> int:
+def _watch(asked: SlideOptions, gains: Gains, ground: Ground) -> int:
     """Serves the live page of a slide."""
-    from palpate.force.sliding.paths import directions
-    from palpate.force.sliding.slide_domain import numbers_of
-
     try:
         from palpate_live.command import ServedOptions, show_live
         from palpate_slide.watched import WatchedSlide
@@ -297,13 +298,8 @@ def _watch(asked: SlideOptions) -> int:
         raise InputError(
             "--live needs palpate-live, which is not installed: pip install palpate-live"
         ) from None
-    gains = asked.tuned_gains()
-    ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
-    ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
-    return show_live(
-        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed, asked.tool),
-        ServedOptions(),
-    )
+    watched = WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed, asked.tool)
+    return show_live(watched, ServedOptions())
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:

@@ -22,6 +22,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
+from palpate.force.sliding.slide_state import VELOCITY, vector_at
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
 from palpate.force.sliding.turning_tool import TurningTool
 from palpate.press.cell import Body, Reading, TouchState, Workcell, apply_drive, read_sensor
@@ -141,7 +142,16 @@ class OnGround(ByMuJoCo):
         self._noise = self._generator.standard_normal((3, 8))
         if self._own is not None:
             self.slid = self._own(
-                cell, self._world, self.ground, self._frame, body, self.slid, self._back, setpoint, k, self._noise
+                cell,
+                self._world,
+                self.ground,
+                self._frame,
+                body,
+                self.slid,
+                self._back,
+                setpoint,
+                k,
+                self._noise,
             )
             return touch
         return super().tick(cell, body, touch, setpoint, k, noise)
@@ -188,15 +198,10 @@ class HeldTip(NamedTuple):
     Args:
         back: from the tool's point back to that centre, along the tool's axis [m].
         weight: reading of the payload alone, in the base's axes [N].
-        known: share of it that the law is told.
     """
 
     back: float = 0.0
-    weight: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    known: float = 1.0
-
-
-POINT = HeldTip()
+    weight: Vec3 = ZERO3
 
 
 @dataclass(frozen=True)
@@ -233,20 +238,15 @@ class JointedArm:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
         rate = gains.arm.rate
-        run = JointedSlide(self, gains, ground, lambda since: ways[round(since * rate)], into, seed, physics, tool)
+        run = JointedSlide(
+            self, gains, ground, lambda since: ways[round(since * rate)], into, seed, physics, tool
+        )
         rows = np.zeros((len(ways) + round(LONGEST * rate), len(COLUMNS)))
         for k, row in enumerate(rows):
             if round(run.sequence.next_since * rate) >= len(ways):
                 return rows[:k]
             run.tick(row)
         return rows
-
-    def frame(self, back: float = 0.0) -> Frame:
-        """The surface's axes, and its first point before what touches, so far behind the tool's point [m]."""
-        n, axes = self.place.normal, self.place.axes
-        at = self.place.pose[:3, 3]
-        at = at + (self.place.place - back - n @ at) * n
-        return Frame(Mat3(triple(axes[2]), triple(axes[1]), triple(-n)), triple(at))
 
 
 class JointedSlide:
@@ -263,39 +263,30 @@ class JointedSlide:
 
     # More than seven arguments: those of a slide, and the path.
     def __init__(
-        self,
-        at: JointedArm,
-        gains: Gains,
-        ground: Ground,
-        direction: Callable[[float], ArrayLike],
-        into: ArrayLike = DOWN,
-        seed: int = 0,
-        physics: str = "mujoco",
-        tool: HeldTip | None = None,
-    ):
+        self, at: JointedArm, gains: Gains, ground: Ground, direction: Callable[[float], ArrayLike],
+        into: ArrayLike = DOWN, seed: int = 0, physics: str = "mujoco", tool: HeldTip | None = None,
+    ):  # fmt: skip
         if gains.arm.kind != "servo":  # which takes the place of any arm's own loop
             check_mode(gains, at.inner.kind)
-        held = tool or POINT
-        self.loop, frame = SlidingLoop(gains, into), at.frame(held.back)
-        cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
-        self.engine = OnGround(
-            at.arm, cell, at.place.q, ground, gains.arm, frame, seed, physics, held.back
-        )
-        self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
-        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
-        tared, weight = self._axes @ at.place.pose[:3, :3], self._axes @ np.array(held.weight)
-        back = np.array([0.0, 0.0, -held.back])
-        turning = TurningTool(self.loop, centre=back, weight=held.known * weight, tared=tared) if tool else None
-        driver = SlidingDriver(self, self.loop, direction, tool=turning)
+        held, place, n = tool or HeldTip(), at.place, at.place.normal
+        self.loop, self._axes = SlidingLoop(gains, into), np.array([place.axes[2], place.axes[1], -n])
+        self._origin = place.point - held.back * n
+        frame = Frame(Mat3(*map(triple, self._axes)), triple(self._origin))
+        cell = cell_of(at.arm, place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
+        self.engine = OnGround(at.arm, cell, place.q, ground, gains.arm, frame, seed, physics, held.back)
+        self.tip = SimulatedArm(at.arm, gains.arm, place, cell, self.engine)
+        tared, weight = self._axes @ place.pose[:3, :3], self._axes @ np.array(held.weight)
+        turning = TurningTool(self.loop, centre=(0.0, 0.0, -held.back), weight=weight, tared=tared)
+        driver = SlidingDriver(self, self.loop, direction, tool=turning if tool else None)
         self._weight, self._unturned = weight, tared.T @ weight
         self.sequence = PressSequence(self, driver, lambda _: self.loop.desired, gains.arm.tick)
 
     def read(self) -> TipSample:
         """The readings at this tick."""
         pose = self._axes @ self.tip.pose[:3]
-        R, reading = pose[:, :3], self.engine.reading
-        reading = reading + self._weight - R @ self._unturned
-        return TipSample(self.tip.read().time, reading, pose[:, 3] - self._axes @ self._origin, rotation=R)
+        R, at = pose[:, :3], pose[:, 3] - self._axes @ self._origin
+        reading = self.engine.reading + self._weight - R @ self._unturned
+        return TipSample(self.tip.read().time, reading, at, rotation=R)
 
     def move(self, velocity: Array, turning: Array | None = None) -> None:
         """Moves the tool's point for a tick with a velocity [m/s] and a turning [rad/s], each of shape (3,)."""
@@ -307,13 +298,13 @@ class JointedSlide:
         Raises:
             InputError: a joint reached the end of its range.
         """
-        sample, desired, action = self.sequence.tick()
+        sample, desired, _ = self.sequence.tick()
         loop, after, arm, q = self.loop, self.engine.slid, self.tip.arm, self.tip.truth.q
         beyond = np.flatnonzero(~((q >= arm.lower) & (q <= arm.upper)))
         if len(beyond):
             at = f"reached the end of its range at {sample.time:.3f} s"
             raise InputError(f"{arm.names[beyond[0]]} {at}; make --length smaller")
-        v, f = triple(action.velocity), triple(sample.force)
+        v, f = vector_at(loop.state, VELOCITY), triple(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
         axis = self._axes @ arm.forward_kinematics(q)[:3, 2]
         up = np.array(outside(self.engine.ground, after.tip.x)[1])

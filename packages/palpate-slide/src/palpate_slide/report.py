@@ -84,19 +84,13 @@ def sentence(summary: dict[str, Any]) -> str:
     if f is None:
         return "The surface was never touched, or the force was not held before a slide."
     n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
+    angle = (summary["tool"] or {}).get("angle95_deg")
+    within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
     return (
         f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
         f"{1e3 * summary['path_m']:.3g} mm; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; friction {mu} "
-        f"\N{PLUS-MINUS SIGN} {half}{_tool_words(summary)}."
+        f"\N{PLUS-MINUS SIGN} {half}{within}."
     )
-
-
-def _tool_words(summary: dict[str, Any]) -> str:
-    """The tool's angle, if it was kept perpendicular."""
-    tool = summary["tool"]
-    if tool is None:
-        return ""
-    return f"; tool within {tool['angle95_deg']:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time"
 
 
 def _friction(summary: dict[str, Any]) -> tuple[str, str]:
@@ -155,9 +149,22 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
         Card("Normal", f"± {n['cone95_deg']:.2g}", "\N{DEGREE SIGN}", why=off),
-        *([Card("Tool", f"{t['median_angle_deg']:.2g}", "\N{DEGREE SIGN}", why=f"95 %: {t['angle95_deg']:.2g}")] if t else []),
+        *(
+            [
+                Card(
+                    "Tool",
+                    f"{t['median_angle_deg']:.2g}",
+                    "\N{DEGREE SIGN}",
+                    why=f"95 %: {t['angle95_deg']:.2g}",
+                )
+            ]
+            if t
+            else []
+        ),
         Card("Friction", mu, half=half, why=f"truth {truth['friction']:g}"),
-        Card("Stiffness", quantity_between(*K["ci95"], "N/m"), why=f"truth {true}", colour="K"),
+        Card(
+            "Stiffness", quantity_between(K["ci95"][0], K["ci95"][1], "N/m"), why=f"truth {true}", colour="K"
+        ),
     ]
 
 

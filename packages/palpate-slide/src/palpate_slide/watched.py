@@ -78,7 +78,12 @@ class WatchedSlide(WatchedArm):
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
         self._run = JointedSlide(
-            self._at, self._gains, self._surface, self._direction, self._into, self.state.seed or 0,
+            self._at,
+            self._gains,
+            self._surface,
+            self._direction,
+            self._into,
+            self.state.seed or 0,
             tool=self._tool,
         )
         self._run.loop.desired = self.state.values["force"]

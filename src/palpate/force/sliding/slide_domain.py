@@ -113,4 +113,5 @@ def slide_sentence(gains: Gains) -> str:
     if domain is None:
         better = "slow down, or give a better normal"
         return f"no surface lies in the domain of a slide {least}{slide.mu_max:g}: {better}; {floor}"
-    return f"the domain of a slide is {domain[0] / 1e3:.3g} to {domain[1] / 1e3:.3g} kN/m {least}{slide.mu_max:g}; {floor}"
+    low, high = (f"{end / 1e3:.3g}" for end in domain)
+    return f"the domain of a slide is {low} to {high} kN/m {least}{slide.mu_max:g}; {floor}"

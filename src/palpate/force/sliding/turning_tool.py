@@ -22,9 +22,10 @@ class TurningTool:
     """Turns a tool's axis into the estimated normal, about the centre of its spherical tip.
 
     The force loop works on that centre, which moves along a surface parallel to the touched one, with the same normal:
-    so turning about it moves nothing. The turning is a proportional and integral one, smooth and well damped: it follows a
-    normal that turns evenly without an error, and rests while the slide halts. Neither the tip nor the tool's point is faster than the loop's limit:
-    the turning has the speed that the slide leaves. A flat tool's moment is not covered.
+    so turning about it moves nothing. The turning is a proportional and integral one, smooth and well damped: it
+    follows a normal that turns evenly without an error, and rests while the slide halts. Neither the tip nor the
+    tool's point is faster than the loop's limit: the turning has the speed that the slide leaves. A flat tool's
+    moment is not covered.
 
     Args:
         loop: holds the force.
