@@ -39,11 +39,13 @@ def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
     }
 
 
-def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
-    """Changes that multiply the joints' friction."""
+LUGRE = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
+
+
+def rougher(experiment: Experiment, factor: float, *names: str) -> Mapping[str, Any]:
+    """Changes that multiply the joints' friction: parameters of these names, or all."""
     f = experiment.friction
-    names = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
-    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names}
+    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names or LUGRE}
 
 
 def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
@@ -60,22 +62,23 @@ def by_condition(
     runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
 ) -> dict[str, list[T]]:
     """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
-    cases = [
-        (name, world, seed)
+    cases = {
+        name: [(world, seed) for seed in runs.seeds[: None if name in full else VARIED_SEEDS]]
         for name, world in worlds.items()
-        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
-    ]
-    found: dict[str, list[T]] = {}
-    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
-        found.setdefault(name, []).append(one)
-    return found
+    }
+    return runs.map_each(lambda case: work(*case), cases)
+
+
+def on_one_line(name: str) -> str:
+    """A variation's name, which a figure breaks, for a sentence."""
+    return name.replace("\n", " ")
 
 
 def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
     """A sentence: under which variations a conclusion holds, and under which it does not."""
     broken, kept = [], []
     for name, runs in found.items():
-        told = name.replace("\n", " ")
+        told = on_one_line(name)
         if often(map(holds, runs)):
             kept.append(told)
         else:

@@ -1,7 +1,6 @@
 """Explanation 10: schemes that learn an unknown surface implicitly (sec. 2.3), on the arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from palpate.bench import Experiment, build, load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RUBBER_SURFACE, SHORT, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import (
@@ -31,7 +30,6 @@ from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "implicit-schemes"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-neural"), {**SHORT, "run.losses": 0, "run.duration": 450.0})
 BEYOND = 0.0138
 """Of the search's desired x beyond the wall [m], as in figure 2.2."""
@@ -60,8 +58,7 @@ WORLDS: Mapping[str, Mapping[str, Any]] = {
 _NAMED = ("foam", "rubber")
 
 
-@dataclass(frozen=True)
-class Learned:
+class Learned(NamedTuple):
     """End of a run, and its way there."""
 
     last: Tracking  # in the last window, whatever was lost before it
@@ -71,8 +68,7 @@ class Learned:
     path: tuple[float, ...]  # rms of each window
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
@@ -108,7 +104,7 @@ def _learning_of(record: Record, seconds: float) -> Learned:
     late, last = since_contact(record) >= seconds - WINDOW, windows[-1]
     y, angle = 1e3 * record["y"][late].mean(), np.degrees(record["phi"][late].mean())
     path = tuple(w.settled for w in windows)
-    return Learned(replace(last, lost=0), float(y), float(angle), last.lost, path)
+    return Learned(last._replace(lost=0), float(y), float(angle), last.lost, path)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:

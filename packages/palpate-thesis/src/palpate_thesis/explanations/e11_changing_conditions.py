@@ -1,7 +1,7 @@
 """Explanation 11: conditions that change: friction with the configuration, a surface with its temperature."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.uncertainty import student
 from palpate.report import style
 from palpate.robots.arm3 import Arm3, directions, onto_joints
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import by_condition, move_wall
 from palpate_thesis.explanations.e6_friction_compensation import PARAMETERS as COMPENSATED
 from palpate_thesis.explanations.e6_friction_compensation import PLAIN, held_in
@@ -25,7 +25,6 @@ from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "changing-conditions"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(COMPENSATED, {"force.first": 15.0})
 WALLS = (0.40, 0.43, 0.465, 0.49)
 """x of the surface [m]; friction is as chosen for the third."""
@@ -51,8 +50,7 @@ def errors(experiment: Experiment, seed: int) -> tuple[float, float]:
     return constant, dependent
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     levels: Array  # friction of the joints over that of the start, shape (walls, 3)

@@ -1,7 +1,7 @@
 """Why M_e comes out negative: every fault of the signals switched on, one after the other."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad, butterworth2, butterworth3
-from palpate_thesis.claims import ThesisClaim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import ZERO, Axes, Figure
 from palpate_thesis.runs import Runs
 
 CAUSES = {
@@ -30,8 +30,7 @@ TICK = 1e-3
 START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
 
 
-@dataclass(frozen=True)
-class RegressionWindow:
+class RegressionWindow(NamedTuple):
     """A press with what came before it, so that filters have settled; true and measured."""
 
     x: Array  # true [m]
@@ -127,7 +126,6 @@ def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]
 
 
 NUMBER = "why-negative-mass"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = {
     name: with_values(e, {"run.press": 4.2})
     for name, e in {
@@ -150,8 +148,7 @@ NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
 """Shares of K and B; kilograms."""
 
 
-@dataclass(frozen=True)
-class EstimatesOfPress:
+class EstimatesOfPress(NamedTuple):
     """Least-squares estimates of one press, each (M, B, K)."""
 
     steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
@@ -162,8 +159,7 @@ class EstimatesOfPress:
     matched: Array
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Presses on each surface, as chosen and varied."""
 
     presses: dict[str, list[EstimatesOfPress]]
@@ -347,7 +343,7 @@ def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
     matched = [float(p.matched[index]) for p in data.presses[surface]]
     axis.barh(len(steps), float(np.median(matched)), color=style.OK, height=0.62)
     axis.plot(matched, np.full(len(matched), len(steps)), "o", color=style.INK, markersize=1.8, alpha=0.5)
-    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, **ZERO)
     if surface != "relaxing foam":
         axis.axvline(data.truth[surface][index], color=style.OK, linewidth=1.1, linestyle="--")
     axis.set_yticks(range(len(labels)), labels)
@@ -366,7 +362,7 @@ def _lag_panel(axis: Axes, data: Data, index: int) -> None:
         )
         predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]
         axis.plot(1e3 * fine, predicted, "--", color=color, linewidth=1.1)
-    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axhline(0.0, **ZERO)
     axis.set(xlabel="T [ms]", ylabel=("$M_e$ [kg]", "$B_e$ [N s/m]")[index])
     axis.legend()
 
@@ -382,5 +378,5 @@ def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
         for i, chain in enumerate(CHAINS)
     }
     panels.dots(axis, groups, colors)
-    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, **ZERO)
     axis.set_xlabel("$M_e$ [kg]")

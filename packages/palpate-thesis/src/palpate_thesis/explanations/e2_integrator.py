@@ -1,8 +1,7 @@
 """Explanation 2: the neural controller is, to first order, an integral controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
-from palpate_thesis.claims import ThesisClaim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.force_control.panels import limits, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
@@ -28,7 +27,6 @@ from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "neural-is-an-integrator"
-TITLE, CAPTION = texts(NUMBER)
 AMPLITUDE, TICK, RATE = 20.0, 1e-3, 5e-5
 GAIN = RATE * (AMPLITUDE / 2) ** 2 / TICK
 """Integral gain equivalent to the text's learning rate: 5 per second."""
@@ -50,8 +48,7 @@ OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
 """Variations that are of the network or the reference alone."""
 
 
-@dataclass(frozen=True)
-class BothControllers:
+class BothControllers(NamedTuple):
     """An experiment under both controllers."""
 
     network: Record
@@ -62,8 +59,7 @@ class BothControllers:
     held: dict[str, float]  # the same with the network's weights from the torques held at zero
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     pairs: dict[str, BothControllers]

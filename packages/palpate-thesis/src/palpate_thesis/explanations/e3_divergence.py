@@ -1,8 +1,7 @@
 """Explanation 3: the neural controller's delayed divergence."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.controllers.neural import NeuralState
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RELAXING_FOAM, move_wall, rougher
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.panels import across, legend_inside, panels
@@ -25,7 +24,7 @@ from palpate_thesis.force_control.weights import (
     layers,
     watch,
 )
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 from palpate_thesis.runs import Runs
 
 DURATION = 240.0
@@ -39,8 +38,7 @@ PARTS = (
 )
 
 
-@dataclass(frozen=True)
-class LongRun:
+class LongRun(NamedTuple):
     """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
 
     t: Array  # (n,) [s]
@@ -49,8 +47,7 @@ class LongRun:
     lost: float | None  # when contact was lost [s]
 
 
-@dataclass(frozen=True)
-class Loss:
+class Loss(NamedTuple):
     """Signals in the last moments before the loss of contact."""
 
     t: Array  # before the loss [s]
@@ -65,7 +62,7 @@ def weights_panel(axis: Axes, course: LongRun, name: str) -> None:
     for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
         axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
     if course.lost is not None:
-        axis.axvline(course.lost, color=style.INK, linestyle="--", linewidth=1)
+        axis.axvline(course.lost, **LIMIT_LINE)
     axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 1.05))
     axis.set_title(f"{name}, eta 5e-5")
 
@@ -153,7 +150,6 @@ def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> No
 
 
 NUMBER = "delayed-divergence"
-TITLE, CAPTION = texts(NUMBER)
 RELAXING = with_values(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
 RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
@@ -188,8 +184,7 @@ HELD: Mapping[str, slice] = {
 """Hidden weights that are not allowed to grow."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     courses: dict[str, dict[float, list[LongRun]]]  # by surface and learning rate

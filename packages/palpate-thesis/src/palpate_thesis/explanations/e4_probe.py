@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
 from palpate_thesis.least_squares import panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, Axes, Figure
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.claims import share_of_starts
 from palpate_thesis.neural_identifier.network import STARTS, NetworkAnswer, NetworkChoice, NetworkPress
@@ -95,7 +94,7 @@ def _draw_known_force(
     asked = 1e3 * NetworkChoice().probe(press.surface, 0).values[0]
     for axis in (force, stiffness):
         axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
-        axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.axvline(asked, **STATED)
         axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
     force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
     stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
@@ -180,8 +179,7 @@ STRAIGHT = NetworkChoice(200.0, 0.1, thresholds=False)
 CHOSEN = NetworkChoice()
 
 
-@dataclass(frozen=True)
-class Toggle:
+class Toggle(NamedTuple):
     """One change against the networks as chosen."""
 
     choice: NetworkChoice = CHOSEN
@@ -208,8 +206,7 @@ TOGGLES = {
 }
 
 
-@dataclass(frozen=True)
-class Looked:
+class Looked(NamedTuple):
     """One network after one press, asked at a probe of one's own."""
 
     over: float  # K by probing over f/x
@@ -217,8 +214,7 @@ class Looked:
     warned: bool
 
 
-@dataclass(frozen=True)
-class SurfaceResults:
+class SurfaceResults(NamedTuple):
     """Results on one surface."""
 
     press: NetworkPress  # of the first noise seed, 4 s
@@ -314,13 +310,10 @@ def gap(press: NetworkPress) -> tuple[float, float]:
     return float(for_stiffness), float(for_mass)
 
 
-__all__ = ["CAPTION", "NUMBER", "PARAMETERS", "TITLE", "check", "plot", "run"]
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NUMBER = "what-the-probe-depends-on"
-TITLE, CAPTION = texts(NUMBER)
 STUDY = (1.3, 2.3)
 """K over f/x with learning thresholds, from an earlier study of ours."""
 FAR = 0.10
@@ -468,4 +461,4 @@ def _spread(values: Sequence[float], unit: str) -> str:
 
 def plot(data: Data) -> Figure:
     """Learned force, K by probing, every variation, and M by initial weights."""
-    return causes(data, replace(NetworkChoice(), thresholds=False), STRAIGHT)
+    return causes(data, NetworkChoice(thresholds=False), STRAIGHT)

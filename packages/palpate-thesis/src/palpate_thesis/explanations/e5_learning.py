@@ -1,14 +1,14 @@
 """Explanation 5: left open by the thesis: the best learning rate, layers and neurons, architectures, stability."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.bench import Experiment, with_values
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.force_control.architectures import bench_with, radial_basis, recurrent
 from palpate_thesis.force_control.panels import legend_inside, panels
@@ -18,7 +18,6 @@ from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "rate-layers-neurons"
-TITLE, CAPTION = texts(NUMBER)
 RATE = 5e-5
 """The text's."""
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
@@ -31,7 +30,6 @@ SURFACES: Mapping[str, Experiment] = {
         ("foam that relaxes", with_values(FOAM, RELAXING_FOAM)),
     )
 }
-PARAMETERS = SURFACES
 JUDGED = (10.0, 15.0)
 LONG = 120.0
 """Seconds of contact over which a network's size is tried for a loss [s]."""
@@ -44,8 +42,7 @@ GONE = 3.8
 """Where runs that lost contact are drawn [N]."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     network: dict[str, dict[float, list[Tracking]]]  # by surface and rate

@@ -1,8 +1,7 @@
 """Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import SHARE
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import (
     RELAXING_FOAM,
     RUBBER_SURFACE,
@@ -37,8 +36,7 @@ AGAIN, PEAK = 3.0, 1.25
 """Seconds from regain to the desired force; largest force on the way, over the desired one."""
 
 
-@dataclass(frozen=True)
-class Recovery:
+class Recovery(NamedTuple):
     """Outcome of a lost contact."""
 
     took: float  # from loss to contact [s]; infinite if never
@@ -103,7 +101,6 @@ def recovery_of(record: Record) -> Recovery:
 
 
 NUMBER = "friction-compensation"
-TITLE, CAPTION = texts(NUMBER)
 LEVEL = (3.0, 0.25, 0.03)
 """Compensated levels [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
 PLAIN = with_values(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
@@ -115,8 +112,7 @@ HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
 
 
-@dataclass(frozen=True)
-class Held:
+class Held(NamedTuple):
     """The last second of a press."""
 
     error: float  # of the true force, absolute mean [N]
@@ -124,8 +120,7 @@ class Held:
     factor: float  # largest share of the Coulomb level that the listing's rule would have applied
 
 
-@dataclass(frozen=True)
-class Ratio:
+class Ratio(NamedTuple):
     """With compensation, over without, in the same world."""
 
     error: float
@@ -137,8 +132,7 @@ class Ratio:
         return not self.lost and self.error <= HALF
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,19 +14,17 @@ from palpate.identifiers import RecursiveLeastSquares
 from palpate.identifiers.estimator import LARGEST, NAMES, VAGUE
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.force_control.panels import panels
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "continuous-least-squares"
-TITLE, CAPTION = texts(NUMBER)
 SURFACES: Mapping[str, Experiment] = {
     name: with_values(e, {"run.press": press_runs.FIRST})
     for name, e in (("foam", press_runs.PLAIN), ("rubber", press_runs.RUBBER))
 }
-PARAMETERS = SURFACES
 TICK = 1e-3
 START = (0.0, 0.0, 2e5)
 LARGE = (1e10, 1e10, 1e10)
@@ -40,8 +37,7 @@ SAME, RIGHT = 0.02, 0.10
 KEYS = "MBK"
 
 
-@dataclass(frozen=True)
-class BothIdentifiers:
+class BothIdentifiers(NamedTuple):
     """One press: both identifiers on the same samples, and Euler's steps of the continuous one's equations."""
 
     recursive: Array  # M, B, K after each sample, shape (k, 3)

@@ -1,7 +1,6 @@
 """Explanation 8: networks that approach the environment and recognise the contact with it (after Fukuda et al.)."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -14,16 +13,14 @@ from palpate.networks import Network, NetworkState, network, random_layers
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.force_control.panels import panels
-from palpate_thesis.look import Figure
+from palpate_thesis.look import LIMIT_LINE, Figure
 from palpate_thesis.one_joint import JOINT_2, one_joint
 from palpate_thesis.runs import Runs
 
 NUMBER = "contact-network"
-TITLE, CAPTION = texts(NUMBER)
 SURFACES = {"foam": KelvinVoigt(5200.0, 200.0, 0.10), "rubber": KelvinVoigt(34500.0, 480.0, 0.05)}
-PARAMETERS = SURFACES
 TICK, LEVER = 1e-3, JOINT_2.lever
 TIP = JOINT_2.inertia / LEVER**2
 """Mass of the joint at its tip [kg]."""
@@ -178,8 +175,7 @@ def approach(surface: KelvinVoigt, part: ApproachByNetwork, seed: int) -> Record
     return one_joint(surface, part, schedule, steps=10).run(duration, seed, gap=GAP)
 
 
-@dataclass(frozen=True)
-class Arrival:
+class Arrival(NamedTuple):
     """How an approach ended."""
 
     time: float  # to the first touch [s]
@@ -196,8 +192,7 @@ def arrival(record: Record) -> Arrival:
     return Arrival(TICK * touched, told < touched, felt, float(force[touched : touched + 500].max()))
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`; arrivals by surface, one a seed."""
 
     shown: dict[str, tuple[ApproachByNetwork, Record]]  # of the first seed
@@ -306,13 +301,13 @@ def plot(data: Data) -> Figure:
     grid[0][1].axhline(SWITCH, **style.KNOWN)
     grid[0][1].set(xlabel="time since recognised [ms]", ylabel="force [N]", ylim=(-2.5, 8.0))
     grid[0][1].set_title("true force, and pale as measured; dashed: the switch")
-    grid[1][0].axhline(MOST, color=style.INK, linewidth=1, linestyle="--")
+    grid[1][0].axhline(MOST, **LIMIT_LINE)
     grid[1][0].set(xlabel="time to the first touch [s]", ylabel="largest force [N]")
     grid[1][0].set_title("crosses: networks; dashed: gentle enough")
     share = [100 * np.mean([a.early for a in some]) for some in data.lower.values()]
     grid[1][1].plot(SWITCHES, share, "o-", color=style.FAIL, markersize=4)
     early = [a.early for some in data.found.values() for a in some]
-    grid[1][1].axhline(100 * sum(early) / len(early), color=style.INK, linewidth=1, linestyle="--")
+    grid[1][1].axhline(100 * sum(early) / len(early), **LIMIT_LINE)
     grid[1][1].set(xlabel="switch [N]", ylabel="in free motion [%]")
     grid[1][1].set_title("recognised before the touch, by a switch; dashed: by the network")
     for axis in (grid[0][0], grid[1][0]):

@@ -1,7 +1,6 @@
 """Explanation 9: a network is the model of a nonlinear environment, and its local slopes tune the controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from palpate.networks import Network, NetworkState, network
 from palpate.networks.network import backward
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import SHORT
 from palpate_thesis.explanations.e8_contact_network import fit
 from palpate_thesis.force_control.panels import across, panels
@@ -29,7 +28,6 @@ from palpate_thesis.neural_identifier.network import STIFFENING
 from palpate_thesis.runs import Runs
 
 NUMBER = "model-tunes"
-TITLE, CAPTION = texts(NUMBER)
 PI = {"foam": {"kf": 1.0, "ki": 3.0}, "rubber": {"kf": 0.25, "ki": 1.5}}
 """The thesis' gains, under which the surface is identified."""
 PARAMETERS: Mapping[str, Experiment] = {
@@ -127,8 +125,7 @@ def input_slope(net, memory, i):
     return total
 
 
-@dataclass(frozen=True)
-class Tuned:
+class Tuned(NamedTuple):
     """One surface and seed: both models, and the responses under each."""
 
     forces: Array  # at which the slopes are looked at [N]

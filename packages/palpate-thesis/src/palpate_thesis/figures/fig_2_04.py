@@ -1,9 +1,8 @@
 """Figures 2.3 and 2.4: one joint under a neural network alone, the direct scheme."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +14,10 @@ from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
 from palpate_studies.metrics.window import SETTLE, rms
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
-from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.conditions import VARIED_SEEDS, by_condition, stops_holding
 from palpate_thesis.force_control.panels import across, dots_panel, panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 from palpate_thesis.one_joint import (
     JOINT_FRICTION,
     DirectIntegral,
@@ -30,11 +29,9 @@ from palpate_thesis.one_joint import (
 from palpate_thesis.runs import Runs
 
 NUMBER = "2.4"
-TITLE, CAPTION = texts(NUMBER)
 
 
-@dataclass(frozen=True)
-class JointWorld:
+class JointWorld(NamedTuple):
     """The joint's surface and friction."""
 
     surface: KelvinVoigt | StandardLinearSolid
@@ -73,8 +70,7 @@ FOLLOWS = (
 )
 
 
-@dataclass(frozen=True)
-class RunAfterStart:
+class RunAfterStart(NamedTuple):
     """How a run went from `FROM` on."""
 
     settled: float  # RMS error outside the steps [N]
@@ -88,8 +84,7 @@ class RunAfterStart:
         return self.settled <= LIMIT and self.off <= SHARE
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     record: dict[str, Array]
@@ -102,9 +97,7 @@ def run(runs: Runs) -> Data:
     """All worlds at one rate, all rates on two surfaces, and the plain integral of the same gain."""
     worlds: dict[str, JointWorld] = PARAMETERS["worlds"]  # type: ignore[assignment]
     two = {"foam": FOAM, "rubber": RUBBER}
-    pressed = {
-        name: runs.map(partial(by_network, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
-    }
+    pressed = by_condition(runs, worlds, lambda world, seed: by_network(world, RATE, seed), two)
     integral = {
         name: runs.map(partial(_integral, world), list(zip(pressed[name], runs.seeds, strict=True)))
         for name, world in two.items()
@@ -187,13 +180,11 @@ def plot(data: Data) -> Figure:
 
 
 def _rate_panel(axis: Axes, data: Data) -> None:
-    for (name, found), color in zip(data.rates.items(), style.SERIES[:2], strict=True):
-        axis.loglog(
-            RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name
-        )
-        for rate, v in zip(RATES, found, strict=True):
-            axis.plot([rate] * len(v), [p.settled for p in v], "o", color=color, markersize=3)
-    axis.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
+    for (name, found), color in zip(data.rates.items(), style.SERIES, strict=False):
+        settled = np.array([[p.settled for p in v] for v in found])
+        axis.loglog(RATES, np.median(settled, axis=1), color=color, linewidth=1.2, label=name)
+        axis.plot(np.repeat(RATES, VARIED_SEEDS), settled.ravel(), "o", color=color, markersize=3)
+    axis.axhline(LIMIT, **LIMIT_LINE)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle=":")
     axis.set(xlabel="learning rate", ylabel="RMS error [N]")
     axis.legend()
@@ -208,10 +199,6 @@ def _span(data: Data) -> tuple[float, float]:
         if all(p.follows for found in data.rates.values() for p in found[i])
     ]
     return (min(good), max(good)) if good else (float("nan"), float("nan"))
-
-
-def _seeds(runs: Runs, name: str) -> list[int]:
-    return list(runs.seeds if name in ("foam", "rubber") else runs.seeds[:VARIED_SEEDS])
 
 
 def _schedule() -> ForceSchedule:

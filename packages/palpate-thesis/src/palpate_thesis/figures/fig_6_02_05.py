@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -11,10 +11,10 @@ from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, ZERO, Axes, Figure
 from palpate_thesis.runs import Runs
 
 MOVING = 0.5
@@ -28,8 +28,7 @@ LEVEL, PLAUSIBLE = 0.10, 0.25
 """By what share K may differ from the thesis' level, and B from the surface's own."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data and criteria of a figure of the later slot."""
 
     shown: dict[str, Record]  # one press of each surface
@@ -157,7 +156,7 @@ def plot(data: Data, near: float) -> Figure:
             for press in data.shown.values()
         ]
         panels.calm_limits(axis, np.zeros(1), *curves)
-        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+        axis.axhline(0.0, **ZERO)
     _gaps(axes[6], data, near)
     _ratios(axes[7], data)
     return drawing
@@ -174,7 +173,7 @@ def _gaps(axis: Axes, data: Data, near: float) -> None:
     }
     panels.dots(axis, groups, panels.COLORS)
     for limit in (-100.0 * near, 100.0 * near):
-        axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.axvline(limit, **STATED)
     axis.set_xlabel(f"difference [%]; dotted: {100.0 * near:g} %")
 
 
@@ -201,9 +200,10 @@ def plausible(found: PressEstimates) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Later(Numbered):
+class Later:
     """The figure of one surface; `judged` is the last of its parameters, and the others are shown beside it."""
 
+    NUMBER: str
     PARAMETERS: Mapping[str, Experiment]
     judged: str  # of the parameters
     claim: str  # the beginning of its claims' names

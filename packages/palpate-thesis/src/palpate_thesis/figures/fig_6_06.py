@@ -1,13 +1,13 @@
 """Figure 6.6: the learning rate of the neural identifier."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import network
@@ -15,7 +15,6 @@ from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkPress
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.6"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = network.FOAM
 RATES = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 SHOWN = {1e-6: style.SERIES[0], 1e-5: style.SERIES[1], 1e-4: style.SERIES[2], 1e-2: style.SERIES[3]}
@@ -27,8 +26,7 @@ OTHERS = (25.0, 100.0)
 """Output amplitudes besides the chosen one, since the rate's meaning hangs on them [N]."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data of the figure: one press learned at several rates, and the times over seeds and conditions."""
 
     press: NetworkPress
@@ -45,11 +43,11 @@ def run(runs: Runs) -> Data:
     some = network.presses(runs, PARAMETERS, "foam")
     own = network.network_of(runs)
     starts = network.starts(runs)
-    curves = {rate: network.learn(some[0], replace(own, rate=rate), starts[0])[1] for rate in SHOWN}
+    curves = {rate: network.learn(some[0], own._replace(rate=rate), starts[0])[1] for rate in SHOWN}
     found = {a: _by_rate(runs, some, a, RATES) for a in (own.amplitude, *OTHERS)}
     conditions = network.varied_presses(runs, PARAMETERS, "foam")
     varied = {
-        name: {rate: network.answers(runs, few, replace(own, rate=rate), starts[:FEW]) for rate in SMALLER}
+        name: {rate: network.answers(runs, few, own._replace(rate=rate), starts[:FEW]) for rate in SMALLER}
         for name, few in conditions.items()
     }
     return Data(some[0], curves, found, varied, own.amplitude)
@@ -58,7 +56,7 @@ def run(runs: Runs) -> Data:
 def _by_rate(
     runs: Runs, some: Sequence[NetworkPress], amplitude: float, rates: Sequence[float]
 ) -> dict[float, list[NetworkAnswer]]:
-    choices = [replace(network.network_of(runs), amplitude=amplitude, rate=rate) for rate in rates]
+    choices = [network.network_of(runs)._replace(amplitude=amplitude, rate=rate) for rate in rates]
     return {choice.rate: found for choice, found in network.sweep(runs, some, choices).items()}
 
 

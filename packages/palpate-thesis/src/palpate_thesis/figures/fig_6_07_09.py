@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,9 +11,9 @@ from palpate.bench import Experiment
 from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Numbered, ThesisClaim
+from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.least_squares import panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, Axes, Figure
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.claims import SMALL, ClaimPart, Grounds, share
 from palpate_thesis.neural_identifier.network import (
@@ -33,8 +34,7 @@ CALM = 60
 NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
 
     press: NetworkPress  # that of the first noise seed
@@ -193,9 +193,10 @@ def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkFirstSeconds(Numbered):
+class NetworkFirstSeconds:
     """The figure of one surface."""
 
+    NUMBER: str
     PARAMETERS: Experiment
     surface: str
     parts: Sequence[ClaimPart]  # of the thesis' claims
@@ -232,7 +233,7 @@ class NetworkError(NetworkFirstSeconds):
         ):
             axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
             axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
-            axis.axvline(0.6, color=style.FAIL, linewidth=0.9, linestyle=":")
+            axis.axvline(0.6, **STATED)
             axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
             panels.set_title(axis, letter, title)
         for axis, learns, letter in ((axes[1], True, "c"), (axes[3], False, "d")):

@@ -1,8 +1,7 @@
 """Figure 6.15: position along the surface and angle under the neural controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from palpate.bench import load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import VARIED_SEEDS, rougher
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
@@ -18,7 +17,6 @@ from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.15"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-neural"), {"run.press": 15.0})
 SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
 VISIBLE = (0.5e-3, np.radians(0.2))
@@ -43,8 +41,7 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
 SOURCE = "fig. 6.15, sec. 6.3"
 
 
-@dataclass(frozen=True)
-class Errors:
+class Errors(NamedTuple):
     """True errors: at the switch to force control, and RMS over the window in contact, where they may change sign."""
 
     y_switch: float  # [m]
@@ -52,8 +49,7 @@ class Errors:
     phi: float  # [rad]
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     shown: Record

@@ -9,7 +9,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.force_control.tracking import Tracking
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 
 T = TypeVar("T")
 HELD: dict[str, Any] = {"color": style.OK, "s": 16, "linewidths": 0}
@@ -72,7 +72,7 @@ def dots_panel(
             places = [i for i, one in enumerate(runs) if holds(one) == good]
             axis.scatter(spot[places], [value(runs[i]) for i in places], **mark)
     if limit is not None:
-        axis.axhline(limit, color=style.INK, linewidth=1, linestyle="--")
+        axis.axhline(limit, **LIMIT_LINE)
     axis.set_xticks(range(len(found)), list(found))
     axis.set_xlim(-0.6, len(found) - 0.4)
     axis.set_ylim(bottom=0.0)

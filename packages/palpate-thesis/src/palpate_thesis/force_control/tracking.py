@@ -1,8 +1,7 @@
 """Common parts of the force-control figures: experiments, criterion of following, varied conditions."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -32,8 +31,7 @@ FOAM = with_values(load("foam-neural"), SHORT)
 RUBBER = with_values(load("rubber-neural"), SHORT)
 
 
-@dataclass(frozen=True)
-class Tracking:
+class Tracking(NamedTuple):
     """How the true force kept to the desired one within a window."""
 
     rms: float  # of the error, steps included [N]
@@ -125,17 +123,14 @@ def robustness(
     runs: Runs, experiment: Experiment, nominal: Sequence[T], measure: Callable[[Record], T]
 ) -> dict[str, list[T]]:
     """`measure` of each variation, the nominal case first."""
-    seeds = runs.seeds[:VARIED_SEEDS]
-    cases = [(name, e, seed) for seed in seeds for name, e in variations(experiment, seed).items()]
-    measured = runs.over([(e, seed) for _, e, seed in cases], measure)
-    found: dict[str, list[T]] = {"as\nchosen": list(nominal)}
-    for (name, _, _), one in zip(cases, measured, strict=True):
-        found.setdefault(name, []).append(one)
-    return found
+    cases: dict[str, list[tuple[Experiment, int]]] = {}
+    for seed in runs.seeds[:VARIED_SEEDS]:
+        for name, e in variations(experiment, seed).items():
+            cases.setdefault(name, []).append((e, seed))
+    return {"as\nchosen": list(nominal), **runs.map_each(lambda case: measure(runs.one(*case)), cases)}
 
 
-@dataclass(frozen=True)
-class Tracked:
+class Tracked(NamedTuple):
     """Data of a figure of force tracking."""
 
     shown: Record

@@ -1,7 +1,7 @@
 """A long run of the neural controller, with its network's weights looked at now and then."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ LOOK = 1000
 COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 
-@dataclass(frozen=True)
-class WeightsAtMoment:
+class WeightsAtMoment(NamedTuple):
     """The controller at a moment, and what went on since the look before."""
 
     t: float  # since contact [s]

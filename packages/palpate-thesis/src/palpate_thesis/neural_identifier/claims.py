@@ -1,8 +1,7 @@
 """Claims of the thesis about its neural identifier, part by part, each with its threshold and its numbers."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +19,7 @@ FOAM_BAND, RUBBER_BAND = 0.06, 0.15
 thesis' own are 10 % apart."""
 
 
-@dataclass(frozen=True)
-class Grounds:
+class Grounds(NamedTuple):
     """Data of a claim's verdict and note.
 
     Args:
@@ -41,8 +39,7 @@ class Grounds:
     starts: int
 
 
-@dataclass(frozen=True)
-class ClaimPart:
+class ClaimPart(NamedTuple):
     """One statement about one coefficient, or about the error: its number in one run, and whether it is true there."""
 
     suffix: str
