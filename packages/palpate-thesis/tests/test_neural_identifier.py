@@ -1,6 +1,5 @@
 """The figures of the neural identifier: what is measured, how it is judged, and that each figure stands."""
 
-
 import numpy as np
 import pytest
 

@@ -76,6 +76,11 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
 
 
+def on_one_line(name: str) -> str:
+    """A variation's name, which a figure breaks, for a sentence."""
+    return name.replace("\n", " ")
+
+
 class _Spread(list[Any]):
     """Values over the seeds, for a place of a text: "{error:N 2}" has their spread in newtons, to two digits.
 

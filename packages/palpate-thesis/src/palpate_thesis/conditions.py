@@ -4,14 +4,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment
-from palpate_thesis.claims import often
-from palpate_thesis.runs import Runs
+from palpate_thesis.claims import often, on_one_line
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 T = TypeVar("T")
 W = TypeVar("W")
-
-VARIED_SEEDS = 3
-"""Runs of each variation; the nominal case has all seeds."""
 
 SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
 """The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
@@ -26,6 +23,13 @@ RELAXING_FOAM = {
     }
 }
 RUBBER_SURFACE = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
+
+
+SURFACES: Mapping[str, Mapping[str, Any]] = {
+    "foam": {},
+    "rubber": RUBBER_SURFACE,
+    "relaxing\nfoam": RELAXING_FOAM,
+}
 
 
 def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
@@ -67,11 +71,6 @@ def by_condition(
         for name, world in worlds.items()
     }
     return runs.map_each(lambda case: work(*case), cases)
-
-
-def on_one_line(name: str) -> str:
-    """A variation's name, which a figure breaks, for a sentence."""
-    return name.replace("\n", " ")
 
 
 def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:

@@ -11,7 +11,11 @@ from palpate.bench.force_input import INTERRUPTED
 from palpate.bench.speed import cores
 from palpate.records import Record
 
-K, T = TypeVar("K"), TypeVar("T")
+K = TypeVar("K")
+T = TypeVar("T")
+
+VARIED_SEEDS = 3
+"""Runs of each variation; the nominal case has all seeds."""
 
 
 class HandChosen:

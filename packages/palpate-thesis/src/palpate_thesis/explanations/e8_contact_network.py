@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -228,25 +228,6 @@ def run(runs: Runs) -> Data:
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Recognising, surface by surface; and the time of an approach that is gentle enough."""
     quiet = [f for f, some in data.lower.items() if often(not a.early for a in some)]
-    return [*(_recognises(data, name, min(quiet, default=SWITCH)) for name in SURFACES), _efficient(data)]
-
-
-def _recognises(data: Data, name: str, quiet: float) -> ThesisClaim:
-    pairs = list(zip(data.found[name], data.by_switch[name], strict=True))
-    return claim(
-        f"{NUMBER}.{name}",
-        often(not a.early and a.felt <= HALF * b.felt for a, b in pairs),
-        surface=name,
-        felt=[a.felt for a, _ in pairs],
-        switched=[b.felt for _, b in pairs],
-        early=sum(a.early for a, _ in pairs),
-        runs=len(pairs),
-        half=HALF,
-        quiet=quiet,
-    )
-
-
-def _efficient(data: Data) -> ThesisClaim:
     gentle = {
         name: max((v for v, some in by.items() if often(a.most <= MOST for a in some)), default=np.nan)
         for name, by in data.constant.items()
@@ -255,24 +236,38 @@ def _efficient(data: Data) -> ThesisClaim:
         name: float(np.median([a.time for a in data.constant[name].get(v, [])] or [np.inf]))
         for name, v in gentle.items()
     }
-    own = {name: [a.time for a in some] for name, some in data.found.items()}
-    return claim(
-        f"{NUMBER}.efficient",
-        all(
-            often(a.most <= MOST and a.time <= HALF * times[name] for a in some)
-            for name, some in data.found.items()
+    return [
+        *(_recognises(data, name, min(quiet, default=SWITCH)) for name in SURFACES),
+        claim(
+            f"{NUMBER}.efficient",
+            all(
+                often(a.most <= MOST and a.time <= HALF * times[name] for a in some)
+                for name, some in data.found.items()
+            ),
+            **data.found,
+            gentle="; ".join(f"{n} {times[n]:.2g} s at {1e3 * v:.2g} mm/s" for n, v in gentle.items()),
+            thesis=float(np.median([a.time for a in data.constant["foam"][SPEEDS[0]]])),
+            half=HALF,
+            most=MOST,
+            stray=1e3 * STRAY,
+            gap=1e3 * GAP,
+            lessons=LESSONS,
         ),
-        foam=own["foam"],
-        rubber=own["rubber"],
-        gentle="; ".join(f"{n} {times[n]:.2g} s at {1e3 * v:.2g} mm/s" for n, v in gentle.items()),
-        foam_most=[a.most for a in data.found["foam"]],
-        rubber_most=[a.most for a in data.found["rubber"]],
-        thesis=float(np.median([a.time for a in data.constant["foam"][SPEEDS[0]]])),
+    ]
+
+
+def _recognises(data: Data, name: str, quiet: float) -> ThesisClaim:
+    pairs = list(zip(data.found[name], data.by_switch[name], strict=True))
+    return claim(
+        f"{NUMBER}.{name}",
+        often(not a.early and a.felt <= HALF * b.felt for a, b in pairs),
+        surface=name,
+        found=data.found[name],
+        switched=data.by_switch[name],
+        early=sum(a.early for a, _ in pairs),
+        runs=len(pairs),
         half=HALF,
-        most=MOST,
-        stray=1e3 * STRAY,
-        gap=1e3 * GAP,
-        lessons=LESSONS,
+        quiet=quiet,
     )
 
 
@@ -288,13 +283,9 @@ def plot(data: Data) -> Figure:
         grid[0][1].plot(since, record["force_measured"][near], color=color, linewidth=0.7, alpha=0.6)
         grid[0][1].plot(since, record["force"][near], color=color, linewidth=1.4, label=name)
         by = data.constant[name]
-        middle = [
-            [float(np.median([getattr(a, k) for a in some])) for some in by.values()]
-            for k in ("time", "most")
-        ]
-        grid[1][0].loglog(
-            *middle, "o-", color=color, linewidth=1.0, markersize=3, label=f"{name}, constant speeds"
-        )
+        times, most = np.median([[(a.time, a.most) for a in some] for some in by.values()], axis=1).T
+        line: Any = {"linewidth": 1.0, "markersize": 3, "label": f"{name}, constant speeds"}
+        grid[1][0].loglog(times, most, "o-", color=color, **line)
         own = data.found[name]
         grid[1][0].plot([a.time for a in own], [a.most for a in own], "x", color=color, markersize=6)
     grid[0][0].set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, 2.0))

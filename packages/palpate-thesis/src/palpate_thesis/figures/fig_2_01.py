@@ -14,16 +14,8 @@ from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
-from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    friction_and_pose,
-    on_one_line,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.look import Axes, Figure
@@ -79,7 +71,7 @@ class Data(NamedTuple):
 
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
-    surfaces = {"foam": {}, "rubber": RUBBER_SURFACE, "relaxing\nfoam": RELAXING_FOAM}
+    surfaces = SURFACES
     worlds = {n: with_values(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
 
     def both(e: Experiment, seed: int) -> BothLaws:
@@ -94,24 +86,31 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Problems of the original, and what leaving out the dynamics does."""
-    return [_problems(data), _dynamics(data)]
-
-
-def _problems(data: Data) -> ThesisClaim:
     reach = np.isfinite(data.growth)
     share = float((data.growth[reach] > GROWS).mean())
     always = float((data.any_gain[reach] > GROWS).mean())
     line = data.growth[np.argmin(np.abs(YS))]
-    return claim(
-        "original-hybrid.problems",
-        always > 0.0,
-        share=share,
-        postures=reach.sum(),
-        always=always,
-        fastest=np.nanmax(data.growth),
-        grows=GROWS,
-        occurs="it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too",
-    )
+    foam = data.varied["foam"]
+    return [
+        claim(
+            "original-hybrid.problems",
+            always > 0.0,
+            share=share,
+            postures=reach.sum(),
+            always=always,
+            fastest=np.nanmax(data.growth),
+            grows=GROWS,
+            occurs="it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too",
+        ),
+        claim(
+            "original-hybrid.dynamics",
+            often(p.worse for p in foam),
+            foam=foam,
+            worse=WORSE,
+            lost=_losses_in_words(data),
+            where=stops_holding(data.varied, lambda p: p.worse),
+        ),
+    ]
 
 
 def _losses_in_words(data: Data) -> str:
@@ -125,33 +124,14 @@ def _losses_in_words(data: Data) -> str:
     return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
 
 
-def _dynamics(data: Data) -> ThesisClaim:
-    foam = data.varied["foam"]
-    return claim(
-        "original-hybrid.dynamics",
-        often(p.worse for p in foam),
-        foam=foam,
-        worse=WORSE,
-        lost=_losses_in_words(data),
-        where=stops_holding(data.varied, lambda p: p.worse),
-    )
-
-
 def plot(data: Data) -> Figure:
     """Force and angle over time, the map, and the runs."""
     drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
     for row, name in zip(grid[:2], ("force", "phi"), strict=True):
         _over_time(across(row), data, name)
     _map_panel(drawing, grid[2][0], data)
-    dots_panel(
-        grid[2][1],
-        data.varied,
-        lambda p: 100 * p.phi,
-        lambda p: p.worse,
-        limit=100 * WORSE,
-        label="ratio [%]",
-        title="stray of the angle; a dot: worse in this and in overshoot",
-    )
+    dots_panel(grid[2][1], data.varied, lambda p: 100 * p.phi, lambda p: p.worse, 100 * WORSE)
+    grid[2][1].set(ylabel="ratio [%]", title="stray of the angle; a dot: worse in this and in overshoot")
     return drawing
 
 
@@ -176,8 +156,7 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     axis.plot([0.40, 0.49], [0.0, 0.0], color=style.SERIES[0], linewidth=2.5)
     words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8.5, "color": style.SERIES[0]}
     axis.annotate("experiments", (0.40, 0.0), (-22, -14), **words)
-    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axis.set_title("growth of the original")
+    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="growth of the original")
 
 
 def growth_over(gain: float, where: Mask) -> Array:

@@ -14,15 +14,7 @@ from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    friction_and_pose,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Change, Disturbance, run_with
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
@@ -104,17 +96,11 @@ def plot(data: Data) -> Figure:
 
 
 def _share_panel(axis: Axes, data: Data, name: str) -> None:
-    dots_panel(
-        axis,
-        data.varied,
-        lambda f: 100 * getattr(f, name),
-        lambda f: f.within(name),
-        limit=100.0,
-        label=f"{name} [%]",
-        title=(
-            f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
-            "target"
-        ),
+    dots_panel(axis, data.varied, lambda f: 100 * getattr(f, name), lambda f: f.within(name), 100.0)
+    axis.set(
+        ylabel=f"{name} [%]",
+        title=f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
+        "target",
     )
     values = [100 * getattr(f, name) for runs in data.varied.values() for f in runs]
     axis.set_ylim(min(0.0, 1.1 * min(values)), 1.1 * max(120.0, *values))
@@ -127,10 +113,10 @@ _FREE = "hardly any\nfriction"
 def _worlds() -> dict[str, Experiment]:
     return {
         "foam": PARAMETERS,
-        "rubber": with_values(PARAMETERS, RUBBER_SURFACE),
+        "rubber": with_values(PARAMETERS, SURFACES["rubber"]),
         _FREE: with_values(PARAMETERS, FREE),
         **{name: with_values(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
-        "relaxing\nfoam": with_values(PARAMETERS, RELAXING_FOAM),
+        "relaxing\nfoam": with_values(PARAMETERS, SURFACES["relaxing\nfoam"]),
     }
 
 

@@ -10,17 +10,8 @@ from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
-from palpate_thesis.claims import ThesisClaim, claim, often, spread
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    move_wall,
-    on_one_line,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line, spread
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, move_wall, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Disturbance, other_surface, run_with
 from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, following, slot, tracking
@@ -63,22 +54,31 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Surfaces, poses, a surface that changes, and whether it is the network that does it."""
-    return [_environment(data), _configuration(data), _network(data)]
-
-
-def _environment(data: Data) -> ThesisClaim:
     found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
-    return claim(
-        "self-tuning-robust.environment",
-        all(following(f) for f in found.values()),
-        described=describe(data.turned),
-        others=_how_many_follow(found),
-        follows=FOLLOWS,
-        fixed_kept=_count_following(data.fixed),
-        surfaces=len(data.fixed),
-        tuned_kept=_count_following(data.tuned),
-        where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
-    )
+    shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
+    return [
+        claim(
+            "self-tuning-robust.environment",
+            all(following(f) for f in found.values()),
+            described=describe(data.turned),
+            others=_how_many_follow(found),
+            follows=FOLLOWS,
+            fixed_kept=_count_following(data.fixed),
+            surfaces=len(data.fixed),
+            tuned_kept=_count_following(data.tuned),
+            where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
+        ),
+        _configuration(data),
+        claim(
+            "self-tuning-robust.tuning",
+            all(often(s <= BETTER for s in v) for v in shares.values()),
+            surfaces="; ".join(
+                f"{on_one_line(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items()
+            ),
+            better=BETTER,
+            where=stops_holding({n: _shares(data, n) for n in data.tuned}, lambda s: s <= BETTER),
+        ),
+    ]
 
 
 def _configuration(data: Data) -> ThesisClaim:
@@ -90,19 +90,6 @@ def _configuration(data: Data) -> ThesisClaim:
         follows=FOLLOWS,
         near=data.tuned["wall at\n0.40 m"],
         where=stops_holding(found, lambda f: f.follows),
-    )
-
-
-def _network(data: Data) -> ThesisClaim:
-    shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
-    return claim(
-        "self-tuning-robust.tuning",
-        all(often(s <= BETTER for s in v) for v in shares.values()),
-        surfaces="; ".join(
-            f"{on_one_line(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items()
-        ),
-        better=BETTER,
-        where=stops_holding({n: _shares(data, n) for n in data.tuned}, lambda s: s <= BETTER),
     )
 
 
@@ -124,12 +111,12 @@ def plot(data: Data) -> Figure:
         {"foam into\nrubber": data.turned, **data.tuned},
         lambda f: f.settled,
         lambda f: f.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title=(
-            "outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
-            "dashed: the limit"
-        ),
+        LIMIT,
+    )
+    dots.set(
+        ylabel="RMS error [N]",
+        title="outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
+        "dashed: the limit",
     )
     for at, runs in enumerate(data.fixed.values(), start=1):
         spot = at + np.linspace(-0.22, 0.22, len(runs))
@@ -146,10 +133,10 @@ _POSES = ("foam", "wall at\n0.40 m", "wall at\n0.49 m")
 def _worlds() -> dict[str, Experiment]:
     by: dict[str, Mapping[str, Any]] = {
         "foam": {},
-        "rubber": RUBBER_SURFACE,
+        "rubber": SURFACES["rubber"],
         "wall at\n0.40 m": move_wall(PARAMETERS, 0.40),
         "wall at\n0.49 m": move_wall(PARAMETERS, 0.49),
-        "relaxing\nfoam": RELAXING_FOAM,
+        "relaxing\nfoam": SURFACES["relaxing\nfoam"],
         "friction\nhalf": rougher(PARAMETERS, 0.5),
         "friction\ndouble": rougher(PARAMETERS, 2.0),
         "other\nweights": {"controller.weights_seed": 1},

@@ -204,13 +204,9 @@ def plot(data: Data) -> Figure:
     )
     style.legend(angle)
     shown = {f"{name}\n{s}": presses for name, found in data.found.items() for s, presses in found.items()}
-    dots_panel(
-        dots,
-        shown,
-        lambda one: min(one.rms_angle, GONE),
-        lambda one: one.perpendicular,
-        limit=WITHIN,
-        label="angle [degrees]",
+    dots_panel(dots, shown, lambda one: min(one.rms_angle, GONE), lambda one: one.perpendicular, WITHIN)
+    dots.set(
+        ylabel="angle [degrees]",
         title="in the last second, a mark each press; dashed: the limit; at 20 it has turned away",
     )
     return drawing

@@ -14,7 +14,7 @@ from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.panels import set_title
 from palpate_thesis.look import STATED, Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 NUMBER = "4.2"
 PARAMETERS = {
@@ -60,7 +60,7 @@ def run(runs: Runs) -> Data:
         shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
         switches=runs.by_name(PARAMETERS, switch_of),
         by_threshold=runs.by_name(thresholds, switch_of),
-        varied=runs.by_name(press_runs.conditions(foam), switch_of, press_runs.SWEPT_SEEDS),
+        varied=runs.by_name(press_runs.conditions(foam), switch_of, VARIED_SEEDS),
     )
 
 
@@ -77,47 +77,38 @@ def _around(record: Record) -> tuple[Array, Array]:
 def switch_of(record: Record) -> Switch:
     """The change-over of a run."""
     force = record["force_measured"]
-    return Switch(
-        true_force=float(record["force"][_start(record)]),
-        lost=bool((record["phase"] == LOST).any()),
-        last=float(force[-1000:].mean()),
-        most=float(force.max()),
-    )
+    lost = bool((record["phase"] == LOST).any())
+    return Switch(record["force"][_start(record)], lost, float(force[-1000:].mean()), float(force.max()))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The switch is clean, and 5 N is a threshold that noise does not reach."""
-    return [_clean(data), _threshold(data)]
-
-
-def _clean(data: Data) -> ThesisClaim:
     fails = press_runs.failing(data.varied, lambda s: s.clean)
-    return claim(
-        "switch-at-5N",
-        not press_runs.failing(data.switches, lambda s: s.clean),
-        **data.switches,
-        where=press_runs.where_it_fails(fails, len(data.varied)),
-        nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
-    )
+    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
+    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
+    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
+    return [
+        claim(
+            "switch-at-5N",
+            not press_runs.failing(data.switches, lambda s: s.clean),
+            **data.switches,
+            where=press_runs.where_it_fails(fails, len(data.varied)),
+            nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
+        ),
+        claim(
+            "switch-at-5N.threshold",
+            _false(chosen) == 0.0,
+            chosen=100 * _false(chosen),
+            listing=100 * _false(listing),
+            early=early,
+            enough=enough,
+        ),
+    ]
 
 
 def _false(some: Sequence[Switch]) -> float:
     """Share of the runs that were switched before anything was touched."""
     return sum(s.true_force <= 0.0 for s in some) / len(some)
-
-
-def _threshold(data: Data) -> ThesisClaim:
-    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
-    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
-    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
-    return claim(
-        "switch-at-5N.threshold",
-        _false(chosen) == 0.0,
-        chosen=100 * _false(chosen),
-        listing=100 * _false(listing),
-        early=early,
-        enough=enough,
-    )
 
 
 def plot(data: Data) -> Figure:

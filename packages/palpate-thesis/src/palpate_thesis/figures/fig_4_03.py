@@ -13,11 +13,11 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import SHORT, VARIED_SEEDS, rougher
+from palpate_thesis.conditions import SHORT, rougher
 from palpate_thesis.force_control.panels import across, panels
 from palpate_thesis.force_control.tracking import since_contact
 from palpate_thesis.look import LIMIT_LINE, Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 TICK = 1e-3
 """[s]"""
@@ -178,51 +178,43 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
-    return [_linear(data), _whole(data), _slow(data)]
-
-
-def _linear(data: Data) -> ThesisClaim:
     told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
-    return claim(
-        "force-loop-stable",
-        all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
-        limits=told,
-        near=NEAR,
-        tip=TIP,
-        needed=_least_damping(data),
-    )
-
-
-def _whole(data: Data) -> ThesisClaim:
+    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
     kept = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
     holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
-    return claim(
-        "force-loop-stable.whole-arm",
-        holds,
-        below=BELOW,
-        stable=", ".join(map(str, kept.values())),
-        runs=n,
-        above=ABOVE,
-        lost=", ".join(map(str, lost.values())),
-        shakes=SHAKES,
-        friction=friction,
-        stiffer=STIFFER[-1],
-    )
-
-
-def _slow(data: Data) -> ThesisClaim:
-    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
-    return claim(
-        "low-pass-destabilises",
-        all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
-        foam_slow=_text(slow[0]),
-        foam_fast=_text(fast[0]),
-        rubber_slow=_text(slow[1]),
-        rubber_fast=_text(fast[1]),
-    )
+    return [
+        claim(
+            "force-loop-stable",
+            all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
+            limits=told,
+            near=NEAR,
+            tip=TIP,
+            needed=_least_damping(data),
+        ),
+        claim(
+            "force-loop-stable.whole-arm",
+            holds,
+            below=BELOW,
+            stable=", ".join(map(str, kept.values())),
+            runs=n,
+            above=ABOVE,
+            lost=", ".join(map(str, lost.values())),
+            shakes=SHAKES,
+            friction=friction,
+            stiffer=STIFFER[-1],
+        ),
+        claim(
+            "low-pass-destabilises",
+            all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
+            foam_slow=_text(slow[0]),
+            foam_fast=_text(fast[0]),
+            rubber_slow=_text(slow[1]),
+            rubber_fast=_text(fast[1]),
+        ),
+    ]
 
 
 def plot(data: Data) -> Figure:

@@ -13,21 +13,13 @@ from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    VARIED_SEEDS,
-    friction_and_pose,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.conditions import SHORT, SURFACES, friction_and_pose, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Disturbance, desired_pose, run_with
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.least_squares.panels import calm_limits
 from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""
@@ -204,16 +196,10 @@ def plot(data: Data) -> Figure:
     handles, labels = grid[0][0].get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside upper right", ncols=4)
     dots = across(grid[3])
-    dots_panel(
-        dots,
-        data.varied,
-        lambda p: 100 * p.angle,
-        angle_kept,
-        limit=100 * HALF,
-        label="share [%]",
-        title=(
-            "the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half"
-        ),
+    dots_panel(dots, data.varied, lambda p: 100 * p.angle, angle_kept, 100 * HALF)
+    dots.set(
+        ylabel="share [%]",
+        title="the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half",
     )
     return drawing
 
@@ -264,8 +250,7 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
     worlds: dict[str, Mapping[str, Any]] = {
         "hardly any\nfriction": FREE,
         **friction_and_pose(PARAMETERS),
-        "rubber": RUBBER_SURFACE,
-        "relaxing\nfoam": RELAXING_FOAM,
+        **{name: changes for name, changes in SURFACES.items() if changes},
     }
     return {
         **{name: (with_values(PARAMETERS, changes), {}) for name, changes in worlds.items()},
@@ -275,6 +260,6 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
 
 
 def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Record]:
-    known = {"controller.stiffness": stiffness}
+    known: dict[str, Any] = {"controller.stiffness": stiffness}
     laws = zip(LAWS, (COUPLED, known, {**known, **PRINTED}), strict=True)
     return {name: slot(press_with_jumps(with_values(world, law), seed)) for name, law in laws}

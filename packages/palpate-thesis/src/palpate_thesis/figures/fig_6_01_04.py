@@ -15,7 +15,7 @@ from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.look import STATED, Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 COVARIANCES = 10.0 ** np.arange(2, 13)
 """P(0) that are tried; the thesis does not give it."""
@@ -50,7 +50,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
 def _settle_by_start(runs: Runs, experiment: Experiment) -> dict[tuple[str, str], Array]:
     """Time to settle, shape (number of P(0), 3), the middle of a few seeds."""
     (each,) = runs.by_name(
-        {"": experiment}, lambda record: _by_start(press_runs.contact(record)), press_runs.SWEPT_SEEDS
+        {"": experiment}, lambda record: _by_start(press_runs.contact(record)), VARIED_SEEDS
     ).values()
     return {key: np.median([one[key] for one in each], axis=0) for key in each[0]}
 

@@ -70,7 +70,25 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Signs of M and B, K, and all at once."""
-    return [*_raw_signs(data), _together(data)]
+    counts = {name: sum(row) for name, row in data.table.items()}
+    most = max(counts.values())
+    best = next(name for name, count in counts.items() if count == most)
+    lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
+    lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
+    return [
+        *_raw_signs(data),
+        claim(
+            "least-squares-one-foam",
+            most == len(SHOWS),
+            most=most,
+            sentences=len(SHOWS),
+            best=best,
+            lack=lack,
+            such=sum(c == most for c in counts.values()),
+            foams=len(counts),
+            names=", ".join(SHOWS),
+        ),
+    ]
 
 
 def _count(data: Data, *what: str) -> str:
@@ -95,25 +113,6 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
         )
         for key, (unit, shown, measure) in raw.items()
     ]
-
-
-def _together(data: Data) -> ThesisClaim:
-    counts = {name: sum(row) for name, row in data.table.items()}
-    most = max(counts.values())
-    best = next(name for name, count in counts.items() if count == most)
-    lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
-    lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
-    return claim(
-        "least-squares-one-foam",
-        most == len(SHOWS),
-        most=most,
-        sentences=len(SHOWS),
-        best=best,
-        lack=lack,
-        such=sum(c == most for c in counts.values()),
-        foams=len(counts),
-        names=", ".join(SHOWS),
-    )
 
 
 def plot(data: Data) -> Figure:

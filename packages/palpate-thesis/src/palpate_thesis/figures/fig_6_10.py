@@ -63,13 +63,9 @@ def plot(data: Data) -> Figure:
     """Two cycles, and the ends of the intervals of all runs."""
     drawing, ((force,), (dots,)) = panels([3.2, 2.0])
     force_panel(force, data.shown)
-    dots_panel(
-        dots,
-        data.varied,
-        lambda e: abs(e.high),
-        misses,
-        limit=20.0 * SHARE,
-        label="error at 20 N [N]",
+    dots_panel(dots, data.varied, lambda e: abs(e.high), misses, 20.0 * SHARE)
+    dots.set(
+        ylabel="error at 20 N [N]",
         title="end of the 20 N intervals, a dot misses both levels, as claimed, a cross does not; dashed: 10 %",
     )
     return drawing

@@ -56,11 +56,9 @@ class Data(NamedTuple):
 def run(runs: Runs) -> Data:
     """190 s of contact; on the other foam and with the plain integral controller as well."""
     both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), course_of(record)))
-    courses = {"foam": [course for _, course in both]}
-    seeds = runs.seeds[:2]
-    for name, changes in OTHERS.items():
-        courses[name] = runs.over([(with_values(PARAMETERS, changes), seed) for seed in seeds], course_of)
-    return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
+    nominal, courses = zip(*both, strict=True)
+    others = runs.by_name({n: with_values(PARAMETERS, by) for n, by in OTHERS.items()}, course_of, 2)
+    return Data(slot(runs.one(PARAMETERS), *SHOWN), [*nominal], {"foam": [*courses], **others})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -95,12 +93,8 @@ def plot(data: Data) -> Figure:
             if one.lost is not None and len(t):
                 course.plot(t[-1], one.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
     course.axhline(LIMIT, **LIMIT_LINE, label="limit of following")
-    course.set(
-        xlabel="time since contact [s]",
-        ylabel="RMS error outside steps [N]",
-        ylim=(0.0, None),
-        xlim=(0.0, None),
-    )
+    course.set(xlabel="time since contact [s]", ylabel="RMS error outside steps [N]")
+    course.set(xlim=(0.0, None), ylim=(0.0, None))
     style.legend(course)
     return drawing
 

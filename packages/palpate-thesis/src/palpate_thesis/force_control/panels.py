@@ -60,10 +60,7 @@ def dots_panel(
     found: Mapping[str, Sequence[T]],
     value: Callable[[T], float],
     holds: Callable[[T], bool],
-    *,
     limit: float | None,
-    label: str,
-    title: str = "",
 ) -> None:
     """One mark per run, by variation: a dot if the claim is true, a cross if not."""
     for at, runs in enumerate(found.values()):
@@ -74,24 +71,15 @@ def dots_panel(
     if limit is not None:
         axis.axhline(limit, **LIMIT_LINE)
     axis.set_xticks(range(len(found)), list(found))
-    axis.set_xlim(-0.6, len(found) - 0.4)
-    axis.set_ylim(bottom=0.0)
-    axis.set_ylabel(label)
+    axis.set(xlim=(-0.6, len(found) - 0.4), ylim=(0.0, None))
     axis.grid(visible=False, axis="x")
-    axis.set_title(title)
 
 
 def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None:
     """RMS error outside the steps, by variation."""
-    dots_panel(
-        axis,
-        found,
-        lambda one: one.settled,
-        lambda one: one.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title="outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit",
-    )
+    dots_panel(axis, found, lambda one: one.settled, lambda one: one.follows, LIMIT)
+    title = "outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit"
+    axis.set(ylabel="RMS error [N]", title=title)
 
 
 def legend_inside(axis: Axes, **options: object) -> None:

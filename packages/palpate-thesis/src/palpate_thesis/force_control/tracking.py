@@ -14,8 +14,8 @@ from palpate_studies.metrics import Window
 from palpate_studies.metrics.following import LIMIT, SHARE, interval_error
 from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import often, spread
-from palpate_thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
-from palpate_thesis.runs import Runs
+from palpate_thesis.conditions import RELAXING_FOAM, SHORT, friction_and_pose
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 T = TypeVar("T")
 
@@ -69,14 +69,9 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
             return NEVER
         if not len(look.error):
             return Tracking(np.nan, np.nan, np.nan, np.nan, losses(record))
-        off = interval_error(look)
-        return Tracking(
-            rms(look.error),
-            rms(look.after_steps),
-            np.nan if off is None else off,
-            float(look["saturated2"].mean()),
-            losses(record),
-        )
+        off, saturated = interval_error(look), float(look["saturated2"].mean())
+        off = np.nan if off is None else off
+        return Tracking(rms(look.error), rms(look.after_steps), off, saturated, losses(record))
 
     return measure
 

@@ -65,8 +65,8 @@ def watch(
     return None if march.contact is not None else float("nan")
 
 
-POSES, TORQUE1, TORQUES = slice(1, 7), slice(7, 8), slice(7, 10)
-"""Columns of the hidden weights of the 9-12-3 network: from both poses, from motor 1's torque, from all torques."""
+HELD = {"poses": slice(1, 7), "motor 1's torque": slice(7, 8), "all torques": slice(7, 10)}
+"""Columns of the hidden weights of the 9-12-3 network, by where they come from."""
 HOLD = 20
 """Ticks after which weights that are held are set back."""
 

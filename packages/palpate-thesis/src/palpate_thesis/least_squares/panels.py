@@ -1,6 +1,7 @@
 """The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -96,13 +97,7 @@ def dots(axis: Axes, groups: Mapping[str, Mapping[str, list[float]]], colors: Ma
         offset = 0.22 * (shift - (len(groups) - 1) / 2)
         for i, name in enumerate(rows):
             values = group.get(name, [])
-            axis.plot(
-                values,
-                np.full(len(values), i + offset),
-                "o",
-                color=colors[label],
-                markersize=3.5,
-                label=label if i == 0 else None,
-            )
+            mark: Any = {"color": colors[label], "markersize": 3.5, "label": None if i else label}
+            axis.plot(values, np.full(len(values), i + offset), "o", **mark)
     axis.set_yticks(range(len(rows)), rows)
     axis.invert_yaxis()

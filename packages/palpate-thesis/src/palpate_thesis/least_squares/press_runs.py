@@ -10,7 +10,7 @@ from palpate.bench import Experiment, load, with_values
 from palpate.bench.force_input import CONTACT
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall, rougher
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 T = TypeVar("T")
 
@@ -47,7 +47,6 @@ COLUMNS = (
     *("vx_raw", "ax_raw", "ax_measured", "penetration"),
     *(f"{key}_{front}" for front in ("thesis", "raw", "matched") for key in "MBK"),
 )
-SWEPT_SEEDS = 3
 
 
 def contact(record: Record) -> Record:
@@ -170,10 +169,10 @@ def numbers_of(record: Record) -> PressEstimates:
 
 def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[PressEstimates]]:
     """Results of the presses of each experiment, over the first few seeds."""
-    return runs.by_name(experiments, numbers_of, SWEPT_SEEDS)
+    return runs.by_name(experiments, numbers_of, VARIED_SEEDS)
 
 
-def median(values: Sequence[float]) -> float:
+def median(values: Sequence[float] | Array) -> float:
     """The middle one, without those that have no value."""
     return float(np.nanmedian(np.asarray(values, dtype=float)))
 

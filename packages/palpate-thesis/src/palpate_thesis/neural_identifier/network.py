@@ -152,12 +152,12 @@ class NetworkAnswer(NamedTuple):
 def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAnswer:
     """Lets one network learn from one press."""
     probe, answers = learn(press, choice, start)
-    found = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    settled = (press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
+    K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
+    k, b, m = (press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
     asked = probe.probe()
     last = asked.force_at_zero, tangent(probe, press.rest), bool(asked.warnings)
     squares_B, gone = float(press.squares[-1, 1]), error_gone(answers[:, 3])
-    return NetworkAnswer(*found, press.ratio, squares_B, *settled, gone, *last)
+    return NetworkAnswer(K, B, M, press.ratio, squares_B, k, b, m, gone, *last)
 
 
 def tangent(probe: NeuralProbe, x: float) -> float:
