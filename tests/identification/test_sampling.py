@@ -83,5 +83,7 @@ def test_a_hold_is_no_end_of_the_position(late):
     t = np.arange(4000) / 1000
     depth = np.interp(t, [0.5, 0.8, 3.0, 3.3], [-1e-3, 3e-3, 3e-3, -1e-3])
     relaxed = 1 + 0.5 * np.exp(-np.maximum(t - 0.8, 0) / 0.7)
-    force = np.roll(np.maximum(2000 * depth, 0) * relaxed, late) + np.random.default_rng(0).normal(0, 0.02, len(t))
+    force = np.roll(np.maximum(2000 * depth, 0) * relaxed, late) + np.random.default_rng(0).normal(
+        0, 0.02, len(t)
+    )
     assert not past_end(depth, force).any()

@@ -256,7 +256,9 @@ def past_end(position: Array, force: Array) -> Rows:
             first, *own, last = way * force[begin:end]
             inside, quarter = np.array(own), (end - begin + 3) // 4
             beyond = [float(inside.mean()) - at for at in (first, last)]
-            near = [float(part.mean()) - at for part, at in ((inside[:quarter], first), (inside[-quarter:], last))]
+            near = [
+                float(part.mean()) - at for part, at in ((inside[:quarter], first), (inside[-quarter:], last))
+            ]
             clear = min(beyond) > _MORE * noise * (1 + 1 / len(own)) ** 0.5
             past[begin:end] = clear and all(n > _FLANK * b for n, b in zip(near, beyond, strict=True))
     return past

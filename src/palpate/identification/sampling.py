@@ -310,8 +310,8 @@ def _leave_saturated(
     stuck, past = at_limit(f, x, _far_end(f)), past_end(x, f)
     for name, values, at, use in (("force", f, stuck, use_force), ("position", x, past, use_position)):
         if at.any():
-            text = f"the {name} rests at its extreme value {values[at][0]:.6g} for {int(at.sum())} rows; they are left out"
-            warnings.append(Warn(Code.SATURATED, text))
+            rests = f"the {name} rests at its extreme value {values[at][0]:.6g}"
+            warnings.append(Warn(Code.SATURATED, f"{rests} for {int(at.sum())} rows; they are left out"))
             use[rows[at]] = False
 
 
