@@ -13,7 +13,7 @@ laws: list[Callable[..., Any]] = []
 foreign_laws: list[Callable[..., Any]] = []
 parts: dict[type, None] = {}
 stored: dict[Callable[..., Any], tuple[type, bool]] = {}
-"""Functions that read (true), or write, a part's numbers in an array: `palpate._jit.stored`."""
+"""Functions that read (true), or write, a part's numbers in an array: `palpate._jit.overloads`."""
 foreign_files: set[Path] = set()
 """Sources of the user's plug-ins, and what they import from beside them."""
 PACKAGE = Path(__file__).resolve().parent.parent

@@ -71,7 +71,7 @@ def uncompilable(loop: Loop, state: LoopState) -> str:
     """Which method of the user's parts does not compile, and why; "" if all do."""
     import numba
 
-    from palpate._jit.compiler_message import compiled_alone
+    from palpate._jit.kernels import compiled_alone
 
     for one in calls(loop, state):
         returned, why = compiled_alone(getattr(type(one.part), one.method), one.part, *one.arguments)
