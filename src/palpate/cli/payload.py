@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 from palpate.cli._program import print_result
-from palpate.cli.options.arm import FrameOptions
 from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, si
 from palpate.errors import InputError
 from palpate.files import write_text

@@ -180,8 +180,8 @@ def _draw(
 
 def _identify(record: Path) -> tuple[Identification | None, str]:
     """The identification of the record by `palpate identify`, or the reason for its absence."""
-    from palpate.cli.identify import ModelOptions
-    from palpate.cli.one_log import OneLog
+    from palpate.cli.identify import OneLog
+    from palpate.cli.options.log import ModelOptions
 
     try:
         return OneLog(ModelOptions()).identification(record)[0], ""

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._streams import notice_signals
-from palpate.cli.identify import ModelOptions
-from palpate.cli.one_log import OneLog
-from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.identify import OneLog
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
 from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
 from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
