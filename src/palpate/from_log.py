@@ -19,7 +19,7 @@ from palpate.contact_frame import (
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification, identify
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.logs.many import log_of
+from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, measured_by
 from palpate.logs.signals import Signals, read_as

@@ -262,7 +262,7 @@ class CovariateOptions:
 
     def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
         """One number of each log, by the covariate's name."""
-        from palpate.logs.many import read_covariates
+        from palpate.logs.formats import read_covariates
 
         if self.covariates is not None and not self.covariate:
             raise InputError(
@@ -328,7 +328,7 @@ def identify(
 
 def _identify(logs: tuple[Path, ...], asked: OneLog, beside: CovariateOptions, output: IdentifyOutput) -> int:
     """Identify one log, or many together."""
-    from palpate.logs.many import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
+    from palpate.logs.formats import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
 
     if not logs:
         raise InputError(
