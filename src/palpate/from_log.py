@@ -8,14 +8,9 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from palpate.contact_frame import (
-    ArmDynamics,
-    ContactFrame,
-    Payload,
-    identify_contact,
-    load_payload,
-    robot_stiffness,
-)
+from palpate.contact_frame.arm import ArmDynamics, identify_contact, robot_stiffness
+from palpate.contact_frame.load import Payload, load_payload
+from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification, identify
 from palpate.identification.indenter import Indenter, with_modulus

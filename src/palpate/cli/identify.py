@@ -62,7 +62,7 @@ class OneLog:
 
     def identification_along(self, log: Path) -> tuple[Identification, Record, Source]:
         """The same, with the force and the position along the normal."""
-        from palpate.contact_frame import describe
+        from palpate.contact_frame.arm import describe
         from palpate.report.identification.words import Source, sha256_of
 
         found, along = self.identifier.identify(log)
@@ -73,7 +73,7 @@ class OneLog:
     @property
     def identifier(self) -> LogIdentifier:
         """The options, as the library takes them."""
-        from palpate.contact_frame import ContactFrame
+        from palpate.contact_frame.signals_in_base import ContactFrame
         from palpate.from_log import LogIdentifier
 
         return LogIdentifier(

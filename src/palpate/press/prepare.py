@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.contact_frame import Payload
+from palpate.contact_frame.load import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor

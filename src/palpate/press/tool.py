@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.arrays import Array
-from palpate.contact_frame import Payload
+from palpate.contact_frame.load import Payload
 from palpate.contact_frame.tool_payload import side_of
 from palpate.press.cell import NO_TOOL, HeldTool
 from palpate.robots.serial.chain import spread_of

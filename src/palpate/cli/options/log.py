@@ -14,7 +14,9 @@ from palpate.errors import InputError
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import ArmDynamics, ContactFrame, Payload
+    from palpate.contact_frame.arm import ArmDynamics
+    from palpate.contact_frame.load import Payload
+    from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.identification.indenter import Indenter
 
 
@@ -69,7 +71,7 @@ class FrameOptions:
 
     def frame(self, hung: Payload | None = None) -> ContactFrame | None:
         """The contact frame; None if not given."""
-        from palpate.contact_frame import ContactFrame
+        from palpate.contact_frame.signals_in_base import ContactFrame
 
         if self == FrameOptions() and hung is None:
             return None
@@ -116,13 +118,13 @@ class ArmOptions:
 
     def weighed_tool(self) -> Payload | None:
         """The payload on the sensor, if it was weighed."""
-        from palpate.contact_frame import load_payload
+        from palpate.contact_frame.load import load_payload
 
         return None if self.payload is None else load_payload(self.payload)
 
     def arm(self) -> ArmDynamics:
         """The arm as given; a press on a wall is another log."""
-        from palpate.contact_frame import ArmDynamics
+        from palpate.contact_frame.arm import ArmDynamics
 
         if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
             raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
