@@ -13,9 +13,24 @@ from collections.abc import Callable, Iterator
 from itertools import repeat
 from typing import Any, get_type_hints
 
-from palpate import _vector
 from palpate._jit.inline_compiler import inside
 from palpate._jit.registry import parts, stored
+from palpate._vector import (
+    METHODS,
+    Vec3,
+    angular,
+    atan2,
+    clip,
+    cos,
+    exp,
+    linear,
+    outer,
+    sign,
+    sin,
+    sqrt,
+    trace,
+    widen,
+)
 
 
 @functools.cache
@@ -47,7 +62,7 @@ def _operators() -> None:
         _overload(getattr(operator, f"i{name}"))(_binary(name))  # a += b is a = a + b on values
     _overload_method_of_first(operator.neg, "__neg__", "a")
     _overload_method_of_first(abs, "__abs__", "a")
-    for function, name in _vector.METHODS.items():
+    for function, name in METHODS.items():
         _overload_method_of_first(function, name, *inspect.signature(function).parameters)
     _scalar_functions()
 
@@ -94,15 +109,15 @@ def _scalar_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
-    numbers(_vector.linear, lambda b: b)
-    numbers(_vector.angular, lambda b: b)
-    numbers(_vector.exp, lambda a: math.exp(a))
-    numbers(_vector.sqrt, lambda a: math.sqrt(a))
-    numbers(_vector.sin, lambda a: math.sin(a))
-    numbers(_vector.cos, lambda a: math.cos(a))
-    numbers(_vector.atan2, lambda y, x: math.atan2(y, x))
-    numbers(_vector.sign, lambda a: float((a > 0.0) - (a < 0.0)))
-    numbers(_vector.clip, lambda a, limit: min(max(a, -limit), limit))
+    numbers(linear, lambda b: b)
+    numbers(angular, lambda b: b)
+    numbers(exp, lambda a: math.exp(a))
+    numbers(sqrt, lambda a: math.sqrt(a))
+    numbers(sin, lambda a: math.sin(a))
+    numbers(cos, lambda a: math.cos(a))
+    numbers(atan2, lambda y, x: math.atan2(y, x))
+    numbers(sign, lambda a: float((a > 0.0) - (a < 0.0)))
+    numbers(clip, lambda a, limit: min(max(a, -limit), limit))
     _widen()
     _array_functions()
 
@@ -119,17 +134,17 @@ def _array_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
-    arrays(_vector.outer, lambda a, b: np.expand_dims(a, 1) * b)
-    arrays(_vector.trace, lambda A: np.trace(A))
-    arrays(_vector.exp, lambda a: np.exp(a))
+    arrays(outer, lambda a, b: np.expand_dims(a, 1) * b)
+    arrays(trace, lambda A: np.trace(A))
+    arrays(exp, lambda a: np.exp(a))
 
 
 def _widen() -> None:
     from numba import types
 
-    vector = _vector.Vec3
+    vector = Vec3
 
-    @_overload(_vector.widen)
+    @_overload(widen)
     def typer(b: Any) -> Any:
         if _is_part(b):
             return lambda b: b

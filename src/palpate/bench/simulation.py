@@ -13,8 +13,9 @@ import numpy as np
 from palpate._jit import NotCompiled
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
-from palpate.bench.force_input import COLUMNS, CONTACT
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import ALONG_X, Loop, LoopState, compiled_march, march, tick
+from palpate.bench.summary import CONTACT
 from palpate.environments.surface_state import touch
 from palpate.errors import PartError
 from palpate.plugins import reason

@@ -79,7 +79,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.force_input import DONE, INTERRUPTED
+    from palpate.bench.summary import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -124,9 +124,9 @@ def _run(
     interrupted: Callable[[], bool],
 ) -> _Ran:
     """Runs and writes the folder of results."""
-    from palpate.bench import summarise
     from palpate.bench.one_direction import OneDirection
-    from palpate.logs import write_record
+    from palpate.bench.summary import summarise
+    from palpate.logs.tables.parquet import write_record
 
     with fresh_folder(folder, replace=output.replace) as fresh:
         command = printable(f"palpate run {shlex.quote(asked.name)} --seed {asked.seed}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate._vector import ZERO3, Vec3, Vec6
 from palpate.arrays import Array
-from palpate.bench.force_input import (
+from palpate.bench.summary import (
     APPROACH,
     CONTACT,
     DIVERGED,
@@ -24,7 +24,7 @@ from palpate.bench.force_input import (
 from palpate.controllers import Hybrid, Impedance, ProportionalIntegral, ResolvedAcceleration
 from palpate.controllers.proportional_integral import integral_gain
 from palpate.errors import InputError, unknown
-from palpate.force import ForceLoop
+from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains
 from palpate.press.sequence import Action, CautiousDriver, Plan, PressDriver, PressSequence, Tick, TipSample
 from palpate.press.setting import Place

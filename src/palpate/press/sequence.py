@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
-from palpate.bench.force_input import APPROACH, CONTACT, LOST
+from palpate.bench.summary import APPROACH, CONTACT, LOST
 from palpate.errors import InputError
-from palpate.force import ForceLoop, SlidingLoop
+from palpate.force.force_loop import ForceLoop
 from palpate.force.guard import BEYOND, DRIFTS, LATE, SWINGS, TROUBLES
 from palpate.force.sliding import slide_state
+from palpate.force.sliding.sliding_loop import SlidingLoop
 
 _STEPS = 6
 """Down and up again, three times."""

@@ -11,7 +11,7 @@ import numpy as np
 from palpate._jit import BoundKernel
 from palpate._vector import ZERO3, Mat3, Vec6
 from palpate.arrays import Array
-from palpate.bench.given_motion import rest_for
+from palpate.environments.surface import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
-from palpate.bench.summary import WINDOW, force_figures, losses
+from palpate.bench.summary import CONTACT, WINDOW, force_figures, losses
 from palpate.contact_frame.arm import identify_contact
 from palpate.contact_frame.load import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt

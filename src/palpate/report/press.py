@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.files import write_text
 from palpate.identification.uncertainty import Verdict
 from palpate.press.setting import Place

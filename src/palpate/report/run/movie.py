@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.errors import InputError
 from palpate.files import MADE, check_place, whole
 from palpate.records import Record
