@@ -106,7 +106,7 @@ def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     from dataclasses import replace as changed
 
     from palpate.logs.tables.parquet import write_record
-    from palpate.press.summary import summarise
+    from palpate.press.pressing import summarise
     from palpate.report.press import write_report
 
     record = changed(record, meta={**record.meta, "command": printable(command())})

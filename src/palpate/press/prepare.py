@@ -14,13 +14,10 @@ from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
 from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
-from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, driver_of, press
-from palpate.press.sequence import Plan, plan_for
-from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
+from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Asked, Progress, driver_of, press
+from palpate.press.sequence import SURE, Plan, check_drift, check_range, fitting, noise_and_drift, plan_for
+from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.summary import Asked
-from palpate.press.tare import SURE, check_drift, check_range, fitting, noise_and_drift
-from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
