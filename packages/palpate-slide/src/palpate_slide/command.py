@@ -157,7 +157,7 @@ class SlideOptions(SlideLimits):
     def tool(self) -> HeldTip | None:
         """The tool that is kept perpendicular; None for one that does not turn."""
         from palpate.contact_frame import load_payload
-        from palpate.press.tool import held_tool
+        from palpate.press.setting import held_tool
         from palpate_slide.jointed_arm import HeldTip
 
         if self.turn is None:
