@@ -150,6 +150,7 @@ class WorkingPoint(Readable):
         prediction95: interval for the same measured once more; None if it was measured once.
         from_surface: whether the depth counts from the surface, which free motion shows; else from the middle of the
             motion.
+        each: stiffness of each press, in the order of time.
     """
 
     stiffness: Parameter
@@ -159,6 +160,13 @@ class WorkingPoint(Readable):
     source: str
     prediction95: tuple[float, float] | None = None
     from_surface: bool = True
+    each: tuple[float, ...] = ()
+
+    @property
+    def differs(self) -> bool:
+        """Whether the presses differ by so much that one stiffness does not describe them."""
+        differ = next(iter(self.stiffness.budget), None) == "repetition" and len(self.each) > 1
+        return differ and self.stiffness.verdict is not Verdict.IDENTIFIED
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -169,6 +177,7 @@ class WorkingPoint(Readable):
             "depth_m": self.depth_m,
             "frequency_Hz": self.frequency_Hz,
             "source": self.source,
+            "each": list(self.each),
         }
 
 

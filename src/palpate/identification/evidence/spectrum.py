@@ -286,7 +286,7 @@ def point_of(found: Slopes, source: str, problem: Problem, options: Options, uni
     interval = None if again is None else (value - again, value + again)
     return WorkingPoint(
         _judge(found.stiffness, options, unit), found.force, found.depth, 0.25 / found.rise, source, interval,
-        not problem.contacts.bonded,
+        not problem.contacts.bonded, found.each if source == "press" else (),
     )  # fmt: skip
 
 

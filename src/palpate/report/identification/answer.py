@@ -17,6 +17,7 @@ from palpate.report.identification import details, figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.words import (
     ADVICE,
+    APART,
     CALLED,
     MARKS,
     STYLES,
@@ -26,6 +27,7 @@ from palpate.report.identification.words import (
     as_json,
     behind_the_arm,
     by_the_model,
+    each_press,
     first_reason,
     full_number,
     interval,
@@ -187,6 +189,12 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     if behind_the_arm(found):
         what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
         detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
+    elif point.differs:
+        text = f"{each_press(point)}   stiffness of each press   "
+        line = Text(text, style="bold").append("? they differ", style=STYLES[own.verdict])
+        yield line.append(printable(f"        {name}") if name else "")
+        yield Text(printable(f"   {at}: {APART}."))
+        return
     elif by_the_model(found):
         own, what = found.parameters["K"], f"stiffness by the model {found.model}"
         mark = _IN_DOUBT if unit_warnings(found) else _mark(own)

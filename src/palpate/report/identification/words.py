@@ -88,6 +88,8 @@ def sentence(found: Identification) -> str:
         return (
             by_model if own.value is None else f"{by_model} Without a model it is {full_number(own)} {where}."
         )
+    if point.differs:
+        return f"{len(point.each)} presses differ, {each_press(point)} {where}; {APART}."
     if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
         lost = _loss(found, point)
         start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
@@ -100,6 +102,16 @@ def sentence(found: Identification) -> str:
         )
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
     return f"The stiffness is {full_number(own)}{only} {where}; {_mostly(limit)}."
+
+
+APART = "to identify one alone, give --start and --end"
+_LISTED = 5
+
+
+def each_press(point: WorkingPoint) -> str:
+    """The stiffness of each press, in the order of time; of many, of the first."""
+    more = ", ..." if len(point.each) > _LISTED else ""
+    return ", ".join(quantity(own, point.stiffness.unit) for own in point.each[:_LISTED]) + more
 
 
 def _known_by_model(found: Identification) -> str | None:
