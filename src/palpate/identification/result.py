@@ -151,6 +151,7 @@ class WorkingPoint(Readable):
         from_surface: whether the depth counts from the surface, which free motion shows; else from the middle of the
             motion.
         each: stiffness of each press, in the order of time.
+        differs: whether these lie farther apart than the tolerance, and it is not identified for that.
     """
 
     stiffness: Parameter
@@ -161,12 +162,7 @@ class WorkingPoint(Readable):
     prediction95: tuple[float, float] | None = None
     from_surface: bool = True
     each: tuple[float, ...] = ()
-
-    @property
-    def differs(self) -> bool:
-        """Whether the presses differ by so much that one stiffness does not describe them."""
-        differ = next(iter(self.stiffness.budget), None) == "repetition" and len(self.each) > 1
-        return differ and self.stiffness.verdict is not Verdict.IDENTIFIED
+    differs: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""

@@ -47,7 +47,8 @@ for another has 1.5, half a sine 1.9."""
 _STILL = 0.1
 """Share of a stroke's mean speed below which a part of it rests."""
 _SHARE = 0.8
-"""Share of all the way of the probe that goes in strokes, of a press: else something shakes it as well."""
+"""Share of the probe's way, in or out, that goes in strokes, of a press: else something shakes it as well. A return may
+be at any speed."""
 _SEEN = 8.0
 """Deviations of the noise that a way must exceed to be one."""
 
@@ -85,8 +86,8 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
         return ()
     steady = [_steady(x, a, b, least) for a, b in pairwise(_turns(x, _STROKE * reach))]
     ends = [own for own in steady if own is not None]
-    whole = float(np.abs(np.diff(x[_turns(x, least)])).sum())
-    if sum(abs(float(x[b] - x[a])) for a, b in ends) < _SHARE * whole:
+    whole, made = np.diff(x[_turns(x, least)]), np.array([x[b] - x[a] for a, b in ends])
+    if not any(0 < _SHARE * way[way > 0].sum() <= own[own > 0].sum() for way, own in ((whole, made), (-whole, -made))):
         return ()
     dt = size * channels.dt
     start = channels.start + (size - 1) / 2 * channels.dt

@@ -28,10 +28,10 @@ from palpate.report.identification.words import (
     behind_the_arm,
     by_the_model,
     each_press,
-    first_reason,
     full_number,
     interval,
     limited_by,
+    no_contact_in,
     place_of,
     press_facts,
     sentence,
@@ -155,12 +155,14 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
         yield from (Text(printable(fact)) for fact in found.slide.facts)
         yield from _rows(found)
     elif not found.contacts or point is None:
-        reason = (
-            f": {first_reason(found)}" if not found.contacts else ": no stretch in contact is long enough"
-        )
-        title = UNTOUCHED.replace("this log", name) if not found.contacts else f"{name} shows no stiffness"
-        yield Text(printable(f"{title}{reason}."), style="bold")
-        yield Text(ADVICE[Code.NO_CONTACT] if not found.contacts else "Log longer, or press deeper.")
+        title = f"{name} shows no stiffness: no stretch in contact is long enough"
+        if not found.contacts:
+            title = no_contact_in(name, found)
+        yield Text(printable(f"{title}."), style="bold")
+        if found.contacts:
+            yield Text("Log longer, or press deeper.")
+        elif title.startswith(UNTOUCHED.partition("in")[0]):
+            yield Text(ADVICE[Code.NO_CONTACT])
     else:
         modulus = found.parameters.get("E")
         if modulus is not None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.files import RECORD
-from palpate.identification.causes import Cause, Code, cause_of
+from palpate.identification.causes import BRIEF, Cause, Code, cause_of
 from palpate.identification.result import Identification, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.numbers import plain, quantity, quantity_between, with_half
@@ -72,7 +72,7 @@ def sentence(found: Identification) -> str:
     if found.slide is not None:
         return found.slide.sentence
     if not found.contacts:
-        return f"{UNTOUCHED}: {first_reason(found)}."
+        return f"{no_contact_in('this log', found)}."
     point = found.working_point
     if point is None:
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
@@ -300,10 +300,13 @@ def by_the_model(found: Identification) -> bool:
     return point.stiffness.verdict is not Verdict.IDENTIFIED
 
 
-def first_reason(found: Identification) -> str:
-    """Why nothing was touched."""
+def no_contact_in(log: str, found: Identification) -> str:
+    """Why a log has no contact."""
     own = next((warn.text for warn in found.warnings if warn.code is Code.NO_CONTACT), "")
-    return own.partition(":")[0].rstrip(".") or "the force does not leave its rest"
+    if own.startswith(BRIEF):
+        return f"The contacts in {log} are too short: {own.replace(':', ';')}"
+    reason = own.partition(":")[0].rstrip(".") or "the force does not leave its rest"
+    return f"{UNTOUCHED.replace('this log', log)}: {reason}"
 
 
 _CHUNK = 1 << 20
