@@ -187,7 +187,11 @@ def test_sizes_of_the_weights_add_up():
     neural = Neural.thesis()
     sizes = e3_divergence.sizes_of(neural.start())
     perceptron = Perceptron.thesis()
-    parts = (perceptron.hidden[:, 7:], perceptron.hidden[:, 1:7], perceptron.hidden[:, 0])
+    parts = (
+        perceptron.hidden_weights[:, 7:],
+        perceptron.hidden_weights[:, 1:7],
+        perceptron.hidden_weights[:, 0],
+    )
     assert sizes[:3] == pytest.approx([np.linalg.norm(part) for part in parts])
     assert sizes[3:] == pytest.approx(
         [np.linalg.norm(perceptron.output[0, 1:]), np.linalg.norm(perceptron.output[:, 0])]
@@ -202,7 +206,7 @@ def test_torque_gains_are_the_slope_of_the_network():
     neural, perceptron = Neural.thesis(), Perceptron.thesis()
     state = neural.start()
     state.network.weights[:] *= 100.0
-    perceptron.hidden[:] *= 100.0
+    perceptron.hidden_weights[:] *= 100.0
     perceptron.output[:] *= 100.0
     state.network.signals[:9] = inputs
     neural.network.forward(state.network)
