@@ -191,8 +191,7 @@ def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] 
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
-    """Of a press at constant speed K is its tangent, unless a model knows it better and lies among its presses; such a
-    motion shows no more."""
+    """K of presses at constant speed is their tangent, unless a model among them knows it better; no more is shown."""
     shown = {
         name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
