@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.identification import in_series
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -23,6 +22,7 @@ from palpate.identification.evidence.slope import (
     slope_of,
 )
 from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
+from palpate.identification.in_series import Series
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
@@ -279,13 +279,11 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     )
     if steady is not None:
         press = at_constant_speed(steady, press, problem.origin)
-    if options.series_stiffness is not None:
-        series = options.series_stiffness, options.series_std
-        spectrum = in_series.spectrum_without_series(spectrum, *series)
-        press = None if press is None else in_series.press_without_series(press, *series)
-        headline = None if headline is None else in_series.slopes_without_series(headline, *series)
-    if options.series_mass is not None:
-        spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
+    series = Series.of(options)
+    if series is not None:
+        spectrum = series.spectrum(spectrum)
+        press = None if press is None else series.press(press)
+        headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
     return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
