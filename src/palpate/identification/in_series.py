@@ -61,22 +61,22 @@ class Series:
         """
         theta, names = seen.theta, seen.names
         self._check(float(theta[names.index("K")]))
-        new, jacobian = self._surface(theta, names), np.eye(len(theta))
+        new, jacobian = self.surface_of(theta, names), np.eye(len(theta))
         for i in (names.index(name) for name in ("K", "B", "M") if name in names):
             step = 1e-6 * max(abs(theta[i]), 1e-9)
             moved = theta.copy()
             moved[i] += step
-            jacobian[:, i] = (self._surface(moved, names) - new) / step
+            jacobian[:, i] = (self.surface_of(moved, names) - new) / step
         stiffer = replace(self, stiffness=self.stiffness + self.std)
-        surface = seen.through(jacobian, new).with_cause(_SPRING, stiffer._surface(theta, names) - new)
+        surface = seen.through(jacobian, new).with_cause(_SPRING, stiffer.surface_of(theta, names) - new)
         if not (self.share or self.share_std):
             return surface
         heavier = replace(self, share=self.share + self.share_std)
         most = min(self.share * (2 * np.pi * band) ** 2, 1.0) / NORMAL
-        beyond = most * replace(self, share=0.0)._surface(theta, names) * np.isin(names, ("B", "M"))
-        return surface.with_cause(_TIP, np.hypot(heavier._surface(theta, names) - new, beyond))
+        beyond = most * replace(self, share=0.0).surface_of(theta, names) * np.isin(names, ("B", "M"))
+        return surface.with_cause(_TIP, np.hypot(heavier.surface_of(theta, names) - new, beyond))
 
-    def _surface(self, theta: Array, names: tuple[str, ...]) -> Array:
+    def surface_of(self, theta: Array, names: tuple[str, ...]) -> Array:
         """The surface's parameters of those of all, shape (p,)."""
         own, new = dict(zip(names, theta, strict=True)), theta.copy()
         r = self.stiffness / (self.stiffness - own["K"])
@@ -124,7 +124,9 @@ class Series:
 
     def press(self, seen: Press) -> Press:
         """The press over the depth of the surface alone."""
-        tangent = [Tangent(t.force, self.slope(t.slope)) for t in seen.tangent if t.stiffness < self.stiffness]
+        tangent = [
+            Tangent(t.force, self.slope(t.slope)) for t in seen.tangent if t.stiffness < self.stiffness
+        ]
         curves = []
         for curve in (seen.loading, seen.unloading):
             own = curve.copy()
@@ -141,6 +143,6 @@ class Series:
         """
         if abs(apparent) >= self.stiffness:
             raise InputError(
-                f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g} N/m,"
-                " but two springs in series are softer than either: check its value and unit (N/m), or leave it out"
+                f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g}"
+                " N/m, but two springs in series are softer than either: check its value and unit (N/m), or leave it out"
             )

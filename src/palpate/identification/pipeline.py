@@ -31,7 +31,6 @@ from palpate.identification.uncertainty import Input, Parameter, Verdict, correl
 from palpate.identification.verdicts import Terms, verdicts
 from palpate.records import Record
 from palpate.signals import Estimate
-from palpate.signals.low_pass import LowPass
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 

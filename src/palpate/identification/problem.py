@@ -194,7 +194,9 @@ def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None
 
 def with_fewer_rows(problem: Problem) -> Problem:
     """The same with so many rows at most, in evenly spaced unbroken pieces."""
-    wider = (None if own is None else with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach))
+    wider = (
+        None if own is None else with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach)
+    )
     rows = problem.motion.rows
     kept = _pieces(len(rows)) if len(rows) > MOST_ROWS else np.ones(len(rows), bool)
     fewer = problem if kept.all() else problem.at(rows[kept], problem.force[kept], problem.spans[kept])
