@@ -144,5 +144,5 @@ class Series:
         if abs(apparent) >= self.stiffness:
             raise InputError(
                 f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g}"
-                " N/m, but two springs in series are softer than either: check its value and unit (N/m), or leave it out"
+                " N/m, but two springs in series are softer than either: check its value and unit, or leave it out"
             )
