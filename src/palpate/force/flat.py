@@ -11,7 +11,7 @@ from palpate.force.guard import SafetyState
 from palpate.force.law import Cautious, CautiousState
 
 
-def flattened(tree: Any) -> Array:
+def flatten(tree: Any) -> Array:
     """Every number of nested tuples, in their order, shape (n,)."""
     return np.array(list(leaves(tree)))
 

@@ -10,7 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn
 from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
-from palpate.identification.free_motion import FLAT, Drift, FreeMotion, Payload, free_motion_of, payload_of
+from palpate.identification.free_motion import FLAT, Drift, FreeMotion, MovingMass, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.steady_press import SteadyPress, Stroke, steady_press, strokes_of
@@ -67,7 +67,7 @@ class Contacts:
     warnings: tuple[Warn, ...]
     clear: bool = True
     signed: bool = True
-    payload: Payload | None = None
+    payload: MovingMass | None = None
     drift: Drift | None = None
     press: SteadyPress | None = None
 

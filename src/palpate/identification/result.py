@@ -250,7 +250,7 @@ class LagFound:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Result, shown_by="palpate.report.identification.answer"):
+class Identification(Result):
     """The contact's model, its parameters with verdicts, and warnings.
 
     Args:

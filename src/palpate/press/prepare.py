@@ -13,7 +13,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
-from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
+from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
 from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, driver_of, press
 from palpate.press.sequence import Plan, plan_for
 from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
@@ -226,7 +226,7 @@ def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
         mode = "torque"
     loop = loop_of(question.arm, arm.title, mode, place.mass)
     _check_sensor(question, loop.sensor, loop.sensor.full_scale)
-    return gains_for(loop, question.force * (1.0 - question.probe))
+    return press_gains(loop, question.force * (1.0 - question.probe))
 
 
 def _check_sensor(question: Question, sensor: Sensor, most: float) -> None:

@@ -12,7 +12,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.lag import STRUCTURE
-from palpate.force.sampled_loop import filter_of, held
+from palpate.force.sampled_loop import filter_of, zero_order_hold
 from palpate.press.cell import NO_TOOL, HeldTool, Workcell, WristSensor
 from palpate.robots.serial.inverse import checked_pose
 from palpate.robots.serial.serial_arm import SerialArm
@@ -177,7 +177,7 @@ def _fastest(links: Array, joints: Array) -> float:
 
 def _sensor(loop: Arm, step: float) -> WristSensor:
     A, b, c = filter_of(loop.low_pass)
-    E, e = held(A, b, step)
+    E, e = zero_order_hold(A, b, step)
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return WristSensor(

@@ -7,7 +7,7 @@ from typing import Any
 
 from palpate.report.chart import page_figures
 from palpate.report.numbers import quantity
-from palpate.report.page import render
+from palpate.report.page import Table, render
 from palpate.text import printable
 
 
@@ -67,6 +67,7 @@ class PageAnswer:
         scale: `log_scale`; None without.
         pairs: pictures that stand beside each other: source and caption.
         figures: as `report.chart.page_figures` takes them.
+        tables: below the cards, above the figures.
         folds: tables that are folded: title, a word about them, rows.
         source: a file's text, and its title.
     """
@@ -80,6 +81,7 @@ class PageAnswer:
     scale: Mapping[str, Any] | None = None
     pairs: Sequence[Mapping[str, str]] = ()
     figures: Sequence[Mapping[str, Any]] = ()
+    tables: Sequence[Table] = ()
     folds: Sequence[tuple[str, str, Sequence[Sequence[str]]]] = ()
     source: tuple[str, str] = ("", "")
 
@@ -118,8 +120,7 @@ def answer_page(
         folds=[{"title": title, "about": about, "rows": rows} for title, about, rows in answer.folds if rows],
         source=answer.source[1],
         source_title=answer.source[0],
-        notes=(),
-        tables=(),
+        tables=answer.tables,
         room=room,
         command=printable(command),
         **shown | {"scripts": (*shown["scripts"], *codes)},

@@ -67,9 +67,10 @@ def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     for name in ("K", "B", "M"):
         assert f"± {percent(found['reached'][name])}" in text.replace("&gt;", ">")
     assert text.count("<tr>") == 1 + len(found["surfaces"])
-    charts = json.loads(re.search(r'id="excitation">(.*?)</script>', text, re.DOTALL).group(1))
-    assert charts["seconds"] == found["duration_s"]
-    assert charts["spectrum"]["t"] == pytest.approx(found["wave"]["frequencies"])
+    figures = json.loads(re.search(r'id="panels">(.*?)</script>', text, re.DOTALL).group(1))
+    _, spectrum, precision = figures["1"]
+    assert spectrum["columns"]["t"] == pytest.approx(found["wave"]["frequencies"], rel=1e-4)
+    assert precision["spec"]["marks"][0]["x"] == found["duration_s"]
     for tag in (' src="http', ' href="http', "@import"):
         assert tag not in text
     assert main(["excite", *ASKED, "--no-figure", "--report", "page.pdf"]) == 2

@@ -75,7 +75,7 @@ def warnings(result: MapResult) -> list[str]:
             f"no place was pressed twice: roughness finer than the presses' spacing counts as their scatter, "
             f"± {_short(100.0 * result.repeat)} %, and not as the surface's; press a few places again to part them"
         )
-    lines += [f"no map of {name}: {why}" for name, why in result.unmapped.items()]
+    lines += [f"no map of {name}: {why}" for name, why in result.missing_maps.items()]
     return lines
 
 

@@ -1,8 +1,7 @@
 """Runs with a change in the middle: of the surface, its position, or the desired pose."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,8 +18,7 @@ LOOK = 100
 Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
 
 
-@dataclass(frozen=True)
-class Disturbance:
+class Disturbance(NamedTuple):
     """Something that changes between two ticks.
 
     Args:
