@@ -29,7 +29,7 @@ _SPRING, _TIP = "series stiffness", "tip's mass"
 
 
 @dataclass(frozen=True)
-class Series:
+class SeriesSpring:
     """A spring between position sensor and surface, and the mass that swings on it.
 
     Args:
@@ -43,8 +43,8 @@ class Series:
     share_std: float = 0.0
 
     @classmethod
-    def of(cls, options: Options) -> Series | None:
-        """What the options say of it; None if they say nothing."""
+    def of(cls, options: Options) -> SeriesSpring | None:
+        """The spring of a log's options; None without one."""
         k = options.series_stiffness
         return None if k is None else cls(k, options.series_std, *options.swing)
 

@@ -98,7 +98,7 @@ def prior_of(lag: Lag, noise: float, free_lag: bool) -> Prior:
 
 @dataclass(frozen=True)
 class Options:
-    """What is known beside the record of a log.
+    """Knowledge of a log beside its record.
 
     Args:
         model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;

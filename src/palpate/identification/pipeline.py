@@ -14,7 +14,7 @@ from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
 from palpate.identification.filters.state_variable import Chain, block_means
 from palpate.identification.front_end import problem_of
-from palpate.identification.in_series import Series
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem, with_fewer_rows
 from palpate.identification.result import (
@@ -72,7 +72,7 @@ def identify(record: Record, **given: Any) -> Identification:
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
     evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
-    series = Series.of(options)
+    series = SeriesSpring.of(options)
     if series is not None:
         choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
         holds = series.parameters(holds, problem.band)

@@ -17,7 +17,7 @@ from palpate.identification.evidence.slope import (
     slope_of,
 )
 from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
-from palpate.identification.in_series import Series
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
@@ -223,7 +223,7 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     )
     if steady is not None:
         press = at_constant_speed(steady, press, problem.origin)
-    series = Series.of(options)
+    series = SeriesSpring.of(options)
     if series is not None:
         spectrum = series.spectrum(spectrum)
         press = None if press is None else series.press(press)
