@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.bench.force_input import DONE
+from palpate.bench.summary import DONE
 from palpate.files import with_author, write_json, write_text
 from palpate.report.page import Table
 from palpate_studies import effects
