@@ -67,7 +67,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.force_input import DONE, INTERRUPTED
+    from palpate.bench.summary import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -112,9 +112,9 @@ def _run(
     interrupted: Callable[[], bool],
 ) -> _Ran:
     """Runs and writes the folder of results."""
-    from palpate.bench import summarise
     from palpate.bench.one_direction import OneDirection
-    from palpate.logs import write_record
+    from palpate.bench.summary import summarise
+    from palpate.logs.tables.parquet import write_record
 
     with fresh_folder(folder, replace=output.replace) as fresh:
         command = printable(f"palpate run {shlex.quote(asked.name)} --seed {asked.seed}")
@@ -168,8 +168,8 @@ def _draw(
 
 def _identify(record: Path) -> tuple[Identification | None, str]:
     """The identification of the record by `palpate identify`, or the reason for its absence."""
-    from palpate.cli.identify import ModelOptions
-    from palpate.cli.one_log import OneLog
+    from palpate.cli.identify import OneLog
+    from palpate.cli.options.log import ModelOptions
 
     try:
         return OneLog(ModelOptions()).identification(record)[0], ""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report.look.assets import DATA, PAIRS
 

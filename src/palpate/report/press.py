@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.files import write_text
 from palpate.identification.uncertainty import Verdict
+from palpate.press.pressing import Asked
 from palpate.press.setting import Place
-from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.files import write_text
 from palpate.records import Record
 from palpate.report import style

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.identification.result import Identification
 from palpate.records import Record
 from palpate.report.answer import Card
