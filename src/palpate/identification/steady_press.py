@@ -87,7 +87,9 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
     steady = [_steady(x, a, b, least) for a, b in pairwise(_turns(x, _STROKE * reach))]
     ends = [own for own in steady if own is not None]
     whole, made = np.diff(x[_turns(x, least)]), np.array([x[b] - x[a] for a, b in ends])
-    if not any(0 < _SHARE * way[way > 0].sum() <= own[own > 0].sum() for way, own in ((whole, made), (-whole, -made))):
+    if not any(
+        0 < _SHARE * way[way > 0].sum() <= own[own > 0].sum() for way, own in ((whole, made), (-whole, -made))
+    ):
         return ()
     dt = size * channels.dt
     start = channels.start + (size - 1) / 2 * channels.dt
@@ -211,7 +213,9 @@ class Slopes:
         """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
         if wider is None or not wider.stiffness.value:
             return self
-        spread = wider.stiffness.contributions["repetition"].times(self.stiffness.value / wider.stiffness.value)
+        spread = wider.stiffness.contributions["repetition"].times(
+            self.stiffness.value / wider.stiffness.value
+        )
         if spread.half <= self.stiffness.contributions["repetition"].half:
             return self
         parts = {**self.stiffness.contributions, "repetition": spread}

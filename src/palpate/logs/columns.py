@@ -129,9 +129,10 @@ def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> floa
         return 0.0
     power = welch(b[there], nperseg=rows)[1]
     by_filter = coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum()
+    force_there = b[there] - b[there].mean()
     place = np.floor(_BLOCKS * (a[there] - a[there].min()) / np.ptp(a[there])).astype(np.intp)
-    count = np.maximum(np.bincount(place), 1)
-    by_place = count @ (np.bincount(place, b[there] - b[there].mean()) / count) ** 2 / b[there].var() / count.sum()
+    sums, count = np.bincount(place, force_there), np.bincount(place)
+    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (force_there @ force_there)
     return float(max(by_filter, by_place))
 
 
