@@ -85,7 +85,7 @@ def pool(logs: Sequence[Any], covariates: Mapping[str, Any] | None = None, **opt
 
 def _fit(record: Record, options: dict[str, Any]) -> Identification:
     """Along the contact's normal where the record has a wrench and a pose."""
-    from palpate.contact_frame import identify_contact
+    from palpate.contact_frame.arm import identify_contact
 
     return (
         identify_contact(record, **options)[0]

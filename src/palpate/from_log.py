@@ -8,18 +8,13 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from palpate.contact_frame import (
-    ArmDynamics,
-    ContactFrame,
-    Payload,
-    identify_contact,
-    load_payload,
-    robot_stiffness,
-)
+from palpate.contact_frame.arm import ArmDynamics, identify_contact, robot_stiffness
+from palpate.contact_frame.load import Payload, load_payload
+from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification, identify
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.logs.many import log_of
+from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, measured_by
 from palpate.logs.signals import Signals, read_as

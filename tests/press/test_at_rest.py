@@ -9,7 +9,7 @@ import pytest
 from palpate.errors import InputError
 from palpate.force import load_arm
 from palpate.press.engines import press_gains
-from palpate.press.tare import check_drift, fitting, noise_and_drift
+from palpate.press.sequence import check_drift, fitting, noise_and_drift
 
 GAINS = press_gains(load_arm("ur5e"), 20.0)
 TIMES = np.arange(250) / 500.0

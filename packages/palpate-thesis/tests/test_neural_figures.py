@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.bench import with_values
-from palpate.bench.force_input import COLUMNS, CONTACT, LOST
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate_studies.metrics.following import LIMIT
 from palpate_studies.metrics.window import SETTLE

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from palpate._jit import reader, writer
-from palpate._jit.stored import leaves, places
+from palpate._jit.overloads import leaves, places
 from palpate.arrays import Array
 from palpate.force.guard import SafetyState
 from palpate.force.law import Cautious, CautiousState

@@ -120,7 +120,7 @@ class Code(Enum):
     )
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = (
-        "The force rests at its extreme value while the probe moves on: it is at the end of its range."
+        "A channel rests at its extreme value while the other moves on: it is at the end of its range."
     )
     UNIT_GUESS = "A unit was taken from a column's name or values."
     UNIT_STATED = "A unit was taken from the file's own statement."

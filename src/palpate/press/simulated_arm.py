@@ -11,15 +11,14 @@ import numpy as np
 from palpate._jit import BoundKernel
 from palpate._vector import ZERO3, Mat3, Vec6
 from palpate.arrays import Array
-from palpate.bench.given_motion import rest_for
+from palpate.environments.surface import rest_for
 from palpate.environments.surface_state import UNTOUCHED
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Reading, TouchState, Workcell, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
-from palpate.press.sequence import TipSample
+from palpate.press.sequence import TARE, TipSample
 from palpate.press.setting import Place
-from palpate.press.tare import TARE
 from palpate.robots.serial.inverse import pose_error
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for

@@ -167,6 +167,8 @@ def figure_of(charts: Sequence[Chart], columns: int = 1) -> Figure:
             draw(axis, chart)
         for axis in axes[len(charts) :]:
             axis.remove()
+        for axis in axes[:-1] if one_axis else ():
+            axis.set_xlabel("")
     return figure
 
 
@@ -188,7 +190,7 @@ def draw(axis: Axes, chart: Chart) -> None:
         for i, ends in enumerate(mark.spans):
             label = "" if i else mark.label
             _interval((axis.axvline, moment), (axis.axvspan, 0.12), ends, mark.colour, label)
-    axis.set(xlabel=chart.x, ylabel=chart.y)
+    axis.set(xlabel=style.literal(chart.x), ylabel=style.literal(chart.y))
     axis.set_title(style.literal(chart.title), loc="left")
     axis.set(**{name: ends for name in ("xlim", "ylim") if (ends := getattr(chart, name))})
     if "y" in chart.log:
@@ -212,8 +214,8 @@ def _line(dash: str) -> Any:
     return (0, (5, 4)) if dash == "--" else dash or "-"
 
 
-def panels(charts: Sequence[Chart]) -> list[dict[str, Any]]:
-    """The charts for a page, in order, as plain values.
+def panels(charts: Sequence[Chart], most: int = MOST) -> list[dict[str, Any]]:
+    """The charts for a page, in order, as plain values, each with about so many places of a line.
 
     Each is `{"spec", "columns"}` as `palpate.chart` takes it, and the `group` of those that are zoomed together.
     """
@@ -222,15 +224,15 @@ def panels(charts: Sequence[Chart]) -> list[dict[str, Any]]:
     found = []
     for chart, key in zip(charts, keys, strict=True):
         x = chart.x or next((name for own, name in zip(keys, names, strict=True) if own == key and name), "")
-        found.append(_panel(chart, x) | {"group": keys.index(key)})
+        found.append(_panel(chart, x, most) | {"group": keys.index(key)})
     return found
 
 
-def _panel(chart: Chart, x: str) -> dict[str, Any]:
+def _panel(chart: Chart, x: str, most: int) -> dict[str, Any]:
     """A chart, thinned so that peaks stay; what has no name, or another's, is not in its legend."""
     lines = [(one.x, one.y) for one in chart.series]
     lines += [(one.x, end) for one in chart.intervals for end in (one.low, one.high)]
-    places, values = _join([_within(*line, *chart.ends) for line in lines])
+    places, values = _join([_within(*line, *chart.ends) for line in lines], most)
     columns = {"t": _column(places, "x" in chart.log)}
     columns |= {f"c{i}": _column(column, "y" in chart.log) for i, column in enumerate(values)}
     series = [look(one) | {"of": f"c{i}"} for i, one in enumerate(chart.series)]
@@ -242,7 +244,7 @@ def _panel(chart: Chart, x: str) -> dict[str, Any]:
         ends = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
         own = look(band) if is_line else _area(band)
         series.append(own | {key: f"{key}{len(series)}" for key in ends})
-        columns |= {series[-1][key]: [float(value)] * len(places) for key, value in ends.items()}
+        columns |= {series[-1][key]: packed_column(np.full(len(places), v)) for key, v in ends.items()}
     labels = [one["label"] for one in series]
     for i, (label, line) in enumerate(zip(labels, series, strict=True)):
         line["silent"] = not label or label in labels[:i]
@@ -289,13 +291,13 @@ def _within(x: Array, y: Array, low: float, high: float) -> tuple[Array, Array]:
     return x[inside], y[inside]
 
 
-def _join(lines: Sequence[tuple[Array, Array]]) -> tuple[Array, list[Array]]:
+def _join(lines: Sequence[tuple[Array, Array]], most: int) -> tuple[Array, list[Array]]:
     """All places of thinned lines in order, and each line's values there: infinite where it has no place."""
     alike = [next(i for i, (other, _) in enumerate(lines) if np.array_equal(other, x)) for x, _ in lines]
     thin = {}
     for first in dict.fromkeys(alike):
         same = [y for i, (_, y) in zip(alike, lines, strict=True) if i == first]
-        thin[first] = np.unique(np.concatenate([rows_shown(y, MOST // len(same)) for y in same]))
+        thin[first] = np.unique(np.concatenate([rows_shown(y, most // len(same)) for y in same]))
     shown = [(x[thin[i]], y[thin[i]]) for i, (x, y) in zip(alike, lines, strict=True)]
     places = np.unique(np.concatenate([x for x, _ in shown]))
     columns = [np.full(len(places), np.inf) for _ in shown]

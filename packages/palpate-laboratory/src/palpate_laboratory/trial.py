@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from palpate.bench import Experiment, build, with_values
-from palpate.bench.force_input import DONE, INTERRUPTED
+from palpate.bench.summary import DONE, INTERRUPTED
 from palpate.records import Record
 from palpate_laboratory.laboratory import Laboratory
 from palpate_thesis.figures import (

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.signals_in_base import ArmDynamics, BaseSignals, ContactFrame, Unloaded
+from palpate.contact_frame.arm import ArmDynamics
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 from palpate.identification.result import LagFound, SlideFound

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import numbers_of

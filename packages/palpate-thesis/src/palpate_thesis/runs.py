@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
-from palpate.bench.force_input import INTERRUPTED
 from palpate.bench.speed import cores
+from palpate.bench.summary import INTERRUPTED
 from palpate.records import Record
 
 K = TypeVar("K")

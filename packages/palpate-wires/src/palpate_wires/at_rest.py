@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.contact_frame import Payload
 from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
+from palpate.contact_frame.load import Payload
 from palpate.errors import InputError
 from palpate.force import ForceLoop
-from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
+from palpate.press.sequence import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
 from palpate.wires import ArmReading, Wire, unreadable
 from palpate_wires.order import Order, check_order
 from palpate_wires.orientation import turn_vector

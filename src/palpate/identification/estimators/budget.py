@@ -277,7 +277,8 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         found[TOUCH] = motion.filtered(motion.touched, 0, lag)
         found["free inertia"] = motion.filtered(motion.free, 2, lag)
     depth = (x - float(x[inside].mean())) / reach
-    return found | {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+    shapes = {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+    return found | shapes | {"hysteresis, slow": _summed(depth, segments)}
 
 
 def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
@@ -293,6 +294,17 @@ def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str,
     turned = [motion.filtered(motion.direction(way), 0, lag) for way in ways]
     sooner = {f"{FRICTION} {i}": short - long for i, (short, long) in enumerate(pairwise(turned))}
     return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
+
+
+def _summed(x: Array, segments: list[Segment]) -> Array:
+    """A force that goes on under a position that stays, shape (m,): the slow beginning of any relaxation or creep.
+
+    Of the surface, or of a load cell that creeps or whose amplifier lets its charge go.
+    """
+    found = np.zeros(len(x))
+    for s in segments:
+        found[s.first : s.last] = np.cumsum(x[s.first : s.last])
+    return found
 
 
 def _in_quadrature(x: Array, segments: list[Segment]) -> Array:

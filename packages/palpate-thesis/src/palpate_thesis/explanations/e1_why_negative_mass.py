@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad, butterworth2, butterworth3

@@ -7,8 +7,7 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT, LOST
-from palpate.bench.summary import losses
+from palpate.bench.summary import CONTACT, LOST, losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style

@@ -10,7 +10,7 @@ from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, clip
 from palpate.arrays import Array
 from palpate.bench import Experiment, build, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.controllers.controller import controller
 from palpate.controllers.decoupled_hybrid import decoupled_hybrid
 from palpate.controllers.resolved_acceleration import position_command

@@ -7,7 +7,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim

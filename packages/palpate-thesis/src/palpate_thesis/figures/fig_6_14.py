@@ -7,7 +7,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT

@@ -7,8 +7,9 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
-from palpate.bench.force_input import COLUMNS, DIVERGED, DONE
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, LoopState
+from palpate.bench.summary import DIVERGED, DONE
 from palpate.environments import KelvinVoigt, join
 from palpate.records import Record
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT
-from palpate.bench.summary import losses
+from palpate.bench.summary import CONTACT, losses
 from palpate.records import Record
 from palpate_studies.metrics import Window
 from palpate_studies.metrics.following import LIMIT, SHARE, interval_error

@@ -7,7 +7,8 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Bench, Experiment, build
-from palpate.bench.force_input import COLUMNS, CONTACT, LOST
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.summary import CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate_thesis.conditions import move_wall, rougher
 from palpate_thesis.runs import VARIED_SEEDS, Runs
