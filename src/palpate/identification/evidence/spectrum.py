@@ -28,7 +28,7 @@ from palpate.identification.estimators.octaves import (
     transform_of,
 )
 from palpate.identification.evidence.slope import slope_in, unseen
-from palpate.identification.in_series import slopes_without_series
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, WorkingPoint
@@ -228,8 +228,9 @@ def working_point(
     tolerance, bonded = options.tolerance, problem.contacts.bonded
     segments = segments_of(problem.motion.rows, problem.spans)
     press, octave = slope_in(problem, segments), _octave_point(spectrum, tolerance)
-    if press is not None and options.series_stiffness is not None:
-        press = slopes_without_series(press, options.series_stiffness, options.series_std)
+    series = SeriesSpring.of(options)
+    if press is not None and series is not None:
+        press = series.slopes(press)
     if press is not None and (
         octave is None
         or (
