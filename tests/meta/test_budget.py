@@ -42,7 +42,7 @@ LARGEST = {
 out as much."""
 PARTICIPLES, SHORT_DOCSTRINGS = 56, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
-UNTESTED = 268
+UNTESTED = 240
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""
 TWICE = frozenset({"Data", "Fit", "Surface", "Table"})
 """Class names that stand for two things. None is added; whoever renames one takes it off."""
