@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=276, lines=50844, tokens=343100),
+    "src/palpate": Weight(files=262, lines=50510, tokens=340875),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1933, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=9499, tokens=78911),
@@ -42,7 +42,7 @@ LARGEST = {
 out as much."""
 PARTICIPLES, SHORT_DOCSTRINGS = 56, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
-UNTESTED = 268
+UNTESTED = 240
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""
 TWICE = frozenset({"Data", "Fit", "Surface", "Table"})
 """Class names that stand for two things. None is added; whoever renames one takes it off."""
