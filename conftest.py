@@ -12,7 +12,7 @@ import pytest
 from hypothesis import settings
 
 from palpate._jit import registry
-from palpate._jit.stamp import home_of
+from palpate._jit.cache import home_of
 from palpate.cli import main
 from palpate.plugins import consent
 

@@ -9,7 +9,7 @@ import time
 
 from palpate.force import load_arm
 from palpate.force.simulated_press import surface
-from palpate.wires import SILENCE, Command, LostError, Sense, SilentError
+from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm, ticks
 
 
@@ -40,10 +40,10 @@ class OurWire:
             v = self._robot.reading()
             force = tuple(f - z for f, z in zip(v[:3], self._zero, strict=True))
             # The force that the tool exerts on the surface, about the point whose position is given, in the base.
-            self._newest = Sense(time.monotonic(), self._robot.time, force, v[3:6], v[6:9], v[9:13])
+            self._newest = ArmReading(time.monotonic(), self._robot.time, force, v[3:6], v[6:9], v[9:13])
             self._fresh.set()
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The next fresh reading."""
         if self._closed:
             raise LostError("the wire is closed")

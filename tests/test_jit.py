@@ -11,8 +11,8 @@ import pytest
 
 import own_parts
 import palpate
-from palpate._jit import kernel, law, part, stamp
-from palpate._jit.stamp import stamp_of
+from palpate._jit import cache, kernel, law, part
+from palpate._jit.cache import stamp_of
 from palpate._vector import ZERO3, Mat3, solve, sqrt
 
 
@@ -111,14 +111,14 @@ def test_an_integer_is_another_type_and_the_plain_function_stays():
 def test_a_user_kernel_depends_on_what_is_registered_outside_and_on_what_that_imports(monkeypatch):
     """Whatever else of the package this process has imported makes no kernel stale."""
     # What other tests of this process have registered is no part of the question.
-    monkeypatch.setattr(stamp, "parts", {})
-    monkeypatch.setattr(stamp, "foreign_laws", [])
-    monkeypatch.setattr(stamp, "foreign_files", set())
+    monkeypatch.setattr(cache, "parts", {})
+    monkeypatch.setattr(cache, "foreign_laws", [])
+    monkeypatch.setattr(cache, "foreign_files", set())
 
     def stamp_with(module):
         registered = type("Registered", (), {"__module__": module})
         with monkeypatch.context() as patch:
-            patch.setitem(stamp.parts, registered, None)
+            patch.setitem(cache.parts, registered, None)
             return stamp_of(adding.plain, ())
 
     known = stamp_of(adding.plain, ())
@@ -128,11 +128,11 @@ def test_a_user_kernel_depends_on_what_is_registered_outside_and_on_what_that_im
 
 def test_a_kernel_of_files_that_changed_since_they_were_imported_is_not_kept(monkeypatch):
     """Its code in memory is the old one, and its files are new: an upgrade under a running process."""
-    monkeypatch.setattr(stamp, "parts", {})
-    monkeypatch.setattr(stamp, "foreign_laws", [])
-    monkeypatch.setattr(stamp, "foreign_files", set())
+    monkeypatch.setattr(cache, "parts", {})
+    monkeypatch.setattr(cache, "foreign_laws", [])
+    monkeypatch.setattr(cache, "foreign_files", set())
     assert stamp_of(adding.plain, ()) is not None
-    monkeypatch.setattr(stamp, "STARTED", 0.0)
+    monkeypatch.setattr(cache, "STARTED", 0.0)
     assert stamp_of(adding.plain, ()) is None
 
 
@@ -428,9 +428,9 @@ def test_a_stamp_follows_imports_in_the_file_of_a_companion(tmp_path):
     (package / "__init__.py").write_text("")
     (package / "loop.py").write_text("from palpate_beside.laws import law\n")
     (package / "laws.py").write_text("law = 1\n")
-    before = stamp.sources_stamp(package / "loop.py")
+    before = cache.sources_stamp(package / "loop.py")
     (package / "laws.py").write_text("law = 2\n")
-    assert stamp.sources_stamp(package / "loop.py") != before
+    assert cache.sources_stamp(package / "loop.py") != before
 
 
 SPOILED = {

@@ -9,7 +9,7 @@ from itertools import product
 
 from palpate.press.engines import MODES
 from palpate.press.prepare import Question, prepare_press, surface_of
-from palpate.press.summary import summarise
+from palpate.press.pressing import summarise
 from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names
 

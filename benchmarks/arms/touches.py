@@ -7,7 +7,7 @@ import argparse
 
 import numpy as np
 
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.force import gains
 from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.robots.serial.from_toml import names

@@ -95,8 +95,8 @@ def stacked(loop, K, B, law, loss):
     none, reading = np.zeros((p, p)), loop.force_gain(1.0, 0.0)
     if not len(loop.low_pass[1]):
         raise SystemExit("a sensor without a low-pass reads the surface itself: not written here")
-    rest = loop.assembled(none, np.zeros(p), reading, law, loss)
-    acting = (loop.assembled(none, np.ones(p), reading, law, loss) - rest)[0]
+    rest = loop.tick_matrix(none, np.zeros(p), reading, law, loss)
+    acting = (loop.tick_matrix(none, np.ones(p), reading, law, loss) - rest)[0]
     Phi = np.broadcast_to(rest, (len(K), *rest.shape)).copy()
     Phi[:, :p] += within[:, :p, p:] * acting
     Phi[:, :p, :p] += within[:, :p, :p]

@@ -35,6 +35,8 @@ a shell: `palpate --help`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from palpate import views
+
 if TYPE_CHECKING:
     from palpate.calls import identify, identify_log, pool, read_log
     from palpate.errors import InputError, PalpateError
@@ -79,6 +81,9 @@ __all__ = [
     "pool",
     "read_log",
 ]
+
+
+views.report = lambda: import_module("palpate.report.values")
 
 
 def __getattr__(name: str) -> Any:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate import views
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.text import in_python
@@ -44,7 +44,7 @@ def _same_arrays(one: object, other: object) -> bool:
 
 
 class Readable:
-    """A value with a `repr` of one line and a view for notebooks; `palpate.report.values` has the facts of each."""
+    """A value with a `repr` of one line and a view for notebooks; the report has the facts of each (`views`)."""
 
     def __init_subclass__(cls, **others: Any) -> None:
         super().__init_subclass__(**others)
@@ -52,11 +52,11 @@ class Readable:
             setattr(cls, name, getattr(cls, name))
 
     def __repr__(self) -> str:
-        return str(import_module("palpate.report.values").line(self))
+        return str(views.report().line(self))
 
     def _repr_html_(self) -> str:
         """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return str(import_module("palpate.report.values").html(self))
+        return str(views.report().html(self))
 
 
 class Compared(Readable):
@@ -71,28 +71,21 @@ class Compared(Readable):
 class Result(Compared):
     """A result that can be read, drawn and written.
 
-    A class says where its looks are, `class Record(Result, shown_by="palpate.report.record")`: a
-    module with `line`, `text`, `html`, `draw` and `page`, each of one result. It is imported when it is first asked.
+    The report has a view of each class: a module with `line`, `text`, `html`, `draw` and `page`, each of one result.
     """
 
-    _shown_by = ""
-
-    def __init_subclass__(cls, *, shown_by: str = "", **others: Any) -> None:
-        super().__init_subclass__(**others)
-        cls._shown_by = shown_by or cls._shown_by
-
-    def _looks(self) -> Any:
-        return import_module(self._shown_by)
+    def _view(self) -> Any:
+        return views.report().view_of(self)
 
     def __str__(self) -> str:
-        return in_python(str(self._looks().text(self)))
+        return in_python(str(self._view().text(self)))
 
     def __repr__(self) -> str:
-        return in_python(f"<{type(self).__name__}: {self._looks().line(self)}>")
+        return in_python(f"<{type(self).__name__}: {self._view().line(self)}>")
 
     def _repr_html_(self) -> str:
         """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return in_python(str(self._looks().html(self)))
+        return in_python(str(self._view().html(self)))
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw it.
@@ -107,8 +100,8 @@ class Result(Compared):
             InputError: it holds nothing that can be drawn; palpate may not write there.
         """
         if path is None:
-            return self._looks().draw(self)
-        return import_module("palpate.report.numbers").write_figure(self, self._looks().draw, Path(path))
+            return self._view().draw(self)
+        return views.report().write_figure(self, self._view().draw, Path(path))
 
     def report(self, path: str | Path) -> Path:
         """Write a page with everything, an HTML file that opens without a network.
@@ -116,11 +109,11 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(import_module("palpate.report.numbers").write_page(self, self._looks().page, Path(path)))
+        return Path(views.report().write_page(self, self._view().page, Path(path)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Record(Result, shown_by="palpate.report.record"):
+class Record(Result):
     """A table of signals, as a log or a run leaves it.
 
     Args:

@@ -16,7 +16,7 @@ def triple(vector: Sequence[float] | Any) -> Triple:
     return float(x), float(y), float(z)
 
 
-class Sense(NamedTuple):
+class ArmReading(NamedTuple):
     """One reading of an arm.
 
     Args:
@@ -40,7 +40,7 @@ _UNIT = 0.01
 """Of a quaternion's squared length, as much as ROS 2's tf2 takes: a force turned by it is wrong by 2 % at most."""
 
 
-def unreadable(sense: Sense) -> str | None:
+def unreadable(sense: ArmReading) -> str | None:
     """Why a reading is none, whatever came before, in words; None if it is one."""
     if not all(map(math.isfinite, (sense.stamp, *sense.force, *sense.position, *sense.quaternion))):
         return "the arm gives a reading that is no number"
@@ -105,7 +105,7 @@ class Wire(Protocol):
         """The arm's own stop if this process dies, in words."""
         ...
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The next fresh reading.
 
         Args:

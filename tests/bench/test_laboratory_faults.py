@@ -7,8 +7,8 @@ import pytest
 
 from palpate._vector import Vec3
 from palpate.bench import build, load, with_values
-from palpate.bench.force_input import CONTACT
 from palpate.bench.plant import RIGID, Plant, elastic_mode
+from palpate.bench.summary import CONTACT
 from palpate.environments import KelvinVoigt, StickSlip, join
 from palpate.errors import InputError
 from palpate.friction import LuGre

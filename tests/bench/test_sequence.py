@@ -7,7 +7,8 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build
-from palpate.bench.force_input import APPROACH, CONTACT, LOST, PHASES, Sequence
+from palpate.bench.force_input import Sequence
+from palpate.bench.summary import APPROACH, CONTACT, LOST, PHASES
 from palpate.references import Approach
 
 TICK = 0.001

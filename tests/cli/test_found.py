@@ -2,7 +2,7 @@
 
 import pytest
 
-from palpate.cli.one_log import read_found
+from palpate.cli.options.common import read_found
 from palpate.errors import InputError
 from palpate_export.contact import contact_from
 

@@ -11,8 +11,8 @@ import pytest
 from cli import asked
 from identification.synthetic_contacts import pressed
 from palpate.cli import main
-from palpate.cli.one_log import OneLog
-from palpate.logs.many import gather_logs, is_folder_of_logs, log_of, read_covariates
+from palpate.cli.identify import OneLog
+from palpate.logs.formats import gather_logs, is_folder_of_logs, log_of, read_covariates
 
 OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 

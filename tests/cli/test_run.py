@@ -32,6 +32,7 @@ FILES = {
     "record.parquet",
     "summary.json",
     "report.html",
+    "film.svg",
     "approach.png",
     "force.png",
     "identification.png",

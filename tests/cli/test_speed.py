@@ -6,7 +6,8 @@ from itertools import count
 import pytest
 
 from palpate.bench import build, load, speed
-from palpate.bench.force_input import COLUMNS, CONTACT
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.summary import CONTACT
 from palpate.bench.tables import with_values
 from palpate.cli import main
 

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force.boundary import radius
-from palpate.force.cells import Box, Prover, curved
+from palpate.force.cells import Box, Prover, curvature_bound
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval, proved_claim
 from palpate.force.claims import Claim, adapting_claims, held_claim
@@ -171,7 +171,7 @@ def test_the_curvature_bound_is_one():
         bound, share = box.low + i * (box.high - box.low), shares[0] + j * (shares[1] - shares[0])
         return stepped(prover.loop, bound * share, gains.theta * bound * (1.0 - share))
 
-    outside(surface, curved(prover, box))
+    outside(surface, curvature_bound(prover, box))
     unsure = Prover(SampledLoop(measured(0.1).arm), gains.theta, (1.0, 1.0))
     ends = np.array(unsure.inner(0))
 
@@ -179,7 +179,7 @@ def test_the_curvature_bound_is_one():
         own = tuple(ends.min(axis=0) + np.array([i, j]) * np.ptp(ends, axis=0))
         return stepped(replace(unsure.loop, inner=own), 4e4, 0.0)
 
-    outside(inner, curved(unsure, Box(4e4, 4e4, 0.0, 0.0)))
+    outside(inner, curvature_bound(unsure, Box(4e4, 4e4, 0.0, 0.0)))
 
 
 def stepped(loop, K, B):

@@ -7,7 +7,7 @@ import pytest
 
 from force.gained import gains_of
 from palpate._vector import Mat3, Vec3
-from palpate.force.flat import STATE, flattened, law_in, put_state, state_in
+from palpate.force.flat import STATE, flatten, law_in, put_state, state_in
 from palpate.force.regression import AXIS_K, PRIOR, Fit, fit_through, without_offset
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.stage import LOCKED, Stage
@@ -174,12 +174,12 @@ def test_a_rise_on_suspicion_is_taken_back_and_one_on_evidence_stays():
 def test_the_flat_state_is_the_state():
     gains = gains_of()
     law = gains.cautious()
-    numbers = flattened(law)
-    assert flattened(law_in(numbers)).tolist() == numbers.tolist()
+    numbers = flatten(law)
+    assert flatten(law_in(numbers)).tolist() == numbers.tolist()
     state, rng = law.start(), np.random.default_rng(0)
     for k in range(300):
         _, state = law.step(state, 20.0, 0.02 * k + 0.1 * rng.normal(), 1e-5 * k)
-    flat = flattened(state)
+    flat = flatten(state)
     assert len(flat) == STATE
     again = np.zeros(STATE)
     put_state(again, state_in(flat))

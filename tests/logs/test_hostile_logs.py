@@ -22,7 +22,7 @@ from logs.ros_bags import storage, wrench, write_bag
 from palpate.errors import InputError
 from palpate.files.limits import ReadingLimits
 from palpate.logs import read_log, read_record
-from palpate.logs.kinds import kind_of
+from palpate.logs.formats import kind_of
 from palpate.logs.listing import list_log
 from palpate.logs.read import measured_by
 from palpate_bags import Bag

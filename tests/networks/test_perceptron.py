@@ -110,13 +110,13 @@ def test_it_learns_exclusive_or():
 
 def test_the_thesis_network():
     net = Perceptron.thesis(learning_rate=1e-4)
-    assert net.hidden.shape == (12, 10)
+    assert net.hidden_weights.shape == (12, 10)
     assert net.output.shape == (3, 13)
     assert tuple(net.amplitude) == THESIS_AMPLITUDE == (20.0, 10.0, 1.0)
     assert net.learning_rate == 1e-4
     # Corners and sums of the listing's numbers, in thousandths.
-    assert net.hidden[0, 0] == -0.001
-    assert net.hidden[3, 4] == -0.008475
+    assert net.hidden_weights[0, 0] == -0.001
+    assert net.hidden_weights[3, 4] == -0.008475
     assert net.output[2, 12] == 0.008905
     hidden, output = thesis_layers()
     assert 1e3 * hidden[:, 0].sum() == pytest.approx(-16.967)
@@ -230,5 +230,5 @@ def test_a_bad_sample_is_refused_and_changes_nothing():
     for bad in ([1.0, 2.0], [np.inf]):
         with pytest.raises(InputError, match="error"):
             net.learn(bad)
-    assert not net.hidden.any()
+    assert not net.hidden_weights.any()
     assert not net.output.any()

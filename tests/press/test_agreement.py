@@ -5,7 +5,7 @@ import pytest
 
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.force import ForceLoop
-from palpate.press.engines import gains_for, loop_of
+from palpate.press.engines import loop_of, press_gains
 from palpate.press.pressing import press
 from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, place_of
@@ -20,7 +20,7 @@ def pressed(name, physics, mode="torque", resolution=0.0, nudge=0.0, stiffness=5
     arm = SerialArm.named(name)
     place = place_of(arm, None, None, gap=2e-4)
     loop = loop_of(name, arm.title, mode, place.mass)
-    gains = gains_for(loop, 20.0)
+    gains = press_gains(loop, 20.0)
     cell = cell_of(arm, place, KelvinVoigt(stiffness, 50.0, 0.0), loop)
     simulated = SimulatedArm(arm, loop, place, cell, physics, 0, resolution)
     simulated._body.q[0] += nudge

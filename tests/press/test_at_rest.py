@@ -8,10 +8,10 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.force import load_arm
-from palpate.press.engines import gains_for
-from palpate.press.tare import check_drift, fitting, noise_and_drift
+from palpate.press.engines import press_gains
+from palpate.press.sequence import check_drift, fitting, noise_and_drift
 
-GAINS = gains_for(load_arm("ur5e"), 20.0)
+GAINS = press_gains(load_arm("ur5e"), 20.0)
 TIMES = np.arange(250) / 500.0
 
 

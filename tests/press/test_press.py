@@ -18,11 +18,10 @@ from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, read_sensor
 from palpate.press.prepare import Question, arm_of, prepare_press, surface_of
-from palpate.press.pressing import press
+from palpate.press.pressing import press, summarise
 from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.summary import summarise
 from palpate.robots.serial.from_toml import names
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")

@@ -10,10 +10,9 @@ from palpate.cli import main
 from palpate.contact_frame import Payload
 from palpate.errors import InputError
 from palpate.press.prepare import Question, prepare_press, surface_of
-from palpate.press.setting import cell_of
+from palpate.press.pressing import summarise
+from palpate.press.setting import cell_of, held_tool, with_tool
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.summary import summarise
-from palpate.press.tool import held_tool, with_tool
 from palpate.report.press import notes
 from palpate.robots import SerialArm
 

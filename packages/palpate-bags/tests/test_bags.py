@@ -13,7 +13,7 @@ import pytest
 from logs.ros_bags import BEGIN, KINDS, joints, pose, storage, wrench, write_bag
 from palpate.errors import InputError
 from palpate.logs import read_log, read_wrench_and_pose
-from palpate.logs.kinds import kind_of
+from palpate.logs.formats import kind_of
 from palpate_bags import Bag
 
 TIME = np.arange(200) / 100

@@ -8,7 +8,7 @@ import pytest
 from logs.ros_bags import KINDS, pose, storage, wrench, write_bag
 from palpate.errors import InputError
 from palpate.logs import read_log
-from palpate.logs.kinds import kind_of
+from palpate.logs.formats import kind_of
 from palpate_bags import Bag
 
 TIME = np.arange(3000) / 1000

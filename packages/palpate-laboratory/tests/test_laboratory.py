@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from cli.json_keys import documented
 from palpate.bench import Experiment, build, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate_laboratory import (

@@ -220,7 +220,7 @@ def test_a_clean_switch_keeps_contact_and_reaches_the_force():
     good = fig_4_02.Switch(true_force=4.6, lost=False, last=20.3, most=22.0)
     assert good.clean
     for change in ({"true_force": 0.0}, {"lost": True}, {"last": 17.5}, {"most": 26.0}):
-        assert not fig_4_02.Switch(**{**good.__dict__, **change}).clean
+        assert not good._replace(**change).clean
 
 
 def test_the_starts_reach_is_told_in_words():

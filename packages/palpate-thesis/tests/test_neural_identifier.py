@@ -1,7 +1,5 @@
 """The figures of the neural identifier: what is measured, how it is judged, and that each figure stands."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -125,19 +123,19 @@ def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
     ],
 )
 def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
-    bad = replace(GOOD, **change)
+    bad = GOOD._replace(**change)
     found = claims.claims(grounds([bad] * 100), claims.FOAM)
     assert [c.id for c in found if c.verdict == "differs"] == [f"network-foam.{suffix}"]
 
 
 def test_nine_of_ten_runs_are_enough_and_fewer_are_not():
-    bad = replace(GOOD, M=-1.0)
+    bad = GOOD._replace(M=-1.0)
     assert claims.enough([GOOD] * 90 + [bad] * 10, claims.MASS)
     assert not claims.enough([GOOD] * 89 + [bad] * 11, claims.MASS)
 
 
 def test_a_note_names_the_part_of_the_sweep_that_agrees():
-    bad = replace(GOOD, M=-1.0)
+    bad = GOOD._replace(M=-1.0)
     swept = {NetworkChoice(): [bad] * 10, NetworkChoice(60.0, 0.1, thresholds=False): [GOOD] * 10}
     told = claims.where(grounds([bad] * 100, swept), claims.MASS)
     assert "fixed at zero: 60 N with weights to 0.1" in told
@@ -152,14 +150,14 @@ def test_variance_is_shared_out_between_starts_and_noise():
 
 def test_a_rate_is_slower_only_if_every_smaller_one_takes_longer():
     times = dict(zip(fig_6_06.SMALLER, (0.1, 0.2, 0.6, 2.0), strict=True))
-    by_rate = {rate: [replace(GOOD, error_gone=t)] for rate, t in times.items()}
+    by_rate = {rate: [GOOD._replace(error_gone=t)] for rate, t in times.items()}
     assert fig_6_06.slower_throughout(by_rate) == [True]
-    by_rate[fig_6_06.SMALLER[2]] = [replace(GOOD, error_gone=0.15)]
+    by_rate[fig_6_06.SMALLER[2]] = [GOOD._replace(error_gone=0.15)]
     assert fig_6_06.slower_throughout(by_rate) == [False]
 
 
 def test_a_rate_is_too_large_when_all_beyond_it_are_stuck_too():
-    stuck = [replace(GOOD, error_gone=np.inf)]
+    stuck = [GOOD._replace(error_gone=np.inf)]
     by_rate = {rate: stuck if rate in (1e-3, 3e-2, 1e-1) else [GOOD] for rate in fig_6_06.RATES}
     assert fig_6_06.stuck_from(by_rate) == 3e-2
     assert fig_6_06.stuck_from({rate: [GOOD] for rate in fig_6_06.RATES}) == np.inf

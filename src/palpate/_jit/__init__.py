@@ -5,11 +5,10 @@ cache; only where the cache has none does it hand Numba every law as it stands a
 overloads, and compile.
 """
 
-from palpate._jit.bound import BoundKernel
-from palpate._jit.kernels import Kernel, NotCompiled, kernel
+from palpate._jit.cache import sources_stamp
+from palpate._jit.kernels import BoundKernel, Kernel, NotCompiled, kernel
+from palpate._jit.overloads import reader, writer
 from palpate._jit.registry import law, part
-from palpate._jit.stamp import sources_stamp
-from palpate._jit.stored import reader, writer
 
 __all__ = [
     "BoundKernel",

@@ -1,21 +1,46 @@
-"""Kernels: from the cache where it has them, and else compiled when first called."""
+"""Kernels: from the cache where it has them, and else compiled when first called; or why they cannot be compiled."""
+
+from __future__ import annotations
 
 import functools
 import gc
 import importlib
+import re
+import signal
 import threading
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
-from palpate._jit.cache_files import hashed_files
-from palpate._jit.compile_lock import CompileLock
+from palpate._jit.cache import CompileLock, hashed_files, home_of, sources_stamp, stamp_of, text_of
 from palpate._jit.inline_compiler import entry, inside
-from palpate._jit.interrupts import interrupts_later
-from palpate._jit.overloads import operators_and_members
-from palpate._jit.registry import laws
-from palpate._jit.stamp import home_of, sources_stamp, stamp_of, text_of
-from palpate._jit.stored import hand_over
+from palpate._jit.overloads import hand_over, operators_and_members
+from palpate._jit.registry import ENTRY, PACKAGE, laws
+
+_Call = tuple[int, FrameType | None]
+
+
+@contextmanager
+def interrupts_later() -> Iterator[None]:
+    """Keep a Ctrl-C back until the block is done, then hand it to who would have had it.
+
+    Numba makes a kernel's result by calling the classes of its NamedTuples, where Python would raise KeyboardInterrupt;
+    Numba does not look whether they raised, and the process ends with a segmentation fault.
+    """
+    if threading.current_thread() is not threading.main_thread():  # no signal gets here
+        yield
+        return
+    held: list[_Call] = []
+    before = signal.signal(signal.SIGINT, lambda *call: held.append(call))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+    if held and callable(before):
+        before(*held[-1])
+
 
 _MAKING = threading.Lock()
 
@@ -159,3 +184,139 @@ def _hand_over() -> None:
     hand_over()
     while laws:
         importlib.import_module("numba.extending").register_jitable(**inside())(laws.pop())
+
+
+class BoundKernel:
+    """Calls a kernel; from the second call on straight at its machine code, a call costing a third or less.
+
+    Args:
+        kernel: what is called; the types of its arguments are those of the first call for ever.
+    """
+
+    def __init__(self, kernel: Kernel):
+        self._kernel, self._entry = kernel, None
+
+    def __call__(self, *args: Any) -> Any:
+        if self._entry is not None:
+            return self._entry(*args)
+        import numba
+
+        types = tuple(map(numba.typeof, args))
+        result = self._kernel(*args)
+        self._entry = self._kernel.compiled.overloads[types].entry_point
+        return result
+
+
+_PLACE = re.compile(r'File "([^"\n]+\.py)", line (\d+)')
+_RAISED = re.compile(r"Raised from (\S+\.py) \((\d+)\)")
+_PLAIN_FUNCTION = re.compile(
+    r"Untyped global name '(\w+)': Cannot determine Numba type of <class 'function'>"
+)
+_UNTYPED = re.compile(r"Untyped global name '(\w+)': *(?:Cannot determine Numba type of )?<?([^>\n]*)>?")
+_NO_FUNCTION = re.compile(r"No implementation of function Function\(<(?:built-in )?function (\w+)[^>]*>\)")
+_CALL = re.compile(r"^ *>>> (\w+\(.*\))$", re.MULTILINE)
+_LONGEST = 200
+"""Letters of the compiler's own words that are passed on."""
+
+
+def compiled_alone(method: Callable[..., Any], *arguments: Any) -> tuple[Any, str]:
+    """Compiles one function by itself.
+
+    Args:
+        method: as it was written.
+        arguments: for it.
+
+    Returns:
+        The Numba type that it returns and "", or None and why it cannot be compiled, in one line.
+    """
+    import numba
+
+    _hand_over()
+    dispatcher = numba.njit(**ENTRY)(method)
+    try:
+        dispatcher.compile(tuple(map(numba.typeof, arguments)))
+    except Exception as error:
+        if not type(error).__module__.startswith("numba."):
+            raise
+        return None, short(str(error))
+    return dispatcher.overloads[tuple(map(numba.typeof, arguments))].signature.return_type, ""
+
+
+def short(message: str) -> str:
+    """The compiler's message in one line."""
+    where = _place(message)
+    words = _words(message)
+    return f"{where}: {words}" if where else words
+
+
+def _place(message: str) -> str:
+    found = [*_PLACE.findall(message), *_RAISED.findall(message)]
+    own = [(file, line) for file, line in found if PACKAGE not in Path(file).resolve().parents]
+    return f"{Path(own[-1][0]).name}, line {own[-1][1]}" if own else ""
+
+
+def _words(message: str) -> str:
+    if plain := _PLAIN_FUNCTION.search(message):
+        return f"{plain[1]} is a plain function; mark it with @law (from palpate.bench import law)"
+    if unknown := _UNTYPED.search(message):
+        return (
+            f"the compiler cannot use {unknown[1]} ({unknown[2].strip()}); keep to numbers, vectors and laws"
+        )
+    if missing := _NO_FUNCTION.search(message):
+        call = _CALL.search(message)
+        told = call[1] if call else missing[1]
+        return f"the compiler knows no {told[:_LONGEST]}; keep to numbers, vectors and laws"
+    lines = [line.strip() for line in message.splitlines() if line.strip()]
+    told = next((line for line in lines if not line.startswith("Failed in nopython")), "it does not compile")
+    return _RAISED.sub("", told)[:_LONGEST].strip()
+
+
+class TypingRules:
+    """Numba's inference on laws and parts, as kernels have it."""
+
+    def __init__(self) -> None:
+        from numba.core.registry import cpu_target
+
+        from palpate._jit.inline_compiler import _flags
+
+        _hand_over()
+        self.context = cpu_target.typing_context
+        cpu_target.target_context.refresh()
+        self.context.refresh()
+        self._shared = _flags()[0]
+
+    def result(self, function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+        """The type of what a law or a method returns, given arguments of such types."""
+        from palpate._jit.overloads import _compiled_member
+
+        return self._within(
+            lambda: _compiled_member(function).get_call_type(self.context, kinds, {}).return_type
+        )
+
+    def implementation(self, callee: Any, kinds: tuple[Any, ...]) -> Callable[..., Any] | None:
+        """The function that stands for a call of `callee` with such types; None if there is none."""
+        from numba.core.errors import TypingError
+
+        def find() -> Callable[..., Any] | None:
+            for template in getattr(self.context.resolve_value_type(callee), "templates", ()):
+                dispatcher = None
+                with suppress(AttributeError, TypingError):  # it is no overload, or one for other types
+                    dispatcher, _ = template(self.context)._get_impl(kinds, {})
+                if dispatcher is not None:
+                    function: Callable[..., Any] = dispatcher.py_func
+                    return function
+            return None
+
+        return self._within(find)
+
+    def signature(self, callee: Any, kinds: tuple[Any, ...]) -> Any:
+        """The types that a call on numbers casts its arguments to, and that of its value."""
+        kind = self.context.resolve_value_type(callee)
+        return self._within(lambda: self.context.resolve_function_type(kind, kinds, {}))
+
+    def _within(self, ask: Callable[[], Any]) -> Any:
+        """Asks as a law would that a kernel calls, so that nothing is compiled twice."""
+        from numba.core.targetconfig import ConfigStack
+
+        with ConfigStack().enter(self._shared):
+            return ask()

@@ -1,14 +1,36 @@
-"""How Numba reads operators, methods and properties of parts: each is the class's own, as it is written."""
+"""How Numba reads and writes parts: operators, methods and properties are the class's own, as it is written.
+
+To name each of a hundred numbers in a kernel costs the compiler as much as the law that they are for: a part whose
+numbers lie one behind the other in an array is read and written whole.
+"""
+
+from __future__ import annotations
 
 import functools
 import inspect
 import operator
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
+from itertools import repeat
+from typing import Any, get_type_hints
 
-from palpate import _vector
 from palpate._jit.inline_compiler import inside
-from palpate._jit.registry import parts
+from palpate._jit.registry import parts, stored
+from palpate._vector import (
+    METHODS,
+    Vec3,
+    angular,
+    atan2,
+    clip,
+    cos,
+    exp,
+    linear,
+    outer,
+    sign,
+    sin,
+    sqrt,
+    trace,
+    widen,
+)
 
 
 @functools.cache
@@ -40,7 +62,7 @@ def _operators() -> None:
         _overload(getattr(operator, f"i{name}"))(_binary(name))  # a += b is a = a + b on values
     _overload_method_of_first(operator.neg, "__neg__", "a")
     _overload_method_of_first(abs, "__abs__", "a")
-    for function, name in _vector.METHODS.items():
+    for function, name in METHODS.items():
         _overload_method_of_first(function, name, *inspect.signature(function).parameters)
     _scalar_functions()
 
@@ -87,15 +109,15 @@ def _scalar_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
-    numbers(_vector.linear, lambda b: b)
-    numbers(_vector.angular, lambda b: b)
-    numbers(_vector.exp, lambda a: math.exp(a))
-    numbers(_vector.sqrt, lambda a: math.sqrt(a))
-    numbers(_vector.sin, lambda a: math.sin(a))
-    numbers(_vector.cos, lambda a: math.cos(a))
-    numbers(_vector.atan2, lambda y, x: math.atan2(y, x))
-    numbers(_vector.sign, lambda a: float((a > 0.0) - (a < 0.0)))
-    numbers(_vector.clip, lambda a, limit: min(max(a, -limit), limit))
+    numbers(linear, lambda b: b)
+    numbers(angular, lambda b: b)
+    numbers(exp, lambda a: math.exp(a))
+    numbers(sqrt, lambda a: math.sqrt(a))
+    numbers(sin, lambda a: math.sin(a))
+    numbers(cos, lambda a: math.cos(a))
+    numbers(atan2, lambda y, x: math.atan2(y, x))
+    numbers(sign, lambda a: float((a > 0.0) - (a < 0.0)))
+    numbers(clip, lambda a, limit: min(max(a, -limit), limit))
     _widen()
     _array_functions()
 
@@ -112,17 +134,17 @@ def _array_functions() -> None:
         typer.__signature__ = inspect.signature(body)  # type: ignore[attr-defined]
         _overload(function)(typer)
 
-    arrays(_vector.outer, lambda a, b: np.expand_dims(a, 1) * b)
-    arrays(_vector.trace, lambda A: np.trace(A))
-    arrays(_vector.exp, lambda a: np.exp(a))
+    arrays(outer, lambda a, b: np.expand_dims(a, 1) * b)
+    arrays(trace, lambda A: np.trace(A))
+    arrays(exp, lambda a: np.exp(a))
 
 
 def _widen() -> None:
     from numba import types
 
-    vector = _vector.Vec3
+    vector = Vec3
 
-    @_overload(_vector.widen)
+    @_overload(widen)
     def typer(b: Any) -> Any:
         if _is_part(b):
             return lambda b: b
@@ -212,3 +234,117 @@ def _call(compiled: Any, context: Any, builder: Any, signature: Any, args: Any) 
     call = context.get_function(compiled, signature)
     context.add_linking_libs(getattr(call, "libs", ()))
     return call(builder, args)
+
+
+_known: set[Callable[..., Any]] = set()
+"""Those that Numba knows."""
+
+
+def places(part: type, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Names of every number of a part, from the outermost field in, in their order."""
+    fields = get_type_hints(part) if part is not float else {}
+    return [place for name, kind in fields.items() for place in places(kind, (*path, name))] or [path]
+
+
+def leaves(tree: Any) -> Iterator[float]:
+    """Every number of nested tuples, in their order."""
+    for branch in tree:
+        if isinstance(branch, tuple):
+            yield from leaves(branch)
+        else:
+            yield float(branch)
+
+
+def reader(part: type) -> Callable[[Any], Any]:
+    """A law that makes a part, of numbers and parts of them, of an array that begins with its numbers."""
+
+    def read(a: Any) -> Any:
+        return _make_part(part, iter(a))
+
+    stored[read] = part, True
+    return read
+
+
+def writer(part: type) -> Callable[[Any, Any], None]:
+    """A law that puts a part's numbers at the beginning of an array."""
+
+    def write(a: Any, value: Any) -> None:
+        for i, number in enumerate(leaves(value)):
+            a[i] = number
+
+    stored[write] = part, False
+    return write
+
+
+def _make_part(part: type, numbers: Iterator[Any]) -> Any:
+    kinds = get_type_hints(part).values()
+    return part(*(float(next(numbers)) if kind is float else _make_part(kind, numbers) for kind in kinds))
+
+
+def kind_of(part: type) -> Any:
+    """Numba's type of a part of numbers and parts of them."""
+    import numba
+
+    return numba.typeof(_make_part(part, repeat(0.0)))
+
+
+def hand_over() -> None:
+    """Tells Numba what those registered since the last time do: a load, or a store, of the whole part."""
+    from numba.extending import overload
+
+    from palpate._jit.inline_compiler import inside
+
+    for function in [one for one in stored if one not in _known]:
+        part, reads = stored[function]
+        _known.add(function)
+        meaning = _reading(_load(kind_of(part))) if reads else _writing(_store(kind_of(part)))
+        overload(function, strict=False, jit_options=inside())(meaning)
+
+
+def _reading(load: Any) -> Callable[..., Any]:
+    return lambda a: lambda a: load(a)  # noqa: ARG005 - Numba goes by the names
+
+
+def _writing(store: Any) -> Callable[..., Any]:
+    return lambda a, value: lambda a, value: store(a, value)  # noqa: ARG005 - likewise
+
+
+def _load(kind: Any) -> Any:
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def load(typing: Any, a: Any) -> Any:
+        def lowered(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return builder.load(_place(context, builder, signature, args, kind), align=8)
+
+        return (kind(a), lowered) if _is_plain(a) else None
+
+    return load
+
+
+def _store(kind: Any) -> Any:
+    from numba import types
+    from numba.extending import intrinsic
+
+    @intrinsic
+    def store(typing: Any, a: Any, value: Any) -> Any:
+        def lowered(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            builder.store(args[1], _place(context, builder, signature, args, kind), align=8)
+            return context.get_dummy_value()
+
+        return (types.void(a, kind), lowered) if _is_plain(a) else None
+
+    return store
+
+
+def _is_plain(kind: Any) -> bool:
+    """An array of numbers that lie one behind the other."""
+    from numba import types
+
+    return isinstance(kind, types.Array) and kind.layout == "C" and kind.dtype == types.float64
+
+
+def _place(context: Any, builder: Any, signature: Any, args: Any, kind: Any) -> Any:
+    """The array's memory as that of the part."""
+    data = context.make_array(signature.args[0])(context, builder, args[0]).data
+    return builder.bitcast(data, context.get_value_type(kind).as_pointer())

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from palpate import _vector
+from palpate._vector import Mat3, Vec3, Vec6
 
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
@@ -13,7 +13,7 @@ laws: list[Callable[..., Any]] = []
 foreign_laws: list[Callable[..., Any]] = []
 parts: dict[type, None] = {}
 stored: dict[Callable[..., Any], tuple[type, bool]] = {}
-"""Functions that read (true), or write, a part's numbers in an array: `palpate._jit.stored`."""
+"""Functions that read (true), or write, a part's numbers in an array: `palpate._jit.overloads`."""
 foreign_files: set[Path] = set()
 """Sources of the user's plug-ins, and what they import from beside them."""
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -38,6 +38,6 @@ def part(cls: C) -> C:
     return cls
 
 
-part(_vector.Vec3)
-part(_vector.Mat3)
-part(_vector.Vec6)
+part(Vec3)
+part(Mat3)
+part(Vec6)

@@ -4,16 +4,22 @@ from palpate.bench import build, load
 record = build(load("foam-hybrid")).run(duration=60.0, seed=1, press=8.0)
 
 Without arm and control, a tip on a given path: `given_motion(surface).run(path)`.
+
+Its names are looked up when they are first used: the summary of a press waits for no bench.
 """
 
-from palpate._jit import law, part
-from palpate._vector import Vec3
-from palpate.bench.bench import Bench
-from palpate.bench.build import build
-from palpate.bench.given_motion import GivenMotion, given_motion
-from palpate.bench.plant import Loop, march, start_at
-from palpate.bench.summary import summarise
-from palpate.bench.tables import Experiment, ForceSensorTable, load, names, source, with_values
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from palpate._jit import law, part
+    from palpate._vector import Vec3
+    from palpate.bench.bench import Bench
+    from palpate.bench.build import build
+    from palpate.bench.given_motion import GivenMotion, given_motion
+    from palpate.bench.plant import Loop, march, start_at
+    from palpate.bench.summary import summarise
+    from palpate.bench.tables import Experiment, ForceSensorTable, load, names, source, with_values
 
 __all__ = [
     "Bench",
@@ -34,3 +40,22 @@ __all__ = [
     "summarise",
     "with_values",
 ]
+
+_HOME = {
+    "_jit": ("law", "part"),
+    "_vector": ("Vec3",),
+    "bench.bench": ("Bench",),
+    "bench.build": ("build",),
+    "bench.given_motion": ("GivenMotion", "given_motion"),
+    "bench.plant": ("Loop", "march", "start_at"),
+    "bench.summary": ("summarise",),
+    "bench.tables": ("Experiment", "ForceSensorTable", "load", "names", "source", "with_values"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOME.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(f"palpate.{module}"), name)
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

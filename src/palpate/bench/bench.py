@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench.estimators import Identifier, watch_run
-from palpate.bench.force_input import COLUMNS, DONE, INTERRUPTED, NO_CONTACT, Ending, StopCondition
+from palpate.bench.force_input import COLUMNS, StopCondition
 from palpate.bench.plant import Loop, start_at
 from palpate.bench.simulation import Simulation
+from palpate.bench.summary import DONE, INTERRUPTED, NO_CONTACT, Ending
 from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.records import Readable, Record

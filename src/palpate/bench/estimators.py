@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import kernel, law, part
 from palpate._vector import Vec3
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.errors import PartError
 from palpate.identifiers.kernels.least_squares import LeastSquares, LeastSquaresState
 from palpate.plugins import reason

@@ -7,7 +7,6 @@ A run looks for the surface, presses on it, finds that it is lost (thesis, ch. 4
 number with a unit.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
+from palpate.bench.summary import APPROACH, CONTACT, DIVERGED, LOST, LOST_CONTACT, Ending
 from palpate.bench.tables import ForceSensorTable
 from palpate.instruments import Converter, ForceSensor, ForceSensorState, analog_filter_190, force_sensor
 from palpate.references import Approach
@@ -166,10 +166,6 @@ def force_input(of: ForceSensorTable, physics: int, full_scale: float = 200.0) -
     return ForceInput(sensor, analog, filtered, Converter(16, full_scale), float(of.roughness))
 
 
-APPROACH, CONTACT, LOST = 0.0, 1.0, 2.0
-PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
-
-
 @part
 class SequenceState(NamedTuple):
     phase: float  # APPROACH, CONTACT or LOST
@@ -272,28 +268,6 @@ def put(out, at, vector):
     """Writes a vector's three components into out from column `at` on; the next free column."""
     out[at], out[at + 1], out[at + 2] = vector.x, vector.y, vector.z
     return at + 3
-
-
-DONE, NO_CONTACT, DIVERGED, LOST_CONTACT, INTERRUPTED = (
-    "done",
-    "no contact",
-    "diverged",
-    "lost contact",
-    "interrupted",
-)
-
-
-@dataclass(frozen=True)
-class Ending:
-    """Why a run ended.
-
-    Args:
-        end: the stable word.
-        why: a sentence with the time.
-    """
-
-    end: str
-    why: str
 
 
 class StopCondition:

@@ -13,7 +13,7 @@ from palpate.arrays import Array
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
 from palpate.bench.tables import ForceSensorTable
 from palpate.environments import SurfaceState, join
-from palpate.environments.surface import members
+from palpate.environments.surface import members, rest_for
 from palpate.environments.surface_state import follow
 from palpate.errors import InputError
 from palpate.records import Record
@@ -99,10 +99,6 @@ COLUMNS = {
 SENSOR = ForceSensorTable()
 RIGID = 1e12
 """Effective mass of a tip that nothing turns from its path [kg]."""
-SHALLOW = 1e-6
-"""Depth at which the search begins [m]."""
-DEEPEST = 10.0
-"""Depth at which it is given up [m]."""
 
 
 @law
@@ -286,26 +282,3 @@ def _truth(surface: Any) -> dict[str, dict[str, Any]]:
     """{name: {"value", "unit"}}; empty for a part without `truth`."""
     truth = surface.truth() if hasattr(surface, "truth") else {}
     return {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
-
-
-def rest_for(surface: Any, force: float, rate: float) -> float:
-    """Penetration [m] at which a relaxed surface moving at a rate [m/s] carries a force [N], without inertia.
-
-    Negative if the damping alone carries more than that.
-
-    Raises:
-        InputError: no depth within metres carries it.
-    """
-    from scipy.optimize import brentq
-
-    def short(depth: float) -> float:
-        return float(surface.force(SurfaceState(depth, rate, 0.0, 1.0), depth, rate)) - force
-
-    bound = SHALLOW if short(0.0) < 0.0 else -SHALLOW
-    while short(0.0) * short(bound) > 0.0:
-        bound *= 2.0
-        if abs(bound) > DEEPEST:
-            raise InputError(
-                f"no depth of the new surface carries the {force:g} N of the old one; change the surface"
-            )
-    return float(brentq(short, 0.0, bound, xtol=1e-18, rtol=1e-15))

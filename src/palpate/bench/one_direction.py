@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from palpate._jit import kernel, law
 from palpate.arrays import Array
-from palpate.bench.force_input import APPROACH, CONTACT, DONE, LOST, NO_CONTACT
+from palpate.bench.summary import APPROACH, CONTACT, DONE, LOST, NO_CONTACT
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop, load_arm
 from palpate.force.gains import Gains, gains_for, known_lag

@@ -10,7 +10,6 @@ from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.bench.estimators import Estimators, EstimatorsState
 from palpate.bench.force_input import (
-    CONTACT,
     Conditioning,
     ConditioningState,
     ForceInput,
@@ -19,6 +18,7 @@ from palpate.bench.force_input import (
     SequenceState,
     put,
 )
+from palpate.bench.summary import CONTACT
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import Surface

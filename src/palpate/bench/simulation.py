@@ -13,8 +13,9 @@ import numpy as np
 from palpate._jit import NotCompiled
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
-from palpate.bench.force_input import COLUMNS, CONTACT
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import ALONG_X, Loop, LoopState, compiled_march, march, tick
+from palpate.bench.summary import CONTACT
 from palpate.environments.surface_state import touch
 from palpate.errors import PartError
 from palpate.plugins import reason
@@ -71,7 +72,7 @@ def uncompilable(loop: Loop, state: LoopState) -> str:
     """Which method of the user's parts does not compile, and why; "" if all do."""
     import numba
 
-    from palpate._jit.compiler_message import compiled_alone
+    from palpate._jit.kernels import compiled_alone
 
     for one in calls(loop, state):
         returned, why = compiled_alone(getattr(type(one.part), one.method), one.part, *one.arguments)

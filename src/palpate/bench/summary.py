@@ -1,13 +1,22 @@
-"""The summary of a run: outcome, force, limits of the motors, estimates and the truth."""
+"""Phases and endings of a run, and its summary: outcome, force, limits of the motors, estimates and the truth."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.force_input import CONTACT, LOST
 from palpate.records import Record
 
+APPROACH, CONTACT, LOST = 0.0, 1.0, 2.0
+PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
+DONE, NO_CONTACT, DIVERGED, LOST_CONTACT, INTERRUPTED = (
+    "done",
+    "no contact",
+    "diverged",
+    "lost contact",
+    "interrupted",
+)
 BAND = 0.05
 """Settled: within this share of the desired force."""
 TICK_ROUNDING = 5e-7
@@ -27,6 +36,19 @@ FRONT_ENDS = ("thesis", "raw", "matched")
 IDENTIFIER = "identifier"
 """The one that an experiment asks for besides."""
 PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Why a run ended.
+
+    Args:
+        end: the stable word.
+        why: a sentence with the time.
+    """
+
+    end: str
+    why: str
 
 
 def summarise(record: Record) -> dict[str, Any]:

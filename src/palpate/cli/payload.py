@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 from palpate.cli._program import print_result
-from palpate.cli.options.arm import FrameOptions
 from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
 from palpate.cli.options.kept import CellOptions
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, si
 from palpate.errors import InputError
 from palpate.files import write_text
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Weighed
+    from palpate.contact_frame.tool_payload import Weighed
     from palpate.records import Record
 
 
@@ -84,7 +83,9 @@ def payload(
     report = output.page()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
-    from palpate.contact_frame import ContactFrame, compare, read_load, weigh
+    from palpate.contact_frame.load_files import compare, read_load
+    from palpate.contact_frame.signals_in_base import ContactFrame
+    from palpate.contact_frame.tool_payload import weigh
     from palpate.report.payload import answer_of
 
     load = None if output.check is None else read_load(output.check)
@@ -118,7 +119,7 @@ def _write(
     start: tuple[float, float, float],
 ) -> list[Path]:
     """Write the payload and the page; returns the written files."""
-    from palpate.contact_frame import load_text
+    from palpate.contact_frame.load_files import load_text
     from palpate.report.payload import page
 
     out, report = files if found.payload is not None else (None, files[1])

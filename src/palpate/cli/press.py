@@ -84,7 +84,7 @@ def press(
 
 
 def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
-    from palpate.bench.force_input import DONE, INTERRUPTED
+    from palpate.bench.summary import DONE, INTERRUPTED
     from palpate.press.prepare import prepare_press
     from palpate.report.press import answer_of
 
@@ -105,8 +105,8 @@ def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int
 def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
     from dataclasses import replace as changed
 
-    from palpate.logs import write_record
-    from palpate.press.summary import summarise
+    from palpate.logs.tables.parquet import write_record
+    from palpate.press.pressing import summarise
     from palpate.report.press import write_report
 
     record = changed(record, meta={**record.meta, "command": printable(command())})

@@ -9,13 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
-
 from palpate.cli._program import print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import COMPILING, console, simulation_progress
 from palpate.cli.options.common import (
-    DRAWN,
     QUIET,
     Experiment,
     FigureOptions,
@@ -25,7 +22,7 @@ from palpate.cli.options.common import (
     print_names,
     source_of,
 )
-from palpate.cli.options.values import FLAG, WHOLE
+from palpate.cli.options.values import WHOLE
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
 from palpate.text import printable
@@ -37,15 +34,6 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 
-@Parameter(name="*", group=DRAWN)
-@dataclass(frozen=True, kw_only=True)
-class DrawnOptions(FigureOptions):
-    """Figures and a film."""
-
-    movie: Annotated[bool, FLAG] = False
-    "Write a film of the arm too, arm.gif; it takes some ten seconds."
-
-
 def run(
     name: Annotated[Experiment | None, QUIET] = None,
     /,
@@ -54,13 +42,13 @@ def run(
     known: KnownOptions | None = None,
     own: PluginOptions | None = None,
     output: FolderOptions | None = None,
-    drawn: DrawnOptions | None = None,
+    drawn: FigureOptions | None = None,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
     palpate run foam-hybrid --seed 1 --out runs/foam
 
-    The folder holds record.parquet, summary.json, figures and report.html; the default is runs/NAME-SEED.
+    The folder holds record.parquet, summary.json, film.svg, figures and report.html; the default is runs/NAME-SEED.
 
     Parameters
     ----------
@@ -69,7 +57,7 @@ def run(
     seed
         Of the noise; the same seed gives the same numbers.
     """
-    known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or DrawnOptions()
+    known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or FigureOptions()
     from palpate.bench.build import FILES, load_any, parse_any
 
     if known.list_:
@@ -79,7 +67,7 @@ def run(
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
-    from palpate.bench.force_input import DONE, INTERRUPTED
+    from palpate.bench.summary import DONE, INTERRUPTED
 
     drawn.check()
     with (own or PluginOptions()).consent():
@@ -120,13 +108,13 @@ def _run(
     asked: _RunRequest,
     folder: Path,
     output: FolderOptions,
-    drawn: DrawnOptions,
+    drawn: FigureOptions,
     interrupted: Callable[[], bool],
 ) -> _Ran:
     """Runs and writes the folder of results."""
-    from palpate.bench import summarise
     from palpate.bench.one_direction import OneDirection
-    from palpate.logs import write_record
+    from palpate.bench.summary import summarise
+    from palpate.logs.tables.parquet import write_record
 
     with fresh_folder(folder, replace=output.replace) as fresh:
         command = printable(f"palpate run {shlex.quote(asked.name)} --seed {asked.seed}")
@@ -155,7 +143,7 @@ def _draw(
     summary: dict[str, Any],
     found: Identification | None,
     source: str,
-    drawn: DrawnOptions,
+    drawn: FigureOptions,
 ) -> None:
     """Figures, page and film of a run."""
     about = record.meta["experiment"]
@@ -172,16 +160,16 @@ def _draw(
     sha256, why = sha256_of(folder / RECORD), summary["not_identified"]
     content = Content(about["title"], about["about"], source, summary, found, why, sha256)
     write_text(folder / "report.html", run_page(record, content))
-    if drawn.movie:
-        from palpate.report.run.movie import write_movie
+    if len(record) > 1:
+        from palpate.report.run.film import film
 
-        write_movie(record, folder / "arm.gif")
+        write_text(folder / "film.svg", film(record))
 
 
 def _identify(record: Path) -> tuple[Identification | None, str]:
     """The identification of the record by `palpate identify`, or the reason for its absence."""
-    from palpate.cli.identify import ModelOptions
-    from palpate.cli.one_log import OneLog
+    from palpate.cli.identify import OneLog
+    from palpate.cli.options.log import ModelOptions
 
     try:
         return OneLog(ModelOptions()).identification(record)[0], ""

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.cli._program import command, print_result
-from palpate.cli.one_log import read_found
-from palpate.cli.options.common import ReportOption
+from palpate.cli.options.common import ReportOption, read_found
 from palpate.cli.options.force import (
     ColumnOptions,
     LoopArmOptions,

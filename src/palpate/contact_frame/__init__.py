@@ -3,16 +3,20 @@
 A wrist's force sensor shows f = R^T (s F + w) + b: the force F that the tool exerts, turned into the tool's axes by
 its rotation R and with a sign s that drivers choose, the tool's weight w and the sensor's bias b. The pose p, R of a
 frame on the tool gives the point that touches, p + R r. Along the normal n these are F n and (p + R r) n.
+
+Its names are looked up when they are first used: a record of one axis waits for no weighing.
 """
 
-from __future__ import annotations
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from palpate.contact_frame.arm import describe, robot_stiffness, with_arm
-from palpate.contact_frame.load import Payload, load_payload
-from palpate.contact_frame.load_files import compare, load_text, read_load
-from palpate.contact_frame.projecting import identify_contact, project
-from palpate.contact_frame.signals_in_base import ArmDynamics, ContactFrame
-from palpate.contact_frame.tool_payload import Weighed, weigh
+if TYPE_CHECKING:
+    from palpate.contact_frame.arm import ArmDynamics, describe, identify_contact, robot_stiffness, with_arm
+    from palpate.contact_frame.load import Payload, load_payload
+    from palpate.contact_frame.load_files import compare, load_text, read_load
+    from palpate.contact_frame.projecting import project
+    from palpate.contact_frame.signals_in_base import ContactFrame
+    from palpate.contact_frame.tool_payload import Weighed, weigh
 
 __all__ = [
     "ArmDynamics",
@@ -30,3 +34,20 @@ __all__ = [
     "weigh",
     "with_arm",
 ]
+
+_HOME = {
+    "arm": ("ArmDynamics", "describe", "identify_contact", "robot_stiffness", "with_arm"),
+    "load": ("Payload", "load_payload"),
+    "load_files": ("compare", "load_text", "read_load"),
+    "projecting": ("project",),
+    "signals_in_base": ("ContactFrame",),
+    "tool_payload": ("Weighed", "weigh"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOME.items():
+        if name in names:
+            value = globals()[name] = getattr(import_module(f"{__name__}.{module}"), name)
+            return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

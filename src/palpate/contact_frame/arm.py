@@ -1,18 +1,188 @@
-"""The arm's effect on the numbers: the tool's mass beyond the sensor, its own compliance, and both in sentences."""
+"""The object that an arm touched: an identification, with the mass and stiffness of the arm itself taken off."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from importlib.metadata import entry_points
+from typing import Any, Literal
 
 import numpy as np
 
-from palpate.contact_frame.signals_in_base import ArmDynamics
+from palpate.contact_frame.signals_in_base import FORCE, ContactFrame, signals_of
 from palpate.errors import InputError
-from palpate.identification import Code, Identification, Parameter, Verdict, Warn
+from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
+from palpate.records import Record
 from palpate.signals.types import NORMAL
 from palpate.units import GRAVITY
+
+
+@dataclass(frozen=True)
+class ArmDynamics:
+    """Mass and stiffness between the sensors and the surface.
+
+    Args:
+        tool_mass: mass between the force sensor and the surface and its standard deviation [kg]; None if not known.
+        stiffness: of the arm between the position sensors and the surface, with its std [N/m]; None if not known.
+        mass: of the arm's tip before the force sensor, which swings on that stiffness, with its std [kg].
+        position_from: source of the position: encoders in the `joints`, or a sensor of the `tip`.
+
+    Raises:
+        InputError: a negative mass, or one that no stiffness holds.
+    """
+
+    tool_mass: tuple[float, float] | None = None
+    stiffness: tuple[float, float] | None = None
+    mass: tuple[float, float] | None = None
+    position_from: Literal["joints", "tip"] | None = None
+
+    def __post_init__(self) -> None:
+        if self.tool_mass is not None and not (self.tool_mass[0] >= 0 and self.tool_mass[1] >= 0):
+            raise InputError(
+                f"the tool's mass must be 0 kg or more, got {self.tool_mass[0]:g}:{self.tool_mass[1]:g}"
+            )
+        if self.mass is not None and not (self.mass[0] >= 0 and self.mass[1] >= 0):
+            raise InputError(f"the robot's mass must be 0 kg or more, got {self.mass[0]:g}:{self.mass[1]:g}")
+
+
+def identify_contact(
+    record: Record,
+    frame: ContactFrame | None = None,
+    arm: ArmDynamics | None = None,
+    *,
+    tolerance: float = 0.25,
+    calibration: float = 0.0,
+    **options: Any,
+) -> tuple[Identification, Record]:
+    """Find what an arm touched.
+
+    Args:
+        record: force and position, or wrench and pose, over time.
+        frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
+        arm: mass and stiffness between the sensors and the surface.
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+        options: of `palpate.identify`.
+
+    Returns:
+        The identification, and the record along the normal that it is of.
+
+    Raises:
+        InputError: the record or an argument is wrong, in one line.
+    """
+    arm = _complete(arm or ArmDynamics(), record.meta)
+    spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
+    in_space = FORCE[0] in record.columns
+    if in_space:
+        from palpate.contact_frame.projecting import project
+
+        whole = record
+        record = project(record, frame or ContactFrame())
+        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
+    elif inertia is not None:
+        record = _note_inertia_sign(record, inertia)
+    if arm.stiffness is not None:
+        options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
+        options["series_mass"] = arm.mass
+    elif arm.mass is not None:
+        raise InputError("the robot's mass swings on the robot's own stiffness: give --robot-stiffness too")
+    scale = float(np.hypot(calibration, spread))
+    found = identify(record, tolerance=tolerance, calibration=scale, **options)
+    if in_space and not record.meta["contact_frame"]["normal_shown"]:
+        found = _refuse_direction(found)
+    if in_space and Code.NO_CONTACT.word in found.codes:
+        found, record = _all_free(found, record)
+    if inertia is not None:
+        found = _mistaken(found, inertia)
+    about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
+    record = replace(record, meta={**record.meta, "arm": about})
+    found = with_arm(found, arm, tolerance, from_pose=in_space)
+    asked = frame or ContactFrame(), arm, tolerance, calibration
+    slid = _slide(whole, asked, found, record) if in_space else None
+    if slid is None or slid.slide is None:
+        return slid or found, record
+    meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
+    return slid, replace(record, meta=meta)
+
+
+def _complete(arm: ArmDynamics, said: Mapping[str, Any]) -> ArmDynamics:
+    """An arm with what its record says of it; what is given goes first."""
+    return replace(
+        arm,
+        position_from=arm.position_from or said.get("position_from"),
+        tool_mass=arm.tool_mass or said.get("tool_mass_kg"),
+        stiffness=arm.stiffness or said.get("robot_stiffness_N_per_m"),
+        mass=arm.mass or said.get("robot_mass_kg"),
+    )
+
+
+def _slide(
+    record: Record,
+    asked: tuple[ContactFrame, ArmDynamics, float, float],
+    press: Identification,
+    along: Record,
+) -> Identification | None:
+    """The identification of a slide, by `palpate-slide`, or of a press without a K that may be a slide's; or None."""
+    for entry in entry_points(group="palpate.slides"):
+        found: Identification | None = entry.load()(signals_of(record, asked[0]), *asked, press, along)
+        return found
+    return None
+
+
+def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:
+    """A record whose tool's inertia was weighed with the wrong sign says so."""
+    from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
+
+    if not wrong_sign(inertia):
+        return record
+    note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
+    return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
+
+
+def _refuse_direction(found: Identification) -> Identification:
+    """If the force has no direction, a fit along any direction is chance."""
+    reason = "the force has no direction, so there seems to be no contact"
+    refused = {
+        name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
+        for name, p in found.parameters.items()
+    }
+    warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
+    return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
+
+
+def _mistaken(found: Identification, inertia: tuple[float, float]) -> Identification:
+    """A contact alone cannot separate a mass compensated with the wrong sign from a lag and a damping."""
+    from palpate.contact_frame.free_motion import wrong_sign
+
+    if not wrong_sign(inertia):
+        return found
+    reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
+    refused = {
+        name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)
+        for name, p in found.parameters.items()
+        if name in {"B", "M"}
+    }
+    return replace(found, parameters={**found.parameters, **refused})
+
+
+def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:
+    """Where nothing is touched, there is no contact that the log could begin in, no normal and no side of a force."""
+    about = {**record.meta["contact_frame"], "untouched": True}
+    warnings = tuple(
+        w for w in found.warnings if w.code not in (Code.CONTACT_AT_START, Code.NORMAL_UNCERTAIN)
+    )
+    return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
+
+
+def _about_arm(arm: ArmDynamics) -> dict[str, Any]:
+    """Properties of the arm, as plain values."""
+    return {
+        "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
+        "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,
+        "robot_mass_kg": list(arm.mass) if arm.mass else None,
+        "position_from": arm.position_from,
+    }
+
 
 LOWER_BOUND = "a lower bound of the surface's stiffness"
 """Begins the reason of a K that holds the arm's own compliance."""

@@ -6,14 +6,11 @@ own mass and compliance are removed.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from importlib.metadata import entry_points
 from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.arm import with_arm
 from palpate.contact_frame.free_motion import (
     CHANCE,
     FEWEST,
@@ -24,8 +21,6 @@ from palpate.contact_frame.free_motion import (
 )
 from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
 from palpate.contact_frame.signals_in_base import (
-    FORCE,
-    ArmDynamics,
     BaseSignals,
     ContactFrame,
     Unloaded,
@@ -33,7 +28,7 @@ from palpate.contact_frame.signals_in_base import (
     signals_of,
 )
 from palpate.errors import InputError
-from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
+from palpate.identification import Identification, Verdict
 from palpate.records import Record
 
 _LEAST = 0.3
@@ -256,126 +251,35 @@ def _about(
     }
 
 
-def identify_contact(
-    record: Record,
-    frame: ContactFrame | None = None,
-    arm: ArmDynamics | None = None,
-    *,
-    tolerance: float = 0.25,
-    calibration: float = 0.0,
-    **options: Any,
-) -> tuple[Identification, Record]:
-    """Find what an arm touched.
+def residual_of_press(
+    press: Identification, about: dict[str, Any], time: Array, place: Array, velocity: Array, force: Array
+) -> Array:
+    """The force that a press leaves unexplained [N], shape (n, 3): along the normal by K, depth and speed, else whole.
+
+    Each contact, and free motion, begins from a force of its own. A K that is not identified is fitted here.
 
     Args:
-        record: force and position, or wrench and pose, over time.
-        frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
-        arm: mass and stiffness between the sensors and the surface.
-        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
-        calibration: relative standard deviation of the scales of force and position together.
-        options: of `palpate.identify`.
-
-    Returns:
-        The identification, and the record along the normal that it is of.
-
-    Raises:
-        InputError: the record or an argument is wrong, in one line.
+        press: its contacts and K.
+        about: its normal and sign, as `project` gives them in `meta`.
+        time: [s], shape (n,).
+        place: of the tip in the base [m], shape (n, 3).
+        velocity: likewise [m/s].
+        force: in the base, of either sign [N], shape (n, 3).
     """
-    arm = arm or ArmDynamics()
-    arm = replace(
-        arm,
-        position_from=arm.position_from or record.meta.get("position_from"),
-        tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
-        stiffness=arm.stiffness or record.meta.get("robot_stiffness_N_per_m"),
-        mass=arm.mass or record.meta.get("robot_mass_kg"),
-    )
-    spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
-    in_space = FORCE[0] in record.columns
-    if in_space:
-        whole = record
-        record = project(record, frame or ContactFrame())
-        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
-    elif inertia is not None and wrong_sign(inertia):
-        record = _note_inertia_sign(record, inertia)
-    if arm.stiffness is not None:
-        options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
-        options["series_mass"] = arm.mass
-    elif arm.mass is not None:
-        raise InputError("the robot's mass swings on the robot's own stiffness: give --robot-stiffness too")
-    scale = float(np.hypot(calibration, spread))
-    found = identify(record, tolerance=tolerance, calibration=scale, **options)
-    if in_space and not record.meta["contact_frame"]["normal_shown"]:
-        found = _refuse_direction(found)
-    if in_space and Code.NO_CONTACT.word in found.codes:
-        found, record = _all_free(found, record)
-    if wrong_sign(inertia):
-        found = _mistaken(found)
-    about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
-    record = replace(record, meta={**record.meta, "arm": about})
-    found = with_arm(found, arm, tolerance, from_pose=in_space)
-    slid = (
-        _slide((whole, frame or ContactFrame(), arm, tolerance, calibration), found, record)
-        if in_space
-        else None
-    )
-    if slid is None or slid.slide is None:
-        return slid or found, record
-    meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
-    return slid, replace(record, meta=meta)
-
-
-def _slide(
-    asked: tuple[Record, ContactFrame, ArmDynamics, float, float], press: Identification, along: Record
-) -> Identification | None:
-    """The identification of a slide, by `palpate-slide`, or of a press without a K that may be a slide's; or None."""
-    for entry in entry_points(group="palpate.slides"):
-        found: Identification | None = entry.load()(signals_of(*asked[:2]), *asked[1:], press, along)
-        return found
-    return None
-
-
-def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:
-    """A record whose tool's inertia was weighed with the wrong sign says so."""
-    note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
-    return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
-
-
-def _refuse_direction(found: Identification) -> Identification:
-    """If the force has no direction, a fit along any direction is chance."""
-    reason = "the force has no direction, so there seems to be no contact"
-    refused = {
-        name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
-        for name, p in found.parameters.items()
-    }
-    warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
-    return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
-
-
-def _mistaken(found: Identification) -> Identification:
-    """A contact alone cannot separate a mass compensated with the wrong sign from a lag and a damping."""
-    reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
-    refused = {
-        name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)
-        for name, p in found.parameters.items()
-        if name in {"B", "M"}
-    }
-    return replace(found, parameters={**found.parameters, **refused})
-
-
-def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:
-    """Where nothing is touched, there is no contact that the log could begin in, no normal and no side of a force."""
-    about = {**record.meta["contact_frame"], "untouched": True}
-    warnings = tuple(
-        w for w in found.warnings if w.code not in (Code.CONTACT_AT_START, Code.NORMAL_UNCERTAIN)
-    )
-    return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
-
-
-def _about_arm(arm: ArmDynamics) -> dict[str, Any]:
-    """Properties of the arm, as plain values."""
-    return {
-        "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
-        "robot_stiffness_N_per_m": list(arm.stiffness) if arm.stiffness else None,
-        "robot_mass_kg": list(arm.mass) if arm.mass else None,
-        "position_from": arm.position_from,
-    }
+    n = np.array(about["normal"])
+    force = force if about["force_sign"] == "action" else -force
+    contact = np.zeros(len(time), int)
+    for i, (start, end) in enumerate(press.contacts):
+        contact[(time >= start) & (time <= end)] = i + 1
+    begins = np.equal.outer(contact, np.unique(contact)).astype(float)
+    depth, speed = (np.where(contact > 0, vectors @ n, 0.0) for vectors in (place, velocity))
+    K, along = press.parameters["K"], force @ n
+    left = force - np.outer(along, n)
+    columns = np.column_stack([begins, speed])
+    if K.verdict is Verdict.IDENTIFIED and K.value is not None:
+        along = along - K.value * depth
+    else:
+        columns = np.column_stack([columns, depth])
+    left -= begins @ np.linalg.lstsq(begins, left, rcond=None)[0]
+    found: Array = left + np.outer(along - columns @ np.linalg.lstsq(columns, along, rcond=None)[0], n)
+    return found

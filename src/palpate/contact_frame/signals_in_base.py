@@ -78,34 +78,6 @@ class ContactFrame:
             )
 
 
-@dataclass(frozen=True)
-class ArmDynamics:
-    """Mass and stiffness between the sensors and the surface.
-
-    Args:
-        tool_mass: mass between the force sensor and the surface and its standard deviation [kg]; None if not known.
-        stiffness: of the arm between the position sensors and the surface, with its std [N/m]; None if not known.
-        mass: of the arm's tip before the force sensor, which swings on that stiffness, with its std [kg].
-        position_from: source of the position: encoders in the `joints`, or a sensor of the `tip`.
-
-    Raises:
-        InputError: a negative mass, or one that no stiffness holds.
-    """
-
-    tool_mass: tuple[float, float] | None = None
-    stiffness: tuple[float, float] | None = None
-    mass: tuple[float, float] | None = None
-    position_from: Literal["joints", "tip"] | None = None
-
-    def __post_init__(self) -> None:
-        if self.tool_mass is not None and not (self.tool_mass[0] >= 0 and self.tool_mass[1] >= 0):
-            raise InputError(
-                f"the tool's mass must be 0 kg or more, got {self.tool_mass[0]:g}:{self.tool_mass[1]:g}"
-            )
-        if self.mass is not None and not (self.mass[0] >= 0 and self.mass[1] >= 0):
-            raise InputError(f"the robot's mass must be 0 kg or more, got {self.mass[0]:g}:{self.mass[1]:g}")
-
-
 FORCE = ("force_x", "force_y", "force_z")
 TORQUE = ("torque_x", "torque_y", "torque_z")
 POSITION = ("position_x", "position_y", "position_z")

@@ -39,7 +39,7 @@ arm turns its tool faster."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Weighed(Result, shown_by="palpate.report.payload"):
+class Weighed(Result):
     """A tool's payload, estimated from a log.
 
     Args:

@@ -4,7 +4,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from palpate._jit import part
-from palpate.environments.surface_state import UNTOUCHED, SurfaceTable
+from palpate.environments.surface_state import UNTOUCHED, SurfaceState, SurfaceTable
 from palpate.errors import InputError
 from palpate.signals.types import example, kinds
 
@@ -90,3 +90,34 @@ def alone(surface: Any) -> Any:
     while isinstance(surface, Surface):
         surface = surface.first if surface.chosen == 1 else surface.second
     return surface
+
+
+SHALLOW = 1e-6
+"""Depth at which the search begins [m]."""
+
+
+DEEPEST = 10.0
+"""Depth at which it is given up [m]."""
+
+
+def rest_for(surface: Any, force: float, rate: float) -> float:
+    """Penetration [m] at which a relaxed surface moving at a rate [m/s] carries a force [N], without inertia.
+
+    Negative if the damping alone carries more than that.
+
+    Raises:
+        InputError: no depth within metres carries it.
+    """
+    from scipy.optimize import brentq
+
+    def short(depth: float) -> float:
+        return float(surface.force(SurfaceState(depth, rate, 0.0, 1.0), depth, rate)) - force
+
+    bound = SHALLOW if short(0.0) < 0.0 else -SHALLOW
+    while short(0.0) * short(bound) > 0.0:
+        bound *= 2.0
+        if abs(bound) > DEEPEST:
+            raise InputError(
+                f"no depth of the new surface carries the {force:g} N of the old one; change the surface"
+            )
+    return float(brentq(short, 0.0, bound, xtol=1e-18, rtol=1e-15))

@@ -36,11 +36,11 @@ def crossings(start: Array, b: Array, c: Array) -> list[float]:
     finite = np.abs(pairs[1]) > _SINGULAR * np.abs(pairs[0])
     z = pairs[0][finite] / pairs[1][finite]
     near = z[np.abs(np.log(np.abs(z) + 1e-300)) < _NEAR]
-    found = {_polished(float(np.angle(v)), start, b, c) for v in near if v.imag >= -_SINGULAR}
+    found = {_refine(float(np.angle(v)), start, b, c) for v in near if v.imag >= -_SINGULAR}
     return sorted(s for s in found if s is not None)
 
 
-def _polished(angle: float, start: Array, b: Array, c: Array) -> float | None:
+def _refine(angle: float, start: Array, b: Array, c: Array) -> float | None:
     """1/G at the nearest angle where G is real; None where that is no positive number."""
     eye = np.eye(len(b))
     for _ in range(8):

@@ -194,14 +194,14 @@ class Prover:
 
     def _rest(self, box: Box, L: Array, back: Array) -> Array:
         """R with |L^T D x| <= |R L^T x| for D the distance of any matrix of the box from its corners' hull."""
-        bound = curved(self, box)
+        bound = curvature_bound(self, box)
         p = len(bound)
         columns = np.flatnonzero(bound.any(axis=0))
         sizes = np.linalg.norm(np.abs(L.T[:, :p]) @ bound[:, columns], axis=0) * np.sqrt(len(columns))
-        fed = [self._fed(law, loss)[columns] for law, loss in self.laws(box)]
+        fed = [self._input_map(law, loss)[columns] for law, loss in self.laws(box)]
         return np.array([sizes[:, None] * (f @ back) for f in fed])
 
-    def _fed(self, law: Law, loss: int) -> Array:
+    def _input_map(self, law: Law, loss: int) -> Array:
         """From the state to z and the held input, shape (p + 1, size): what the exponential acts on.
 
         For a position arm z's first number is counted from the held input: at rest it is nothing.
@@ -209,7 +209,7 @@ class Prover:
         p = len(self.loop.rates(1.0, 0.0)[1])
         into = np.zeros(p)
         into[0] = 1.0
-        Phi = self.loop.assembled(np.zeros((p, p)), into, self.loop.force_gain(0.0, 0.0), law, loss)
+        Phi = self.loop.tick_matrix(np.zeros((p, p)), into, self.loop.force_gain(0.0, 0.0), law, loss)
         fed = np.vstack([np.eye(p, self.loop.size), Phi[:1]])
         if self.loop.arm.kind == "position":
             fed[0] -= fed[p]
@@ -238,7 +238,7 @@ def _with_rest(turned: Array, rests: Array, alone: float) -> float:
     return best
 
 
-def curved(prover: Prover, box: Box) -> Array:
+def curvature_bound(prover: Prover, box: Box) -> Array:
     """How far E = exp(T A) may lie from the multilinear function through its corners, by element, shape (p, p + 1).
 
     The parameters are w^2 and 2 z w for a position arm, K + B/theta and 1/(1 + B/(K theta)) for others: A is

@@ -76,7 +76,7 @@ def certify(
     own_gains, gains = gains, gains if measured is None else with_inner(gains, measured)
     position = gains.arm.kind == "position"
     most = gains.theta if damping_time is None else damping_time
-    low, high = _felt(gains, stiffness, most, margin)
+    low, high = _felt_range(gains, stiffness, most, margin)
     wanted = [[held_claim(gains, low, high, most, margin)]]
     if position:
         wanted.append([one_sided_claim(gains, most, margin)])
@@ -117,7 +117,7 @@ def _first_proved(
     return None
 
 
-def _felt(
+def _felt_range(
     gains: Gains, stiffness: tuple[float, float] | None, most: float, margin: float
 ) -> tuple[float, float]:
     if stiffness is not None:
@@ -145,7 +145,7 @@ def proved_claim(gains: Gains, claim: Claim, starts: Sequence[Box] | None = None
     whole = claim.boxes(gains)
     edge = exact_interval(gains)[1] / claim.shares[1]
     for start in starts or [s for box in whole for s in _starts(prover, box, edge)]:
-        found, left = search.covered(start)
+        found, left = search.cover(start)
         if left:
             return None
         cells += found
@@ -175,7 +175,7 @@ def _starts(prover: Prover, box: Box, edge: float) -> list[Box]:
     if prover.loop.arm.kind != "position" or box.most == 0.0 or box.high <= 0.5 * edge:
         return _decades(box)
     soft = _decades(replace(box, high=0.5 * edge)) if box.low < 0.5 * edge else []
-    return soft + _graded(replace(box, low=max(box.low, 0.5 * edge)), prover.theta, edge)
+    return soft + _grade(replace(box, low=max(box.low, 0.5 * edge)), prover.theta, edge)
 
 
 def _decades(box: Box) -> list[Box]:
@@ -195,7 +195,7 @@ def _rings(box: Box, theta: float, cuts: int) -> list[Box]:
     return [upper, *_rings(lower, theta, cuts - 1)]
 
 
-def _graded(box: Box, theta: float, edge: float) -> list[Box]:
+def _grade(box: Box, theta: float, edge: float) -> list[Box]:
     """Cut towards the corner nearest to the edge: a norm serves surfaces whose distances to it differ by four times."""
     upper, rest = _rings(box, theta, 1)
     found, distance = [upper], edge - box.low

@@ -55,7 +55,7 @@ class Search:
         self._weight: Array | None = None
         self._boxes = 0
 
-    def covered(self, box: Box) -> tuple[list[Cell], list[Box]]:
+    def cover(self, box: Box) -> tuple[list[Cell], list[Box]]:
         """Cells that prove the box; and, where it cannot be proved, the first piece that is not after so many cuts."""
         prover = self.prover
         cells: list[Cell] = []

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 
 from palpate._jit import reader, writer
-from palpate._jit.stored import leaves, places
+from palpate._jit.overloads import leaves, places
 from palpate.arrays import Array
 from palpate.force.guard import SafetyState
 from palpate.force.law import Cautious, CautiousState
 
 
-def flattened(tree: Any) -> Array:
+def flatten(tree: Any) -> Array:
     """Every number of nested tuples, in their order, shape (n,)."""
     return np.array(list(leaves(tree)))
 

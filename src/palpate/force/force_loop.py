@@ -23,7 +23,7 @@ from palpate.force.flat import (
     TROUBLE,
     VALUE,
     VARIANCE,
-    flattened,
+    flatten,
     guard_in,
     law_in,
     put_guard,
@@ -109,7 +109,7 @@ class ForceLoop(Readable):
             certificate.check_of(gains)
         self.gains, self.certificate = gains, certificate
         self._desired = gains.force
-        self._numbers = flattened(gains.cautious())
+        self._numbers = flatten(gains.cautious())
         self._state = np.zeros(STATE + GUARD)
         self.reset()
         self._bind()
@@ -133,7 +133,7 @@ class ForceLoop(Readable):
     def reset(self) -> None:
         """Returns to free motion and forgets the surface."""
         self._state[:] = 0.0
-        self._state[:STATE] = flattened(self.gains.cautious().start())
+        self._state[:STATE] = flatten(self.gains.cautious().start())
 
     @property
     def desired(self) -> float:
@@ -162,7 +162,7 @@ class ForceLoop(Readable):
                 f"the speed must be at least the approach of {self.gains.approach:g} m/s, got {speed:g}"
             )
         own = self.gains.cautious()
-        self._numbers = flattened(own._replace(speed=min(own.speed, speed)))
+        self._numbers = flatten(own._replace(speed=min(own.speed, speed)))
 
     def update(self, force: float, position: float, missed: float = 0.0) -> float:
         """The speed of the commanded position for this tick [m/s].

@@ -15,7 +15,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.lag import worst_stiffness, yielding_lag
-from palpate.force.sampled_loop import held
+from palpate.force.sampled_loop import zero_order_hold
 from palpate.signals.types import NORMAL
 
 BLOCKS = 8
@@ -331,9 +331,9 @@ def _columns(log_: _Log, p: Array) -> Array:
     w, z, late = exp(p[0]), exp(p[1]), float(p[2])
     A, b = np.array([[0.0, w], [-w, -2.0 * z * w]]), np.array([0.0, w])
     whole, part = divmod(late / log_.tick, 1.0)
-    E, early = held(A, b, log_.tick)
+    E, early = zero_order_hold(A, b, log_.tick)
     # Within a tick the command before acts for `part` of it, and then the newer one.
-    later = held(A, b, (1.0 - part) * log_.tick)[1]
+    later = zero_order_hold(A, b, (1.0 - part) * log_.tick)[1]
     denominator = np.array([1.0, -E[0, 0] - E[1, 1], E[0, 0] * E[1, 1] - E[0, 1] * E[1, 0]])
     first = _numerator(E, early - later)
     second = _numerator(E, later)

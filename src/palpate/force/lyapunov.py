@@ -35,9 +35,9 @@ def single(Phi: Array, weight: Array | None = None) -> Array | None:
     if rate is None:
         return None
     if weight is not None:
-        return _root(_summed(Phi / rate, weight))
-    scale = _balanced(Phi)
-    P = _summed(Phi / scale[:, None] * scale / rate, np.eye(len(Phi)))
+        return _root(_lyapunov_sum(Phi / rate, weight))
+    scale = _balance(Phi)
+    P = _lyapunov_sum(Phi / scale[:, None] * scale / rate, np.eye(len(Phi)))
     return _root(P / np.outer(scale, scale))
 
 
@@ -52,7 +52,7 @@ def _rate(Phi: Array) -> float | None:
     return 0.5 * (1.0 + radius) if radius < 1.0 else None
 
 
-def _summed(A: Array, W: Array) -> Array:
+def _lyapunov_sum(A: Array, W: Array) -> Array:
     """P = W + A^T P A of a stable A: the sum of all A^T^k W A^k, with twice as many terms at each step.
 
     For one matrix of this size several times as fast as SciPy's solvers.
@@ -129,7 +129,7 @@ def _interior(matrices: Sequence[Array], slack: Array, apart: int = 0) -> Array 
     n = Phi.shape[1]
     basis = _Symmetric.of(n, apart)
     P, unit = 0.5 * np.eye(n), np.linalg.inv(np.linalg.cholesky(slack))
-    s = 2.0 * float(np.linalg.eigvalsh(unit @ (_turned(P, Phi) - P) @ unit.T).max()) + 1.0
+    s = 2.0 * float(np.linalg.eigvalsh(unit @ (_map_through(P, Phi) - P) @ unit.T).max()) + 1.0
     weight = 1.0
     for _ in range(_STEPS):
         for _ in range(4):
@@ -235,12 +235,12 @@ def _newton(hessian: Array, gradient: Array) -> Array | None:
     return step if np.isfinite(step).all() else None
 
 
-def _turned(P: Array, Phi: Array) -> Array:
+def _map_through(P: Array, Phi: Array) -> Array:
     return Phi.transpose(0, 2, 1) @ P @ Phi
 
 
 def _constraints(P: Array, s: float, Phi: Array, W: Array) -> Array:
-    return P - _turned(P, Phi) + s * W
+    return P - _map_through(P, Phi) + s * W
 
 
 def _along(P: Array, s: float, step: tuple[Array, float], Phi: Array, W: Array) -> tuple[Array, float]:
@@ -255,7 +255,7 @@ def _along(P: Array, s: float, step: tuple[Array, float], Phi: Array, W: Array) 
 
 
 def _contracts(P: Array, Phi: Array) -> bool:
-    return _positive(P) and _positive((1.0 - _MARGIN) * P - _turned(P, Phi))
+    return _positive(P) and _positive((1.0 - _MARGIN) * P - _map_through(P, Phi))
 
 
 def _positive(F: Array) -> bool:
@@ -267,7 +267,7 @@ def _positive(F: Array) -> bool:
     return True
 
 
-def _balanced(Phi: Array) -> Array:
+def _balance(Phi: Array) -> Array:
     """Units in which rows and columns are of one size, shape (n,)."""
     scale = np.ones(len(Phi))
     for _ in range(20):

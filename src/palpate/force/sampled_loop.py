@@ -154,7 +154,9 @@ class SampledLoop:
             loss: ticks of age by which the reading in use is younger than the oldest; all of them for this tick's own.
         """
         A, b = self.rates(stiffness, damping)
-        return self.assembled(*held(A, b, self.arm.tick), self.force_gain(stiffness, damping), law, loss)
+        return self.tick_matrix(
+            *zero_order_hold(A, b, self.arm.tick), self.force_gain(stiffness, damping), law, loss
+        )
 
     def force_gain(self, stiffness: float, damping: float) -> Array:
         """The sensor's reading of tip and low-pass, before its age, in k0, shape (2 + n,)."""
@@ -163,7 +165,7 @@ class SampledLoop:
             return np.concatenate([[0.0, 0.0], c])
         return np.array([stiffness, damping * self.rate_unit]) / self.force_unit
 
-    def assembled(self, E: Array, e: Array, reading: Array, law: Law, loss: int = 0) -> Array:
+    def tick_matrix(self, E: Array, e: Array, reading: Array, law: Law, loss: int = 0) -> Array:
         """The matrix of a tick from what happens within it: z' = E z + e u.
 
         Args:
@@ -225,7 +227,7 @@ class SampledLoop:
         return Phi
 
 
-def held(A: Array, b: Array, time: float) -> tuple[Array, Array]:
+def zero_order_hold(A: Array, b: Array, time: float) -> tuple[Array, Array]:
     """z(t) = E z(0) + e u for zdot = A z + b u and a held u."""
     from scipy.linalg import expm
 

@@ -11,7 +11,7 @@ import numpy as np
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
-from palpate.force.sampled_loop import filter_of, held
+from palpate.force.sampled_loop import filter_of, zero_order_hold
 from palpate.force.touching import Surface, World, compiled_touch
 
 STEP = {"position": 2e-4, "torque": 5e-5, "servo": 5e-5}
@@ -32,7 +32,7 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0, resolution: float = 
     inner = arm.inner
     steps = max(round(arm.tick / STEP[arm.kind]), 1)
     A, b, c = filter_of(arm.low_pass)
-    E, e = held(A, b, arm.tick / steps)
+    E, e = zero_order_hold(A, b, arm.tick / steps)
     if isinstance(inner, PositionLoop):
         w = 2.0 * math.pi * inner.bandwidth
         first, second = w * w, 2.0 * inner.damping * w

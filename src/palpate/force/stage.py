@@ -7,7 +7,7 @@ from palpate._vector import sqrt
 from palpate.force.contact_evidence import CONTACT, FREE_MOTION, PLAIN
 
 LEARNING, LOCKED = 1.0, 2.0
-"""Phases after `AIR`."""
+"""Phases after free motion."""
 STEP = 0.02
 """Relative change of the desired force in a tick above which it is a step, which the error follows."""
 

@@ -35,7 +35,7 @@ RIGID = 1e9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning(Result, shown_by="palpate.report.tuning"):
+class Tuning(Result):
     """A tuned loop: what `palpate tune` says.
 
     Args:

@@ -294,7 +294,7 @@ by `benchmarks/identification/free_motion_constants.py`."""
 
 
 @dataclass(frozen=True)
-class Payload:
+class MovingMass:
     """A mass seen in free motion [kg]: negative if more than the tool's inertia was taken out before.
 
     Args:
@@ -315,7 +315,7 @@ class Payload:
 
 def payload_of(
     channels: Channels, chain: Chain, air: FreeMotion, lag: float, *, alone: bool = False
-) -> Payload | None:
+) -> MovingMass | None:
     """The mass that the force in free motion tells, both channels as they count in the log; None if it tells none.
 
     Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
@@ -344,7 +344,7 @@ def payload_of(
     noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
     level = noise.variance * len(force) / noise.effective
     mean = _of_parts(force, motion, stays, level)
-    return Payload(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
+    return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
 def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:

@@ -176,7 +176,7 @@ class PooledPoint:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Pooled(Result, shown_by="palpate.report.many.page"):
+class Pooled(Result):
     """Estimates pooled over many logs.
 
     Args:

@@ -10,11 +10,9 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.logs.bags import Bag, bag_reader
-from palpate.logs.kinds import Kind, kind_of
+from palpate.logs.formats import Bag, Kind, bag_reader, kind_of, open_table
 from palpate.logs.read import read_log
 from palpate.logs.roles import POSE, WRENCH
-from palpate.logs.tables import open_table
 from palpate.records import Record
 
 PLACE = ("position_x", "position_y", "position_z")

@@ -1,4 +1,4 @@
-"""Statistics of a column before its role is known, and the value in it that stands for "no reading"."""
+"""Statistics of a column before its role is known."""
 
 import re
 from dataclasses import dataclass
@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
+from palpate.logs.tables.sheet import find_sentinel
 from palpate.units import known_unit, unit, unit_in_name
 
 NAMES = {
@@ -18,17 +19,9 @@ NAMES = {
     "force": r"forc|^f$|^f[nxyz]$|[_.]f[nxyz]?$|^f_|load|kraft|fuerza|weight|scale|effort|torque|newton|press",
 }
 """Usual names of columns in laboratories."""
-_USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0, -3.697314e28)
-"""Values that drivers return for "no reading", as a scale's -1 between two readings. NDI's trackers write the last for
-a marker that they do not see."""
-_LEAST_SHARE = 0.002
-"""Of the rows: a reading that is right by accident is rarer, one in the number of steps of its converter."""
 _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
-_APART = 0.5
-"""Least distance of such a value from the readings beside it, in the column's unit: half of the step between whole
-numbers, which these values are."""
 
 
 @dataclass(frozen=True)
@@ -108,40 +101,6 @@ class ColumnStatistics:
         return 2 * fits + bool(re.search(NAMES[role], self.name, re.I)) - 3 * contradicts
 
 
-def find_sentinel(values: Array) -> float | None:
-    """The value in a column, shape (n,), that plainly means "no reading"; None where there is none.
-
-    It must be one of those that drivers use, occur again and again, lie on one side of all other
-    values, and be left and returned to in jumps: a force of -1 on its way from 0 to -2 is a force.
-    """
-    for value in _USUAL:
-        here = values == value
-        share = float(np.mean(here))
-        if not max(_LEAST_SHARE, 2 / len(values)) <= share < 1 - 2 / len(values):
-            continue
-        others = values[~here & np.isfinite(values)]
-        if len(others) > 1 and _outside(value, others) and _jumps(values, here, value):
-            return value
-    return None
-
-
-def _outside(value: float, others: Array) -> bool:
-    """Whether the value lies where no reading does; a small negative one needs readings that are never negative."""
-    low, high = float(others.min()), float(others.max())
-    if value < 0:
-        return low >= 0 if value > -10 else value < low - (high - low)
-    return value > high + (high - low)
-
-
-def _jumps(values: Array, here: Mask, value: float) -> bool:
-    """Whether the typical reading beside this value is far from it, measured by how far readings step otherwise."""
-    beside = values[1:][here[:-1] & ~here[1:]]
-    if not len(beside):
-        return False
-    steps = np.abs(np.diff(values[~here]))
-    return float(np.median(np.abs(beside - value))) > _APART + 3 * float(np.median(steps))
-
-
 def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float:
     """How closely the ranks of two columns agree, from 0 to 1."""
     from scipy.stats import spearmanr
@@ -155,9 +114,11 @@ def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float
 
 
 def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
-    """Share of the force's power that some filter of the position accounts for: its coherence (Welch), 0 to 1.
+    """Share of the force's power that a filter or a curve of the position accounts for, 0 to 1.
 
-    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
+    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing,
+    and its coherence (Welch) tells. In taps most rows are noise in free motion: the means by place (correlation ratio)
+    tell.
     """
     from scipy.signal import coherence, welch
 
@@ -167,7 +128,12 @@ def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> floa
     if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
         return 0.0
     power = welch(b[there], nperseg=rows)[1]
-    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
+    by_filter = coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum()
+    force_there = b[there] - b[there].mean()
+    place = np.floor(_BLOCKS * (a[there] - a[there].min()) / np.ptp(a[there])).astype(np.intp)
+    sums, count = np.bincount(place, force_there), np.bincount(place)
+    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (force_there @ force_there)
+    return float(max(by_filter, by_place))
 
 
 def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:

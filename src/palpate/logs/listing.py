@@ -9,13 +9,13 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.files.limits import ReadingLimits
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.bags import Bag, bag_reader
 from palpate.logs.columns import ColumnStatistics
-from palpate.logs.kinds import Kind, kind_of
+from palpate.logs.formats import Bag, Kind, bag_reader, kind_of, open_table
 from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
 from palpate.logs.read import is_run
 from palpate.logs.roles import epoch_unit
-from palpate.logs.tables import Sheet, Stated, equal_sheets, open_table
+from palpate.logs.tables.sheet import Sheet, Stated
+from palpate.logs.tables.spreadsheet import equal_sheets
 from palpate.text import shorten
 from palpate.units import unit, unit_in_name
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.bags import Bag, Topic
 from palpate.logs.columns import (
     NAMES,
     ColumnStatistics,
@@ -18,9 +17,10 @@ from palpate.logs.columns import (
     rank_correlation,
     roughness,
 )
+from palpate.logs.formats import Bag, Topic
 from palpate.logs.presets import preset, presets
 from palpate.logs.roles import epoch_unit, usual_unit
-from palpate.logs.tables import Sheet
+from palpate.logs.tables.sheet import Sheet
 from palpate.units import known_unit, unit, unit_in_name
 
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}

@@ -6,23 +6,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from palpate.errors import InputError
 from palpate.files.limits import ReadingLimits
-from palpate.logs import read
-from palpate.logs.arm_logs import read_wrench_and_pose
-from palpate.logs.kinds import Kind, kind_of
-from palpate.logs.listing import list_log, propose
+from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.presets import preset
-from palpate.logs.proposal import Proposal
 from palpate.logs.read import is_run, read_run
+from palpate.logs.read import read_log as read_named
 from palpate.logs.roles import POSE, WRENCH
-from palpate.logs.tables import open_table
 from palpate.logs.tables.parquet import stored_about
 from palpate.logs.tables.sheet import read_frame
 from palpate.records import Record
 from palpate.units import split_spec
+
+if TYPE_CHECKING:
+    from palpate.logs.proposal import Proposal
 
 Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
@@ -94,6 +93,8 @@ class Signals:
         Raises:
             InputError: the log cannot be read, or something would have to be guessed.
         """
+        from palpate.logs.listing import list_log
+
         bag = kind_of(path).is_bag
         if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
             return self, {}
@@ -133,13 +134,15 @@ class Signals:
         return list(open_table(path, kind_of(path), self.delimiter, self.limits).names)
 
     def _of_bag(self, path: Path, cut: dict[str, Any], samples: bool) -> Record:
+        from palpate.logs.arm_logs import read_wrench_and_pose
+
         one = self._one_axis()
         if self.time or self.rate:
             raise InputError(f"the messages of {path} have their own times; leave out --time and --rate")
         if one is None:
             held = "force_x" if samples else None
             return read_wrench_and_pose(path, self.wrench, self.pose, self.rotation, held=held, **cut)
-        return read.read_log(path, held="force" if samples else None, **cut, **one)
+        return read_named(path, held="force" if samples else None, **cut, **one)
 
     def _of_table(self, path: Path, cut: dict[str, Any]) -> Record:
         table = open_table(path, kind_of(path), self.delimiter, cut["limits"])
@@ -148,6 +151,8 @@ class Signals:
         columns: dict[str, Any] = {} if time is None else {"time": time}
         saved = self.position is None and self.force is None and {*WRENCH[:3], *POSE[:3]} <= set(there)
         if self.wrench or self.pose or saved:
+            from palpate.logs.arm_logs import read_wrench_and_pose
+
             self._one_axis()
             own = [
                 ",".join(name for name in names if name in there) if saved else None
@@ -172,7 +177,7 @@ class Signals:
                 f"name the columns of {path} with {flags}; there are: {listed} (palpate topics {path} proposes a "
                 "command)"
             )
-        return read.read_log(path, **cut, **columns, **names)
+        return read_named(path, **cut, **columns, **names)
 
     def _one_axis(self) -> dict[str, Any] | None:
         """Force and position of one axis, if these were named.
@@ -192,18 +197,18 @@ class Signals:
         return named or None
 
 
-@wraps(read.read_log)
+@wraps(read_named)
 def read_log(path: str | Path | Any, **options: Any) -> Record:
     """Read a log as `palpate.logs.read.read_log` does, or as what its own names say where no column is named."""
     if not isinstance(path, str | Path):
-        return read.read_log(path, **(options | _columns_of(path, options)))
+        return read_named(path, **(options | _columns_of(path, options)))
     path = Path(path)
     own: dict[str, Any] = {
         name: options[name] for name in ("rate", "start", "end", "missing", "delimiter") if name in options
     }
     named = set(options) - {*own, "held", "limits"}
     if named or (kind_of(path) is Kind.PARQUET and stored_about(path) is not None):
-        return read.read_log(path, **options)
+        return read_named(path, **options)
     if "limits" in options:
         own |= {"max_size": options["limits"].size / 1e9, "max_seconds": options["limits"].seconds}
     signals, others = Signals(**own).complete(path)
@@ -215,6 +220,8 @@ def _columns_of(table: Any, options: Mapping[str, Any]) -> dict[str, str]:
     sheet = read_frame(table)
     if {"rate", "time", "position", "force"} & {*options} or {"position", "force"} & {*sheet.names}:
         return {}
+    from palpate.logs.listing import propose
+
     proposal = propose(sheet)
     alone = proposal.options is not None and not proposal.guesses and "preset" not in proposal.options
     return (
@@ -240,7 +247,7 @@ def _with_underscores(options: dict[str, Any]) -> dict[str, Any]:
     return {name.replace("-", "_"): value for name, value in options.items()}
 
 
-def _list_guesses(path: Path, proposal: Proposal) -> str:
+def _list_guesses(path: Path, proposal: "Proposal") -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
     guesses = "; ".join(proposal.guesses)
     if proposal.options is None:

@@ -75,7 +75,7 @@ class Perceptron:
         return layers_of(self._sizes, self._weights)
 
     @property
-    def hidden(self) -> Array:
+    def hidden_weights(self) -> Array:
         """The weights of the first layer after the inputs, a view."""
         return self.layers[0]
 

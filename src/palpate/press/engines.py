@@ -14,8 +14,7 @@ from palpate.arrays import Array
 from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
-from palpate.force.gains import Gains, approach_speed, free_motion_level
-from palpate.force.lag import lag_of
+from palpate.force.gains import Gains, gains_for
 from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
 from palpate.robots.serial.serial_arm import SerialArm
@@ -173,18 +172,13 @@ def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
     return msgspec.structs.replace(arm, title=f"{title}, {mode}s", inner=inner, sensor=sensor)
 
 
-def gains_for(arm: Arm, force: float) -> Gains:
-    """Gains of the cautious law for a force, on any surface up to the arm's limit; no proof is made here.
+def press_gains(arm: Arm, force: float) -> Gains:
+    """Gains for a force on any surface up to the arm's limit, without a relief of the lag; no proof is made here.
 
     Raises:
         InputError: a force that the sensor's noise hides, or that it cannot read.
     """
-    theta = lag_of(arm)
-    cap = arm.limits.stiffness
-    return Gains(
-        arm=arm, force=force, theta=theta, cap=cap, force_limit=arm.sensor.full_scale,
-        approach=approach_speed(arm, force, theta, cap), level=free_motion_level(arm, force),
-    )  # fmt: skip
+    return msgspec.structs.replace(gains_for(arm, force), relief=0.0)
 
 
 def check_mode(gains: Gains, mode: str | None) -> str:

@@ -8,19 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.contact_frame import Payload
+from palpate.contact_frame.load import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.gains import Gains, load_gains
-from palpate.press.engines import ENGINES, MODES, check_mode, gains_for, loop_of, mass_note, usual_mode
-from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Progress, driver_of, press
-from palpate.press.sequence import Plan, plan_for
-from palpate.press.setting import GAP, Place, cell_of, check_able, place_of
+from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
+from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Asked, Progress, driver_of, press
+from palpate.press.sequence import SURE, Plan, check_drift, check_range, fitting, noise_and_drift, plan_for
+from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.press.summary import Asked
-from palpate.press.tare import SURE, check_drift, check_range, fitting, noise_and_drift
-from palpate.press.tool import held_tool, with_tool
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.serial_arm import SerialArm
@@ -226,7 +223,7 @@ def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
         mode = "torque"
     loop = loop_of(question.arm, arm.title, mode, place.mass)
     _check_sensor(question, loop.sensor, loop.sensor.full_scale)
-    return gains_for(loop, question.force * (1.0 - question.probe))
+    return press_gains(loop, question.force * (1.0 - question.probe))
 
 
 def _check_sensor(question: Question, sensor: Sensor, most: float) -> None:

@@ -1,6 +1,7 @@
-"""Sequence of every press and slide: from free motion to contact to the end, tick by tick, whoever moves the arm.
+"""Sequence of every press and slide: at rest, from free motion to contact to the end, whoever moves the arm.
 
-A simulated arm and one over a wire are read and moved alike. A driver is the law between the two.
+A simulated arm and one over a wire are read and moved alike. A driver is the law between the two. At
+rest in free motion the force sensor is tared; its noise and drift are compared with those that the gains assume.
 """
 
 from __future__ import annotations
@@ -9,17 +10,119 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
-from palpate.bench.force_input import APPROACH, CONTACT, LOST
+from palpate.bench.summary import APPROACH, CONTACT, LOST
 from palpate.errors import InputError
-from palpate.force import ForceLoop, SlidingLoop
+from palpate.force.arm import Sensor
+from palpate.force.force_loop import ForceLoop
+from palpate.force.gains import Gains
 from palpate.force.guard import BEYOND, DRIFTS, LATE, SWINGS, TROUBLES
 from palpate.force.sliding import slide_state
+
+if TYPE_CHECKING:
+    from palpate.force.sliding.sliding_loop import SlidingLoop
+    from palpate.force.sliding.turning_tool import TurningTool
+
+
+TARE = 0.5
+"""At rest in free motion before a press [s]."""
+SURE = 8.0
+"""Standard deviations of a reading, which no reading of a press shows by chance."""
+
+
+def check_range(shown: float, most: float, full_scale: float) -> None:
+    """Refuse a sensor that is saturated, or too far from zero.
+
+    Args:
+        shown: in free motion, the largest component [N].
+        most: that is to be read [N].
+        full_scale: of the sensor [N].
+
+    Raises:
+        InputError: it stands at the end of its scale, or could not read that force.
+    """
+    if shown >= 0.99 * full_scale:
+        raise InputError(
+            f"the force sensor shows {shown:.3g} N in free motion, the end of its scale; unload it"
+        )
+    if shown + most > full_scale:
+        raise InputError(
+            f"the force sensor shows {shown:.3g} N in free motion, so that it cannot read a force of up to {most:g} N"
+            f" (full scale {full_scale:g} N); tare it, or lower the force and its limit"
+        )
+
+
+_PARTS = 10
+_SURELY = 4.5
+"""Student's t of eight degrees of freedom at 99.9 %: a line through the means of ten parts."""
+_SHARE = 0.05
+"""Of the desired force, the band within which a press counts as settled: a drift that leaves it is no reading of it."""
+
+
+def noise_and_drift(times: Array, force: Array) -> tuple[float, float, float]:
+    """Noise [N], drift and the drift's standard deviation [N/s] of readings at rest.
+
+    The drift is that of the means of ten parts, so that a hum, or the memory of a low-pass, counts once in each part.
+
+    Args:
+        times: of the readings [s], shape (n,), ten or more.
+        force: [N], shape (n,).
+    """
+    t, f = (np.array([part.mean() for part in np.array_split(v, _PARTS)]) for v in (times, force))
+    t = t - t.mean()
+    drift = float(t @ f / (t @ t))
+    left = f - f.mean() - drift * t
+    about = force - force.mean() - drift * (times - times.mean())
+    return float(about.std()), drift, float(np.sqrt(left @ left / (_PARTS - 2) / (t @ t)))
+
+
+def fitting(gains: Gains, noise: float, count: int) -> Gains | None:
+    """The gains for a noise that was measured; None if they are for that already.
+
+    No lag and no gain depends on the noise: it decides what counts as a touch.
+
+    Args:
+        gains: as they were tuned.
+        noise: standard deviation of the readings at rest [N].
+        count: of the readings.
+
+    Raises:
+        InputError: a noise that hides the force.
+    """
+    sensor = gains.arm.sensor
+    if noise <= sensor.noise * (1.0 + SURE / np.sqrt(2.0 * count)):
+        return None
+    sensor = msgspec.structs.replace(sensor, noise=noise)
+    return msgspec.structs.replace(gains, arm=msgspec.structs.replace(gains.arm, sensor=sensor))
+
+
+def check_drift(drift: float, std: float, force: float, seconds: float, sensor: Sensor) -> None:
+    """Refuse a sensor that surely drifts by more than its maker's figure, or than the press can bear.
+
+    Args:
+        drift: of the force at rest [N/s].
+        std: its standard deviation [N/s].
+        force: desired [N].
+        seconds: that the press may last [s].
+        sensor: of the gains; without a drift, so much is borne as leaves the force within 5 %.
+
+    Raises:
+        InputError: it drifts by more.
+    """
+    borne = _SHARE * force / seconds
+    most = borne if sensor.drift is None else max(sensor.drift, borne)
+    if abs(drift) - _SURELY * std > most:
+        raise InputError(
+            f"the force drifts by {drift:.2g} N/s at rest, and at most {most:.2g} N/s is borne: let the sensor warm up,"
+            " tare again, or press for a shorter time"
+        )
+
 
 _STEPS = 6
 """Down and up again, three times."""
@@ -82,6 +185,7 @@ class TipSample(NamedTuple):
     force: Array  # that the tip exerts on the environment [N], shape (3,)
     position: Array  # of the tip [m], shape (3,)
     missed: float = 0.0  # readings that never came, since the one before
+    rotation: Array | None = None  # of the tool, its axes in columns, shape (3, 3); where it is to turn
 
 
 class MovableArm(Protocol):
@@ -91,8 +195,8 @@ class MovableArm(Protocol):
         """The readings at this tick; waits for the tick if the arm has its own clock."""
         ...
 
-    def move(self, velocity: Array) -> None:
-        """Moves the tip with this velocity until the next command [m/s], shape (3,); it does not turn."""
+    def move(self, velocity: Array, turning: Array | None = None) -> None:
+        """Moves the tool's point with this velocity [m/s] and turning [rad/s] until the next command, shape (3,)."""
         ...
 
 
@@ -243,6 +347,7 @@ class SlidingDriver:
         loop: its sliding loop, whose desired force is set.
         direction: of the slide at a time since it began [s], shape (3,).
         show: called with the sentence of a trouble when it begins.
+        tool: turns the tool with that loop; None for one that does not turn.
     """
 
     def __init__(
@@ -251,16 +356,22 @@ class SlidingDriver:
         loop: SlidingLoop,
         direction: Callable[[float], ArrayLike],
         show: Callable[[str], None] = lambda _: None,
+        tool: TurningTool | None = None,
     ):
-        self._arm, self.loop, self._direction = arm, loop, direction
+        self._arm, self.loop, self._direction, self._tool = arm, loop, direction, tool
         self._slid = False
         self.troubles = Troubles(loop.gains.theta, show)
 
     def step(self, sample: TipSample, desired: float, since: float) -> Action:
         """One tick, as `PressDriver` describes it."""
-        loop = self.loop
-        velocity = loop.update(sample.force, sample.position, self._direction(since), sample.missed)
-        self._arm.move(velocity)
+        loop, way = self.loop, self._direction(since)
+        if self._tool is None or sample.rotation is None:
+            velocity = loop.update(sample.force, sample.position, way, sample.missed)
+            self._arm.move(velocity)
+        else:
+            twist = self._tool.update(sample.force, sample.position, sample.rotation, way, sample.missed)
+            velocity = twist[:3]
+            self._arm.move(velocity, twist[3:])
         self._slid = self._slid or loop.sliding
         phase = CONTACT if loop.sliding else LOST if self._slid else APPROACH
         lasting = self.troubles.lasting(loop.trouble, sample.time)

@@ -1,13 +1,13 @@
 """A result as a page shows it: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import ceil, floor, inf, isfinite, log10
 from typing import Any
 
 from palpate.report.chart import page_figures
 from palpate.report.numbers import quantity
-from palpate.report.page import render
+from palpate.report.page import Table, render
 from palpate.text import printable
 
 
@@ -67,6 +67,7 @@ class PageAnswer:
         scale: `log_scale`; None without.
         pairs: pictures that stand beside each other: source and caption.
         figures: as `report.chart.page_figures` takes them.
+        tables: below the cards, above the figures.
         folds: tables that are folded: title, a word about them, rows.
         source: a file's text, and its title.
     """
@@ -80,8 +81,17 @@ class PageAnswer:
     scale: Mapping[str, Any] | None = None
     pairs: Sequence[Mapping[str, str]] = ()
     figures: Sequence[Mapping[str, Any]] = ()
+    tables: Sequence[Table] = ()
     folds: Sequence[tuple[str, str, Sequence[Sequence[str]]]] = ()
     source: tuple[str, str] = ("", "")
+
+
+def warning_alerts(notes: Iterable[str]) -> list[dict[str, str]]:
+    """Warnings of a page, each a sentence, whether its capital and its full stop are there or not."""
+    return [
+        {"tone": "warn", "title": "", "text": f"{note[:1].upper()}{note[1:].removesuffix('.')}."}
+        for note in notes
+    ]
 
 
 def answer_page(
@@ -118,8 +128,7 @@ def answer_page(
         folds=[{"title": title, "about": about, "rows": rows} for title, about, rows in answer.folds if rows],
         source=answer.source[1],
         source_title=answer.source[0],
-        notes=(),
-        tables=(),
+        tables=answer.tables,
         room=room,
         command=printable(command),
         **shown | {"scripts": (*shown["scripts"], *codes)},

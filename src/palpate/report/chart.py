@@ -68,6 +68,17 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Interval:
+    """An interval of y that changes along x: its places in order, and its ends there, each of shape (n,)."""
+
+    x: Array
+    low: Array
+    high: Array
+    colour: str
+    label: str = ""
+
+
+@dataclass(frozen=True)
 class Band:
     """An interval of y along the whole chart; a line where both ends are one."""
 
@@ -95,6 +106,7 @@ class Chart:
     Args:
         y: label of the values.
         series: lines and dots.
+        intervals: of values that change along x.
         bands: levels and intervals along the whole chart.
         marks: moments and stretches.
         x: label of the places; one that has none takes that of the charts it is zoomed with.
@@ -114,6 +126,7 @@ class Chart:
     ylim: tuple[float, float] | None = None
     log: str = ""
     height: float = 2.6
+    intervals: Sequence[Interval] = ()
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -131,6 +144,7 @@ class Chart:
         if self.ylim is not None:
             return self.ylim
         values = [*(one.y for one in self.series), [end for b in self.bands for end in (b.low, b.high)]]
+        values += [end for one in self.intervals for end in (one.low, one.high)]
         known = np.concatenate([np.asarray(one, dtype=float) for one in values])
         known = known[np.isfinite(known)]
         known = np.log10(known[known > 0.0]) if "y" in self.log else known
@@ -143,22 +157,26 @@ class Chart:
 
 
 def figure_of(charts: Sequence[Chart], columns: int = 1) -> Figure:
-    """The charts under each other over one axis, or in rows of several, each over its own."""
+    """The charts under each other, over one axis where all have the same, or in rows of several."""
     rows, high = -(-len(charts) // columns), charts[0].height
+    one_axis = columns == 1 and len({(chart.ends, "x" in chart.log) for chart in charts}) == 1
     with style.ink():
-        if columns == 1:
-            figure, axes = style.figure(rows, height=high)
-        else:
-            figure, axes = style.grid((9.0, high * rows), rows, columns)
+        size = (9.0, high * rows + (0.5 if one_axis else 0.0))
+        figure, axes = style.grid(size, rows, columns, sharex=one_axis)
         for axis, chart in zip(axes, charts, strict=False):
             draw(axis, chart)
         for axis in axes[len(charts) :]:
             axis.remove()
+        for axis in axes[:-1] if one_axis else ():
+            axis.set_xlabel("")
     return figure
 
 
 def draw(axis: Axes, chart: Chart) -> None:
     """Draw a chart in a panel of a figure."""
+    for area in chart.intervals:
+        colour, label = COLOURS[area.colour], area.label or None
+        axis.fill_between(area.x, area.low, area.high, color=colour, alpha=0.22, linewidth=0, label=label)
     for one in chart.series:
         line: dict[str, Any] = {"linewidth": one.width, "linestyle": _line(one.dash)}
         if one.dots:
@@ -172,7 +190,7 @@ def draw(axis: Axes, chart: Chart) -> None:
         for i, ends in enumerate(mark.spans):
             label = "" if i else mark.label
             _interval((axis.axvline, moment), (axis.axvspan, 0.12), ends, mark.colour, label)
-    axis.set(xlabel=chart.x, ylabel=chart.y)
+    axis.set(xlabel=style.literal(chart.x), ylabel=style.literal(chart.y))
     axis.set_title(style.literal(chart.title), loc="left")
     axis.set(**{name: ends for name in ("xlim", "ylim") if (ends := getattr(chart, name))})
     if "y" in chart.log:
@@ -196,8 +214,8 @@ def _line(dash: str) -> Any:
     return (0, (5, 4)) if dash == "--" else dash or "-"
 
 
-def panels(charts: Sequence[Chart]) -> list[dict[str, Any]]:
-    """The charts for a page, in order, as plain values.
+def panels(charts: Sequence[Chart], most: int = MOST) -> list[dict[str, Any]]:
+    """The charts for a page, in order, as plain values, each with about so many places of a line.
 
     Each is `{"spec", "columns"}` as `palpate.chart` takes it, and the `group` of those that are zoomed together.
     """
@@ -206,24 +224,27 @@ def panels(charts: Sequence[Chart]) -> list[dict[str, Any]]:
     found = []
     for chart, key in zip(charts, keys, strict=True):
         x = chart.x or next((name for own, name in zip(keys, names, strict=True) if own == key and name), "")
-        found.append(_panel(chart, x) | {"group": keys.index(key)})
+        found.append(_panel(chart, x, most) | {"group": keys.index(key)})
     return found
 
 
-def _panel(chart: Chart, x: str) -> dict[str, Any]:
+def _panel(chart: Chart, x: str, most: int) -> dict[str, Any]:
     """A chart, thinned so that peaks stay; what has no name, or another's, is not in its legend."""
-    places, values = _join([_within(one, *chart.ends) for one in chart.series])
+    lines = [(one.x, one.y) for one in chart.series]
+    lines += [(one.x, end) for one in chart.intervals for end in (one.low, one.high)]
+    places, values = _join([_within(*line, *chart.ends) for line in lines], most)
     columns = {"t": _column(places, "x" in chart.log)}
-    series: list[dict[str, Any]] = []
-    for one, column in zip(chart.series, values, strict=True):
-        series.append(look(one) | {"of": f"c{len(series)}"})
-        columns[series[-1]["of"]] = _column(column, "y" in chart.log)
+    columns |= {f"c{i}": _column(column, "y" in chart.log) for i, column in enumerate(values)}
+    series = [look(one) | {"of": f"c{i}"} for i, one in enumerate(chart.series)]
+    for i, one in enumerate(chart.intervals):
+        k = len(chart.series) + 2 * i
+        series.append(_area(one) | {"low": f"c{k}", "high": f"c{k + 1}"})
     for band in chart.bands:
         is_line = band.low == band.high
         ends = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
-        own = look(band) if is_line else {"kind": "band", "colour": band.colour, "label": band.label}
+        own = look(band) if is_line else _area(band)
         series.append(own | {key: f"{key}{len(series)}" for key in ends})
-        columns |= {series[-1][key]: [float(value)] * len(places) for key, value in ends.items()}
+        columns |= {series[-1][key]: packed_column(np.full(len(places), v)) for key, v in ends.items()}
     labels = [one["label"] for one in series]
     for i, (label, line) in enumerate(zip(labels, series, strict=True)):
         line["silent"] = not label or label in labels[:i]
@@ -245,6 +266,10 @@ def _panel(chart: Chart, x: str) -> dict[str, Any]:
     return {"spec": spec, "columns": columns}
 
 
+def _area(one: Interval | Band) -> dict[str, Any]:
+    return {"kind": "band", "colour": one.colour, "label": one.label}
+
+
 def look(one: Series | Band) -> dict[str, Any]:
     """How a page draws a line, and its entry in a legend."""
     return {
@@ -261,18 +286,18 @@ def _key(one: Mark) -> str:
     return "band" if any(low < high for low, high in one.spans) else "known"
 
 
-def _within(one: Series, low: float, high: float) -> tuple[Array, Array]:
-    inside = (one.x >= low) & (one.x <= high)
-    return one.x[inside], one.y[inside]
+def _within(x: Array, y: Array, low: float, high: float) -> tuple[Array, Array]:
+    inside = (x >= low) & (x <= high)
+    return x[inside], y[inside]
 
 
-def _join(lines: Sequence[tuple[Array, Array]]) -> tuple[Array, list[Array]]:
+def _join(lines: Sequence[tuple[Array, Array]], most: int) -> tuple[Array, list[Array]]:
     """All places of thinned lines in order, and each line's values there: infinite where it has no place."""
     alike = [next(i for i, (other, _) in enumerate(lines) if np.array_equal(other, x)) for x, _ in lines]
     thin = {}
     for first in dict.fromkeys(alike):
         same = [y for i, (_, y) in zip(alike, lines, strict=True) if i == first]
-        thin[first] = np.unique(np.concatenate([rows_shown(y, MOST // len(same)) for y in same]))
+        thin[first] = np.unique(np.concatenate([rows_shown(y, most // len(same)) for y in same]))
     shown = [(x[thin[i]], y[thin[i]]) for i, (x, y) in zip(alike, lines, strict=True)]
     places = np.unique(np.concatenate([x for x, _ in shown]))
     columns = [np.full(len(places), np.inf) for _ in shown]

@@ -4,14 +4,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from palpate.arrays import Array
+from palpate.bench.summary import CONTACT
+from palpate.records import Record
 from palpate.report.look.assets import DATA, PAIRS
 
 FRAMES = 96
 """Of a film."""
 Panel = tuple[float, float, float, float]
 """Left, top, width and height of a part of the picture."""
+
+
+def frames_of(record: Record, before: float) -> NDArray[np.intp]:
+    """Rows evenly in time, from so many seconds before the first contact to the end."""
+    t, pressing = record["t"], record["phase"] == CONTACT
+    touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
+    start = max(float(t[0]), touch - before)
+    return np.searchsorted(t, np.linspace(start, float(t[-1]), FRAMES)).clip(max=len(t) - 1)
 
 
 def sheet() -> str:

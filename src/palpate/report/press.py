@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.files import write_text
 from palpate.identification.uncertainty import Verdict
+from palpate.press.pressing import Asked
 from palpate.press.setting import Place
-from palpate.press.summary import Asked
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
-from palpate.report.film import FRAMES, animation, coordinates, film_of, text, trace_panel, view_of
+from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity
@@ -51,7 +51,7 @@ def film(record: Record, arm: SerialArm, place: Place, half: str = "") -> str:
         place: where.
         half: `arm` or `tip` for that half alone, which is legible on a telephone; both if empty.
     """
-    rows = _frames(record)
+    rows = frames_of(record, _BEFORE)
     seconds = float(record["t"][rows[-1]] - record["t"][rows[0]])
     q = np.column_stack([record[f"q{i}"] for i in range(1, arm.joints + 1)])[rows]
     left, width = {"": (0.0, _WIDE), "arm": (0.0, _TIP[0] - 20.0), "tip": (_TIP[0] - 20.0, _TIP[2] + 40.0)}[
@@ -63,14 +63,6 @@ def film(record: Record, arm: SerialArm, place: Place, half: str = "") -> str:
         words = f"force and desired force, up to {float(force.max()):.3g} N in {seconds:.3g} s"
         parts += [*_tip_panel(record, rows, seconds), *trace_panel(t, force, wanted, _FORCE, words)]
     return film_of(parts, left, width, _HIGH)
-
-
-def _frames(record: Record) -> NDArray[np.intp]:
-    """Rows evenly in time, from a little before the touch to the end."""
-    t, pressing = record["t"], record["phase"] == CONTACT
-    touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
-    start = max(float(t[0]), touch - _BEFORE)
-    return np.searchsorted(t, np.linspace(start, float(t[-1]), FRAMES)).clip(max=len(t) - 1)
 
 
 def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[str]:

@@ -2,17 +2,28 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from palpate.report.numbers import as_html, plain, quantity, quantity_between
+from palpate.report.numbers import as_html, plain, quantity, quantity_between, write_figure, write_page
 from palpate.text import in_python, printable
+
+__all__ = ["facts_of", "html", "line", "view_of", "write_figure", "write_page"]
 
 Facts = list[tuple[str, str]]
 _LETTERS = {"M": "kg", "B": "N s/m", "K": "N/m", "offset": "N"}
 """Units of an estimate's parameters by their usual names; others are told without one."""
+_VIEWS = {
+    "Identification": "identification.answer",
+    "Pooled": "many.page",
+    "Record": "record",
+    "Tuning": "tuning",
+    "Weighed": "payload",
+}
+"""Modules that show a result whole, by the name of its class."""
 _SHORT = 8
 """Numbers of an array that are shown; of a longer one its shape."""
 
@@ -29,6 +40,12 @@ def html(value: Any) -> str:
     head = ", ".join(text for name, text in facts if not name)
     rows = [(name, text) for name, text in facts if name]
     return in_python(as_html(f"{type(value).__name__}: {head}", [("of it", "value"), *rows] if rows else []))
+
+
+def view_of(result: Any) -> Any:
+    """The module that shows a result whole, imported when it is first asked for."""
+    name = next(_VIEWS[base.__name__] for base in type(result).__mro__ if base.__name__ in _VIEWS)
+    return import_module(f"palpate.report.{name}")
 
 
 def facts_of(value: Any) -> Facts:

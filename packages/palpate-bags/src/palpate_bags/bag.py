@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.errors import InputError, unknown
 from palpate.files.limits import ReadingBudget, ReadingLimits
-from palpate.logs.kinds import Kind
+from palpate.logs.formats import Kind
 from palpate_bags.reading import Stream, finder, first_line, leaves, no_field, open_files
 from palpate_bags.scanning import TopicInFile
 

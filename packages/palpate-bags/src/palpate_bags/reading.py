@@ -15,7 +15,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files.limits import ReadingBudget
-from palpate.logs.kinds import PACKED, STORAGES, Kind, kind_of
+from palpate.logs.formats import PACKED, STORAGES, Kind, kind_of
 from palpate_bags.scanning import (
     ZSTD,
     End,

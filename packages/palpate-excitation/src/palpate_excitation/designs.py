@@ -63,7 +63,7 @@ def _predict_chirp(problem: DesignProblem, sweep: Chirp) -> Made:
     for surface, force in zip(problem.surfaces.surfaces(), forces, strict=True):
         motion = force / surface.impedance(omega)
         error = error_of_sweep(motion, omega, sweep.seconds, sensors.rate, sensors.position_step)
-        known = problem.predicted(surface, omega, force, error, sweep.seconds, together=False)
+        known = problem.information_with_errors(surface, omega, force, error, sweep.seconds, together=False)
         felt = float(np.abs(force).max())
         travel = 2 * float(np.abs(force / surface.impedance(omega)).max())
         between = (problem.budget.mean - felt, problem.budget.mean + felt)

@@ -163,7 +163,7 @@ def _multisine(problem: DesignProblem, seconds: float, mix: float) -> Made:
     for _ in range(_ROUNDS):  # friction makes the answer depend on the power, so the two are found in turns
         forces = problem.forces(omega, strength * np.sqrt(2 * powers))
         unit = seconds * problem.information(omega, forces) / powers[:, None, None]
-        found = optimal(unit, problem.prior, problem.wanted, problem.criterion, costs, powers)
+        found = optimal(unit, problem.prior, problem.target_halves, problem.criterion, costs, powers)
         powers, gap = found.powers, found.gap
 
     def spread(width: float, rounds: int) -> Made:
@@ -214,7 +214,9 @@ def _within_budget(
         motion = force / surface.impedance(omega) * start
         readings = max(round(period * sensors.rate), 2 * int(harmonics[-1]) + 2)
         error = error_of_period(motion, harmonics, readings, sensors.position_step)
-        known = problem.predicted(surface, omega, force * start, error[:, harmonics], seconds, together=True)
+        known = problem.information_with_errors(
+            surface, omega, force * start, error[:, harmonics], seconds, together=True
+        )
         names, prior = problem.surfaces.names, problem.prior
         predictions.append(
             SurfaceResponse(

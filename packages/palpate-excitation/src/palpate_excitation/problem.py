@@ -272,7 +272,7 @@ class DesignProblem:
         return np.array([ALL.index(name) for name in self.surfaces.names] + [len(ALL)])
 
     @property
-    def wanted(self) -> Array:
+    def target_halves(self) -> Array:
         """The half-widths asked for in the order of `free`, infinite where nothing is asked."""
         return np.array([*(self.precision.get(name, np.inf) for name in self.surfaces.names), np.inf])
 
@@ -292,7 +292,7 @@ class DesignProblem:
         found = np.stack([self.sensors.information(surface, omega, force) for surface, force in pairs])
         return found[:, :, self.free[:, None], self.free]
 
-    def predicted(
+    def information_with_errors(
         self,
         surface: LinearSurface,
         omega: Array,

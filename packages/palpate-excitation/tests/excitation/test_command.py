@@ -52,7 +52,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert main(["excite", *ASKED, "--duration", "4"]) == 0
     printed = capsys.readouterr().out
     assert "multisine of" in printed
-    assert "yes, predicted K" in printed
+    assert "predicted K" in printed
     assert "written: excite.png" in printed
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
 
@@ -67,9 +67,10 @@ def test_its_page_says_what_the_terminal_says(capsys, elsewhere):
     for name in ("K", "B", "M"):
         assert f"± {percent(found['reached'][name])}" in text.replace("&gt;", ">")
     assert text.count("<tr>") == 1 + len(found["surfaces"])
-    charts = json.loads(re.search(r'id="excitation">(.*?)</script>', text, re.DOTALL).group(1))
-    assert charts["seconds"] == found["duration_s"]
-    assert charts["spectrum"]["t"] == pytest.approx(found["wave"]["frequencies"])
+    figures = json.loads(re.search(r'id="panels">(.*?)</script>', text, re.DOTALL).group(1))
+    _, spectrum, precision = figures["1"]
+    assert spectrum["columns"]["t"] == pytest.approx(found["wave"]["frequencies"], rel=1e-4)
+    assert precision["spec"]["marks"][0]["x"] == found["duration_s"]
     for tag in (' src="http', ' href="http', "@import"):
         assert tag not in text
     assert main(["excite", *ASKED, "--no-figure", "--report", "page.pdf"]) == 2
@@ -80,7 +81,7 @@ def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
     printed = capsys.readouterr().out
-    assert "no; the best is K" in printed
+    assert "at best K" in printed
     assert "a lag between force and position known exactly" in printed
     assert "all of these" in printed
     assert list(elsewhere.iterdir()) == []

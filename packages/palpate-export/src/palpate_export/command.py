@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli.one_log import read_found
+from palpate.cli.options.common import read_found
 from palpate.cli.toolkit import STYLE, command, console, head, place, print_answer, show_table
 from palpate.errors import InputError
 from palpate.files import MADE, whole, with_author, write_json

@@ -1,11 +1,11 @@
 """The experiments of chapters 4 and 6 in one laboratory, each run once and only when a sentence asks for it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from palpate.bench import Experiment, build, with_values
-from palpate.bench.force_input import DONE, INTERRUPTED
+from palpate.bench.summary import DONE, INTERRUPTED
 from palpate.records import Record
 from palpate_laboratory.laboratory import Laboratory
 from palpate_thesis.figures import (
@@ -112,7 +112,7 @@ class Trial:
     def identifiers_answer(self, press: NetworkPress, rate: float = NetworkChoice().rate) -> NetworkAnswer:
         """The network's K, B and M over a press, at a learning rate."""
         lab = self.laboratory
-        choice = replace(NetworkChoice(lab.amplitude, lab.weights), rate=rate)
+        choice = NetworkChoice(lab.amplitude, lab.weights, rate=rate)
         return network.answer(press, choice, int(self.seed if lab.start is None else lab.start))
 
     @cached_property

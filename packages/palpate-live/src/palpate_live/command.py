@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.identify import ModelOptions
-from palpate.cli.options.arm import ArmOptions, FrameOptions
 from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
@@ -109,7 +107,7 @@ def live(
     if path is None:
         with (own or PluginOptions()).consent():
             return show_live(_simulation(shown.run or _DEFAULT, shown.seed, shown.whole_approach), at)
-    from palpate.cli.one_log import OneLog
+    from palpate.cli.identify import OneLog
 
     asked = OneLog(
         fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions()

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from palpate.arrays import Array
-from palpate.bench.force_input import CONTACT, DIVERGED, LOST
+from palpate.bench.summary import CONTACT, DIVERGED, LOST
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force import ForceLoop

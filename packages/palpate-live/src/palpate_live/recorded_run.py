@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench.force_input import COLUMNS as ROW
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter
 from palpate.logs.read import read_log

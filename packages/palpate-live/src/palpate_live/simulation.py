@@ -8,10 +8,11 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench.build import build, check_parts
 from palpate.bench.force_input import COLUMNS as ROW
-from palpate.bench.force_input import CONTACT, LOST, StopCondition
-from palpate.bench.given_motion import rest_for
+from palpate.bench.force_input import StopCondition
+from palpate.bench.summary import CONTACT, LOST
 from palpate.bench.tables import Experiment, with_values
 from palpate.environments import SurfaceState
+from palpate.environments.surface import rest_for
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 from palpate_live.stability import OfBench

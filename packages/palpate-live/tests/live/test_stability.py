@@ -7,7 +7,7 @@ import pytest
 from live.conftest import PATIENCE, near
 from palpate.force.certificate import Claim
 from palpate.force.expected import margins as margins_on
-from palpate.press.engines import gains_for, loop_of
+from palpate.press.engines import loop_of, press_gains
 from palpate.report.numbers import plain
 from palpate_live import stability
 from palpate_live.stability import OfArm, OfBench, Stability, answers
@@ -71,7 +71,7 @@ def test_a_proof_is_not_claimed_of_a_surface_that_it_does_not_cover(proof):
 
 
 def test_an_arm_s_proof_and_margins_are_those_of_its_gains(proof):
-    gains = gains_for(loop_of("ur5e", "UR5e", "position", 5.0), 20.0)
+    gains = press_gains(loop_of("ur5e", "UR5e", "position", 5.0), 20.0)
     found = list(answers(OfArm(gains, 5000.0, 0.0)))
     assert "Proving" in found[0]["text"]
     assert (
@@ -88,5 +88,5 @@ def test_an_arm_s_proof_and_margins_are_those_of_its_gains(proof):
 @pytest.mark.long
 def test_what_cannot_be_proved_is_said(monkeypatch):
     monkeypatch.setattr(stability, "_proof", lambda encoded, adapting: ())
-    gains = gains_for(loop_of("fr3", "FR3", "torque", 5.0), 20.0)
+    gains = press_gains(loop_of("fr3", "FR3", "torque", 5.0), 20.0)
     assert list(answers(OfArm(gains, 5000.0, 0.0)))[-1]["text"].startswith("Nothing could be proved")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from palpate_maps.next_press import NextPresses
-    from palpate_maps.stiffness_map import FieldMap, Prediction, StiffnessMap
+    from palpate_maps.stiffness_map import FieldMap, FieldPrediction, StiffnessMap
 
-__all__ = ["FieldMap", "NextPresses", "Prediction", "StiffnessMap"]
+__all__ = ["FieldMap", "FieldPrediction", "NextPresses", "StiffnessMap"]
 
 
 def __getattr__(name: str) -> Any:

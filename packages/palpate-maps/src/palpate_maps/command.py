@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._streams import notice_signals
-from palpate.cli.identify import ModelOptions
-from palpate.cli.one_log import OneLog
-from palpate.cli.options.arm import ArmOptions, FrameOptions
+from palpate.cli.identify import OneLog
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
-from palpate.cli.options.log import LogOptions
+from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
 from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
 from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
@@ -217,7 +215,7 @@ def _watch(growth: Callable[[Known], Presses], request: MapRequest, output: Outp
 
 def _growth(logs: Sequence[Path], places: PlaceOptions, one: OneLog, known: Known) -> Presses:
     """The presses by now; a file is read when it has rested since the last look, and once."""
-    from palpate.logs.many import gather_logs
+    from palpate.logs.formats import gather_logs
     from palpate_maps.presses import merge_presses
 
     for path in [places.table] if places.table is not None else gather_logs(logs):
@@ -249,7 +247,7 @@ def _presses(logs: Sequence[Path], places: PlaceOptions, one: OneLog) -> Presses
         return read_table(places.table, columns, fields)
     if places.columns is not None or places.fields is not None:
         raise InputError("--columns and --fields are of --table; the place in logs is given with --place")
-    from palpate.logs.many import gather_logs
+    from palpate.logs.formats import gather_logs
 
     with bar(console(stderr=True)) as progress:
 

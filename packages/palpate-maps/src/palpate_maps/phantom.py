@@ -14,8 +14,8 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.files import read_table, read_text
 from palpate.press.prepare import Pressing, Question, prepare_press
+from palpate.press.pressing import summarise
 from palpate.press.setting import GAP, place_of
-from palpate.press.summary import summarise
 from palpate_maps.presses import Presses
 from palpate_maps.result import MapRequest, MapResult, map_of
 

@@ -13,12 +13,12 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, PalpateError
 from palpate.from_log import LogIdentifier
-from palpate.logs.kinds import kind_of
+from palpate.logs.formats import kind_of, open_table
 from palpate.logs.read import is_run, read_log
 from palpate.logs.roles import POSE, WRENCH
 from palpate.logs.signals import Signals
-from palpate.logs.tables import Sheet, open_table
 from palpate.logs.tables.parquet import stored_about
+from palpate.logs.tables.sheet import Sheet
 from palpate.units import UNITS, split_spec, unit, unit_in_name
 
 if TYPE_CHECKING:

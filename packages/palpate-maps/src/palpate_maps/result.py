@@ -18,7 +18,7 @@ from palpate.files import whole, write_text
 from palpate_maps.gaussian_process import Z95
 from palpate_maps.next_press import Goal, NextPresses
 from palpate_maps.presses import AXES, LEAST, Presses
-from palpate_maps.stiffness_map import FieldMap, Prediction, StiffnessMap
+from palpate_maps.stiffness_map import FieldMap, FieldPrediction, StiffnessMap
 from palpate_maps.surface import Grid
 
 SHOWN = 2500
@@ -50,7 +50,7 @@ class Lump:
     is_sure: bool
 
 
-def lumps_of(grid: Grid, prediction: Prediction, threshold: float) -> list[Lump]:
+def lumps_of(grid: Grid, prediction: FieldPrediction, threshold: float) -> list[Lump]:
     """The lumps on a grid within the hull of the presses, the stiffest first.
 
     Args:
@@ -118,7 +118,7 @@ class MapResult:
         return self.map.grid(SHOWN)
 
     @cached_property
-    def prediction(self) -> Prediction:
+    def prediction(self) -> FieldPrediction:
         """The stiffness at the grid."""
         return self.map.predict(self.grid.places)
 
@@ -141,17 +141,17 @@ class MapResult:
         )
 
     @cached_property
-    def fields(self) -> dict[str, Prediction]:
+    def fields(self) -> dict[str, FieldPrediction]:
         """Further fields at the grid, by name: those that vary, over presses that span a surface."""
         found = {name: self._field(name) for name in self.presses.fields}
         return {name: field for name, field in found.items() if not isinstance(field, str)}
 
     @property
-    def unmapped(self) -> dict[str, str]:
+    def missing_maps(self) -> dict[str, str]:
         """Further quantities of the presses without a map, by name, each with the reason."""
         return {name: str(self._field(name)) for name in self.presses.fields if name not in self.fields}
 
-    def _field(self, name: str) -> Prediction | str:
+    def _field(self, name: str) -> FieldPrediction | str:
         values = self.presses.fields[name]
         known = np.isfinite(values)
         if known.sum() < LEAST:
@@ -166,7 +166,7 @@ class MapResult:
             return str(error)
 
     @cached_property
-    def film(self) -> list[tuple[int, Prediction]]:
+    def film(self) -> list[tuple[int, FieldPrediction]]:
         """The map of the first presses, of ever more of them, at `coarse`, all with the scales of the whole map."""
         whole, n = self.map.process.likeliest, len(self.map)
         counts = np.unique(np.linspace(min(n, 4), n, FRAMES).round().astype(int))
@@ -175,7 +175,7 @@ class MapResult:
         for k in map(int, counts):
             mean, variance = whole.first(k).reduction.predict(distance[:k])
             std, common = np.sqrt(variance), self.request.common
-            frames.append((k, Prediction(mean, std, std, common, z95=self.map.process.z95)))
+            frames.append((k, FieldPrediction(mean, std, std, common, z95=self.map.process.z95)))
         return frames
 
     @cached_property

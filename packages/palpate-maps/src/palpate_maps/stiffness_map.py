@@ -25,7 +25,7 @@ MOST_PRESSES = 1000
 
 
 @dataclass(frozen=True)
-class Prediction:
+class FieldPrediction:
     """A field at places.
 
     Args:
@@ -183,10 +183,10 @@ class FieldMap:
             self.surface  # noqa: B018 - refuses presses that span no surface
             lines, line = np.unique(self._line, return_inverse=True, equal_nan=False)
             shared = line.astype(float) if 1 < len(lines) < len(line) else None
-            self._process = fit(self._places, *self._scaled(self._values, self._half), shared)
+            self._process = fit(self._places, *self._on_scale(self._values, self._half), shared)
         return self._process
 
-    def predict(self, places: Any) -> Prediction:
+    def predict(self, places: Any) -> FieldPrediction:
         """The field at places (n, d) [m], and that of a next press whose own interval is the presses' median."""
         at = np.atleast_2d(np.asarray(places, dtype=float))
         if len(self) and (at.ndim != 2 or at.shape[1] != self._places.shape[1]):
@@ -196,7 +196,7 @@ class FieldMap:
         mean, variance = self.process.predict(at)
         next_std = np.sqrt(variance + self._noise)
         z95 = (self.process.z95, self.process.next_z95)
-        return Prediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, *z95)
+        return FieldPrediction(mean, np.sqrt(variance), next_std, self._common, self.logarithmic, *z95)
 
     def next(
         self,
@@ -272,7 +272,7 @@ class FieldMap:
     @property
     def _noise(self) -> float:
         """Variance of a normal next press, on its own line, whose 95 % are those of one that errs as any before."""
-        _, own = self._scaled(self._values, self._half)
+        _, own = self._on_scale(self._values, self._half)
         std = np.sqrt(own**2 + self.process.repeat**2 + self.process.shared**2)
         outside = lambda half: 2.0 * np.mean(norm.sf(half / std)) - LEVEL  # noqa: E731
         return float(brentq(outside, Z95 * std.min() / 2.0, 2.0 * Z95 * std.max()) / Z95) ** 2
@@ -281,7 +281,7 @@ class FieldMap:
         grid = self.grid(CANDIDATES)
         return grid.places[grid.inside]
 
-    def _scaled(self, values: Array, half: Array) -> tuple[Array, Array]:
+    def _on_scale(self, values: Array, half: Array) -> tuple[Array, Array]:
         """Values (n,) and their own standard deviations (n,) on the scale of the process."""
         return (np.log(values), half / (Z95 * values)) if self.logarithmic else (values, half / Z95)
 
@@ -292,7 +292,7 @@ class FieldMap:
         span is 3.7 standard deviations (Tippett 1925), so that two repeated presses differ so with a probability below
         1e-6.
         """
-        value, std = self._scaled(values, half)
+        value, std = self._on_scale(values, half)
         _, place = np.unique(places, axis=0, return_inverse=True)
         place = place.ravel()
         for i, j in pairwise(np.argsort(place, kind="stable")):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate._jit.typing_rules import TypingRules
+from palpate._jit.kernels import TypingRules
 from palpate_native.source import comment_text, home_of, place_of, refuse, syntax_of
 from palpate_native.statements import FunctionBody
 from palpate_native.structs import Structs, c_name, initial, plain

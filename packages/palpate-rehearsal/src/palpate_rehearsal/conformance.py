@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires import Command, EndedError, Sense, SilentError, unreadable
+from palpate.wires import ArmReading, Command, EndedError, SilentError, unreadable
 from palpate_checks.check import Check, require
 
 _READINGS, _PATIENCE = 50, 5.0
@@ -39,9 +39,9 @@ def _open(make: Callable[[], Any]) -> Iterator[Any]:
         wire.close()
 
 
-def _readings(wire: Any, count: int = _READINGS) -> list[Sense]:
+def _readings(wire: Any, count: int = _READINGS) -> list[ArmReading]:
     """So many, as they come."""
-    found: list[Sense] = []
+    found: list[ArmReading] = []
     end = time.monotonic() + _PATIENCE
     while len(found) < count:
         require(time.monotonic() < end, f"only {len(found)} readings came in {_PATIENCE:g} s")
@@ -64,7 +64,7 @@ def its_readings_are_numbers_with_an_orientation(make: Callable[[], Any]) -> Non
     """Finite numbers, and a quaternion of the length 1."""
     with _open(make) as wire:
         for sense in _readings(wire):
-            require(isinstance(sense, Sense), f"read gave {type(sense).__name__}, not a Sense")
+            require(isinstance(sense, ArmReading), f"read gave {type(sense).__name__}, not a ArmReading")
             require(unreadable(sense) is None, f"{unreadable(sense)}")
             require(all(map(math.isfinite, sense.torque)), "the torque is no number")
 

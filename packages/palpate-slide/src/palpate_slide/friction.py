@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.signals_in_base import ArmDynamics, BaseSignals, ContactFrame, Unloaded
+from palpate.contact_frame.arm import ArmDynamics
+from palpate.contact_frame.projecting import residual_of_press
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 from palpate.identification.result import LagFound, SlideFound
 from palpate.identification.uncertainty import student
 from palpate.records import Record
-from palpate_slide.against_press import advantage
 from palpate_slide.from_log import (
     BLOCKS,
     SHAPE,
@@ -23,6 +24,7 @@ from palpate_slide.from_log import (
     SlideWindows,
     course_of,
     freed_of,
+    nearest,
     with_length,
 )
 
@@ -38,8 +40,6 @@ ASKEW = np.radians(30.0)
 """Angle between the normal by the force and that of the path's own plane, at most."""
 PART = 2.5
 """Length of a part of a slide for which a stiffness is estimated [s]."""
-FAINT = 0.15
-"""Share of noise in the variance of the force's rate, above which it does not show a stiffness."""
 TANGENTIAL = (2.0 / 3.0 / SHAPE, SHAPE)
 """Tangential over normal stiffness of a contact: 2 (1 - nu)/(2 - nu) (Mindlin 1949), within `SHAPE`."""
 CHI2_95 = 2.4477
@@ -121,7 +121,7 @@ def _identification(
     if course.known:
         K, parts = _stiffness(course, found, beside[:, 0], length, arm, *wide)
     else:
-        K, parts = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_ZERO), np.zeros((0, 5))
+        K, parts = _nothing("N/m", _NO_ZERO), np.zeros((0, 5))
     normal, cone = _normals(course, fit, found, mu, share)
     own = _verdict(mu, _contradiction(course, fit, found, normal, rows), course.known, wide[0])
     std = float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1]))
@@ -137,6 +137,55 @@ def _identification(
         warnings=() if course.known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),),
         slide=_answer(course, mu, own, normal, cone, parts, length),
     )
+
+
+def advantage(
+    course: SlideWindows,
+    found: SlideFit,
+    length: float,
+    freed: Unloaded,
+    press: Identification,
+    about: dict[str, Any],
+) -> float:
+    """How much more of the force a press leaves than a slide does, in standard deviations of the difference.
+
+    A press says that the force is a function of the depth along one direction, F = F_0 + n (K d + B d'), with its own
+    n, K and contacts. A slide says that the force goes on while the tip moves across it: |F| = F_0, at the angle of
+    friction to the motion. Each is compared with the force in newtons, in the same rows, where the tip moves across the
+    force and in free motion. Where the zero of the force is unknown, so is its size: a slide says its angle alone.
+    The deviation is that of a sum over parts of the log: Vuong's test (Econometrica 57, 1989), of models of which none
+    holds the other.
+
+    Args:
+        course: of the slide.
+        found: its parameters.
+        length: on which its friction relaxes [m].
+        freed: rows in free motion and in contact by the slide.
+        press: its K counts as it is, if it is identified; otherwise the best one does.
+        about: normal, sign and bias of the press, as `project` gives them.
+    """
+    s = course.smooth
+    free = np.interp(s.time, course.turns[0], freed.free.astype(float)) > 0.999
+    rows = np.flatnonzero(course.slides | free)[:: max(s.rows // 2, 1)]
+    slides = course.slides[rows]
+    F, angle = (values[rows] for values in course.friction_angle(found, length))
+    size = np.linalg.norm(F, axis=1)
+    usual = size[slides].mean() if course.known else size
+    R = course.turns[1][nearest(course.turns[0], s.time[rows])]
+    read = s.force[rows] + freed.load.weight + R @ (freed.load.bias - np.array(about["bias_N"]))
+    by_slide = np.where(slides, (size - usual) ** 2 + (size * angle) ** 2, size**2)
+    by_press = np.sum(
+        residual_of_press(press, about, s.time[rows], s.place[rows], s.velocity[rows], read) ** 2, axis=1
+    )
+    # Both are normal with a variance of their own: the parts' log-likelihoods against each other.
+    one, other = (values / values.mean() for values in (by_press, by_slide))
+    parts = np.array([part.mean() for part in np.array_split(one - other, BLOCKS)])
+    ratio = np.log(by_press.mean() / by_slide.mean())
+    return float(np.sqrt(BLOCKS) * ratio / max(np.std(parts, ddof=1), 1e-300))
+
+
+def _nothing(unit: str, why: str) -> Parameter:
+    return Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, why)
 
 
 def _unclear(K: Parameter) -> Parameter:
@@ -236,9 +285,9 @@ def _coefficient(
 def _verdict(mu: Coefficient, wrong: str, known: bool, tolerance: float) -> Parameter:
     ends = (max(mu.value - mu.half, 0.0), mu.value + mu.half)
     if not known:
-        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, _NO_ZERO)
+        return _nothing("1", _NO_ZERO)
     if wrong:
-        return Parameter(None, None, None, "1", Verdict.REJECTED, wrong)
+        return replace(_nothing("1", wrong), verdict=Verdict.REJECTED)
     speeds = "" if len(mu.table) == 1 else ", the mean; it depends on the speed"
     why = f"95 %: {ends[0]:.3g} to {ends[1]:.3g}{speeds}"
     good = mu.half <= tolerance * mu.value
@@ -302,7 +351,7 @@ def _stiffness(
     d|F|/dt cos(atan mu)/K, each side seen through the same window. A lag of the force adds the rate of that. The
     length of relaxation counts, as friction lags a force that changes.
     """
-    none = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_DITHER)
+    none = _nothing("N/m", _NO_DITHER)
     places: Array = np.zeros((0, 5))
     main = _dips(course, found, length)
     whole = _ratio(main, BLOCKS) if len(main.dip) >= 4 * BLOCKS else None
@@ -383,7 +432,7 @@ def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:
     rest = own[:, :-2]
     rate = columns[:, 1] - rest @ np.linalg.lstsq(rest, columns[:, 1], rcond=None)[0]
     faint = noise / max(float(np.mean(rate**2)), 1e-300)
-    if faint > FAINT:
+    if faint >= 1.0:
         return None
     theta = np.linalg.lstsq(own, dip, rcond=None)[0]
     split = np.array_split(np.arange(len(dip)), blocks)

@@ -56,7 +56,7 @@ class Smooth:
         rows, longer: in a window, and in one of a rate.
         time: [s], shape (n,).
         place, velocity: [m], [m/s], shape (n, 3).
-        force, rate, bend: in the base without the load, as the sensor shows it [N]; its derivatives in the tool's axes,
+        force, rate: in the base without the load, as the sensor shows it [N]; its derivative in the tool's axes,
             turned into the base's, since a sensor is late in its own axes; shape (n, 3).
         grain, noise: standard deviation of a reading of the position [m] and of the force [N], of an axis.
         inside: rows in contact, shape (n,).
@@ -70,7 +70,6 @@ class Smooth:
     velocity: Array
     force: Array
     rate: Array
-    bend: Array
     grain: float
     noise: float
     inside: Mask
@@ -106,12 +105,12 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
         return found
 
     longer = max(rows, round(RATE / step) // 2 * 2 + 1)
-    rate, bend = (savgol_filter(force, longer, 2, deriv=k, delta=step, axis=0) for k in (1, 2))
+    rate = savgol_filter(force, longer, 2, deriv=1, delta=step, axis=0)
     at = signals.rotations[nearest(time, grid)]
-    level, rate, bend = (np.einsum("nij,nj->ni", at, values) for values in (of(force, 0), rate, bend))
+    level, rate = (np.einsum("nij,nj->ni", at, values) for values in (of(force, 0), rate))
     level -= freed.load.weight
     edge = np.convolve(inside, np.ones(rows), "same") > rows - 0.5
-    return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, bend, grain, noise, edge)
+    return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, grain, noise, edge)
 
 
 def nearest(time: Array, at: Array) -> NDArray[np.intp]:
@@ -204,7 +203,7 @@ class SlideWindows:
     Args:
         time, speed: [s], [m/s], shape (m,).
         place, way: [m], direction of the motion, shape (m, 3).
-        force, rate, bend: as of `Smooth`, from the tip on the surface, shape (m, 3).
+        force, rate: as of `Smooth`, from the tip on the surface, shape (m, 3).
         turned: rotation of the tool, and that against the middle of the free rows, shape (m, 3, 3).
         rows: of the smooth signals.
         smooth, moves, slides: whence the windows are, and where the tip moves on, and across the force.
@@ -221,7 +220,6 @@ class SlideWindows:
     way: Array
     force: Array
     rate: Array
-    bend: Array
     turned: tuple[Array, Array]
     rows: NDArray[np.intp]
     smooth: Smooth
@@ -292,7 +290,7 @@ def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Sli
     noise = np.hypot(force, size[rows] * blur / speed[rows])
     return SlideWindows(
         s.time[rows], speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
-        sign * s.bend[rows], (rotations, rotations @ rest.T), rows, s, moves, slides, known,
+         (rotations, rotations @ rest.T), rows, s, moves, slides, known,
         (signals.time, signals.rotations), rest, sign, noise, path,
     )  # fmt: skip
 
@@ -373,7 +371,7 @@ class Fit:
         along = np.einsum("ij,ij->i", F, c.way)
         size = np.linalg.norm(F, axis=1)
         level = np.sqrt(np.maximum(size**2 - along**2, 1e-12))
-        rate = np.einsum("ij,ij->i", F, c.rate + lag * c.bend) / np.maximum(size, 1e-9)
+        rate = np.einsum("ij,ij->i", F, c.rate) / np.maximum(size, 1e-9)
         return np.arctan2(along, level), rate / c.speed, F
 
     def residuals(self, x: Array, share: Array) -> Array:

@@ -14,9 +14,10 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
 from palpate_live.view import AT
+from palpate_slide.film import FRAMES, slide_film
 from palpate_slide.ground import Ground, ground_of, outside, surface_height
 from palpate_slide.jointed_arm import jointed_arm
-from palpate_slide.report import FRAMES, sentence, slide_film, summarise, write_report
+from palpate_slide.report import sentence, summarise, write_report
 from palpate_slide.watched import WatchedSlide
 from palpate_slide.world import COLUMNS, Vec3, simulate
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Mask
 from palpate.bench import Experiment, with_values
-from palpate.bench.force_input import DONE
+from palpate.bench.summary import DONE
 from palpate.controllers import NeuralController
 from palpate.errors import InputError
 from palpate.report import style

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.force_input import DONE
+from palpate.bench.summary import DONE
 from palpate.errors import unknown
 from palpate_studies.metrics import Metric, metric_of
 from palpate_studies.parameters import Axis, Label, label

@@ -97,7 +97,7 @@ class StudyPart:
         return [a for a in self.axes if not a.drawn]
 
     @property
-    def drawn(self) -> list[Axis]:
+    def random_axes(self) -> list[Axis]:
         """The axes whose values are drawn."""
         return [a for a in self.axes if a.drawn]
 
@@ -112,7 +112,7 @@ class StudyPart:
     @cached_property
     def sobol(self) -> Sobol:
         """The sequence of the points drawn."""
-        return Sobol(len(self.drawn), self.samples_seed)
+        return Sobol(len(self.random_axes), self.samples_seed)
 
     def values(self, number: int) -> dict[str, Any]:
         """The parameters' values of a setting by its number, as they are set."""
@@ -120,9 +120,9 @@ class StudyPart:
         for one in reversed(self.grid):
             number, i = divmod(number, len(one.settings))
             found[one.name] = one.settings[i]
-        if self.drawn:
+        if self.random_axes:
             shares = self.sobol.point(number)
-            found |= {a.name: a.between(s) for a, s in zip(self.drawn, shares, strict=True)}
+            found |= {a.name: a.between(s) for a, s in zip(self.random_axes, shares, strict=True)}
         return {a.name: found[a.name] for a in self.axes}
 
     def experiment(self, values: Mapping[str, Any]) -> AnyExperiment:

@@ -13,8 +13,8 @@ import numpy as np
 
 from palpate.bench import Experiment, build
 from palpate.bench.build import AnyExperiment, build_any, check_parts
-from palpate.bench.force_input import DONE, NO_CONTACT
 from palpate.bench.speed import cores
+from palpate.bench.summary import DONE, NO_CONTACT
 from palpate.errors import InputError, PluginError
 from palpate.plugins import is_plugin
 from palpate.text import duration

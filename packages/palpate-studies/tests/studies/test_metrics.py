@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from palpate.bench.force_input import APPROACH, COLUMNS, CONTACT, LOST
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.summary import APPROACH, CONTACT, LOST
 from palpate.records import Record
 from palpate_studies.metrics import METRICS, Window
 

@@ -76,12 +76,28 @@ def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
 
 
-class _Spread(list[float]):
-    """Values over the seeds, for a place of a text: "{error:N 2}" has their spread in newtons, to two digits."""
+def on_one_line(name: str) -> str:
+    """A variation's name, which a figure breaks, for a sentence."""
+    return name.replace("\n", " ")
+
+
+class _Spread(list[Any]):
+    """Values over the seeds, for a place of a text: "{error:N 2}" has their spread in newtons, to two digits.
+
+    Of measured objects "{press.off:% 2}" has the spread of an attribute, a number without prefix, in the place's unit.
+    """
+
+    scales: Mapping[str, float] = {}
+
+    def __getattr__(self, name: str) -> "_Spread":
+        found = _Spread(getattr(one, name) for one in self)
+        found.scales = {"%": 100.0, "mm": 1e3, "kN/m": 1e-3}
+        return found
 
     def __format__(self, spec: str) -> str:
         unit, _, digits = spec.rpartition(" ")
-        return spread(self, unit, int(digits)) if digits.isdigit() else spread(self, spec)
+        unit, some = (unit, int(digits)) if digits.isdigit() else (spec, 3)
+        return spread([self.scales.get(unit, 1.0) * value for value in self], unit, some)
 
 
 @cache
@@ -98,23 +114,6 @@ def texts(number: str) -> tuple[str, str]:
     """Title and caption of a figure."""
     figure = tables()["figures"][number]
     return figure["title"], figure["caption"]
-
-
-@dataclass(frozen=True, eq=False)
-class Numbered:
-    """A figure of several that differ in values; its title and caption are those of its number."""
-
-    NUMBER: str
-
-    @property
-    def TITLE(self) -> str:
-        """Title of the figure, one line."""
-        return texts(self.NUMBER)[0]
-
-    @property
-    def CAPTION(self) -> str:
-        """Caption of the figure, the claim included."""
-        return texts(self.NUMBER)[1]
 
 
 def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:

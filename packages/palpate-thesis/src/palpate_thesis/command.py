@@ -67,15 +67,16 @@ def thesis(
     replace
         Replace an existing measurement.
     """
+    from palpate_thesis.claims import texts
     from palpate_thesis.figure import studies
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import HandChosen, Runs
 
     if list_:
-        everything = studies()
-        width = 2 + max(len(known.NUMBER) for known in everything)
-        for known in everything:
-            print_lines(f"{known.NUMBER:<{width}}{known.TITLE}")
+        numbers = [known.NUMBER for known in studies()]
+        width = 2 + max(map(len, numbers))
+        for number in numbers:
+            print_lines(f"{number:<{width}}{texts(number)[0]}")
         return 0
     drawn = drawn or FigureOptions()
     drawn.check()
@@ -114,6 +115,7 @@ def _measure(
 ) -> None:
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
+    from palpate_thesis.claims import texts
     from palpate_thesis.measure import measure
 
     screen = console()
@@ -121,7 +123,8 @@ def _measure(
         task = progress.add_task("", total=len(chosen))
 
         def start_study(one: FigureModule) -> None:
-            progress.update(task, completed=chosen.index(one), description=f"{one.NUMBER}  {one.TITLE}")
+            told = f"{one.NUMBER}  {texts(one.NUMBER)[0]}"
+            progress.update(task, completed=chosen.index(one), description=told)
 
         def say_resumed(done: int) -> None:
             screen.print(f"resuming in {folder}: {done} of {len(chosen)} are measured already")

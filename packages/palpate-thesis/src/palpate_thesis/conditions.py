@@ -4,14 +4,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment
-from palpate_thesis.claims import often
-from palpate_thesis.runs import Runs
+from palpate_thesis.claims import often, on_one_line
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 T = TypeVar("T")
 W = TypeVar("W")
-
-VARIED_SEEDS = 3
-"""Runs of each variation; the nominal case has all seeds."""
 
 SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
 """The last millimetres of the approach: the rest of it takes sixteen seconds and moves errors in contact by 4 %."""
@@ -28,6 +25,13 @@ RELAXING_FOAM = {
 RUBBER_SURFACE = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
 
 
+SURFACES: Mapping[str, Mapping[str, Any]] = {
+    "foam": {},
+    "rubber": RUBBER_SURFACE,
+    "relaxing\nfoam": RELAXING_FOAM,
+}
+
+
 def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
     """Changes that bring start, approach and wall together to a wall at x [m]."""
     by = x - experiment.wall.x
@@ -39,11 +43,13 @@ def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
     }
 
 
-def rougher(experiment: Experiment, factor: float) -> Mapping[str, Any]:
-    """Changes that multiply the joints' friction."""
+LUGRE = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
+
+
+def rougher(experiment: Experiment, factor: float, *names: str) -> Mapping[str, Any]:
+    """Changes that multiply the joints' friction: parameters of these names, or all."""
     f = experiment.friction
-    names = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
-    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names}
+    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names or LUGRE}
 
 
 def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
@@ -60,22 +66,18 @@ def by_condition(
     runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
 ) -> dict[str, list[T]]:
     """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
-    cases = [
-        (name, world, seed)
+    cases = {
+        name: [(world, seed) for seed in runs.seeds[: None if name in full else VARIED_SEEDS]]
         for name, world in worlds.items()
-        for seed in (runs.seeds if name in full else runs.seeds[:VARIED_SEEDS])
-    ]
-    found: dict[str, list[T]] = {}
-    for (name, _, _), one in zip(cases, runs.map(lambda case: work(*case[1:]), cases), strict=True):
-        found.setdefault(name, []).append(one)
-    return found
+    }
+    return runs.map_each(lambda case: work(*case), cases)
 
 
 def stops_holding(found: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
     """A sentence: under which variations a conclusion holds, and under which it does not."""
     broken, kept = [], []
     for name, runs in found.items():
-        told = name.replace("\n", " ")
+        told = on_one_line(name)
         if often(map(holds, runs)):
             kept.append(told)
         else:

@@ -111,20 +111,17 @@ def _lower(found: re.Match[str]) -> str:
 
 
 def _title(axes: Axes) -> str:
-    return plain(axes.get_title(loc="left") or axes.get_title() or axes.get_title(loc="right"))
+    return plain(axes.get_title(loc="left") or axes.get_title())
 
 
 def _check_scales(axes: Axes) -> None:
     """Both grow, and have numbers."""
     from matplotlib.ticker import FixedFormatter, FuncFormatter
 
-    scales = {axes.get_xscale(), axes.get_yscale()} <= {"linear", "log"}
-    worded = any(
-        isinstance(one.get_major_formatter(), FixedFormatter | FuncFormatter)
-        for one in (axes.xaxis, axes.yaxis)
-    )
-    if not scales or worded or axes.xaxis_inverted() or axes.yaxis_inverted():
-        raise NotLines
+    for one in (axes.xaxis, axes.yaxis):
+        worded = isinstance(one.get_major_formatter(), FixedFormatter | FuncFormatter)
+        if worded or one.get_inverted() or one.get_scale() not in ("linear", "log"):
+            raise NotLines
 
 
 def _kind(line: Line2D) -> Kind:
@@ -181,11 +178,8 @@ def _of_area(axes: Axes, area: Any) -> Band | Mark:
     """A band over all of the panel, or stretches of its x axis."""
     along, up = _by_data(axes, area)
     colour = _token(_code(area.get_facecolor()))
-    paths = (
-        area.get_paths()
-        if hasattr(area, "get_paths")
-        else [area.get_path().transformed(area.get_patch_transform())]
-    )
+    is_patch = not hasattr(area, "get_paths")
+    paths = [area.get_path().transformed(area.get_patch_transform())] if is_patch else area.get_paths()
     boxes = [path.get_extents() for path in paths]
     if along and not up:
         return Mark([(float(box.x0), float(box.x1)) for box in boxes], colour, _label(area))
@@ -226,15 +220,11 @@ def _legend(drawing: Figure) -> list[dict[str, Any]]:
     """Entries of the figure's own legends, as `palpate.chart` has them; those of areas have no line."""
     from matplotlib.lines import Line2D
 
-    entries = [
-        (handle, text.get_text())
-        for legend in drawing.legends
-        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
-    ]
     none = np.empty(0)
     return [
-        chart.look(replace(_series(handle, none, none), label=plain(text)))
-        for handle, text in entries
+        chart.look(replace(_series(handle, none, none), label=plain(text.get_text())))
+        for legend in drawing.legends
+        for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True)
         if isinstance(handle, Line2D)
     ]
 

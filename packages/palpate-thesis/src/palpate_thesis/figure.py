@@ -17,14 +17,10 @@ class FigureModule(Protocol):
     """A module with one figure.
 
     ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
-    ("why-negative-mass"). ``TITLE`` is a line; ``CAPTION`` describes it, the claim included. ``PARAMETERS`` holds
-    everything that was chosen.
+    ("why-negative-mass"), by which claims.toml has its title and caption.
     """
 
     NUMBER: str
-    TITLE: str
-    CAPTION: str
-    PARAMETERS: Any
 
     def run(self, runs: Runs) -> Any:
         """Measured values for `check` and `plot`, and no others."""

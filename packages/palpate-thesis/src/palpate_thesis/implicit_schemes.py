@@ -197,38 +197,25 @@ class ImpedanceSearch(NamedTuple):
 
     def step(self, state, sense, task, model):
         context, own = self.context(task.s @ task.f), self.impedance
-        k = own.stiffness * (1.0 + task.s * (exp(state.stiffness @ context + state.tried.x) - 1.0))
-        b = own.damping * (1.0 + task.s * (exp(state.damping @ context + state.tried.y) - 1.0))
+        stiffness, damping, expected, tried, cost, ticks, seed = state
+        k = own.stiffness * (1.0 + task.s * (exp(stiffness @ context + tried.x) - 1.0))
+        b = own.damping * (1.0 + task.s * (exp(damping @ context + tried.y) - 1.0))
         tuned = Impedance(own.mass, b, k, own.target)
         torque, _ = tuned.step(0.0, sense, task, model)
-        counts = 1.0 if state.ticks * self.tick >= self.after else 0.0
-        cost = state.cost + counts * abs(task.s @ (task.f - sense.f))
-        if (state.ticks + 1.0) * self.tick < self.period:
-            return torque, SearchState(
-                state.stiffness,
-                state.damping,
-                state.expected,
-                state.tried,
-                cost,
-                state.ticks + 1.0,
-                state.seed,
-            )
-        better = state.expected @ context - cost / ((self.period - self.after) / self.tick)
+        counts = 1.0 if ticks * self.tick >= self.after else 0.0
+        cost += counts * abs(task.s @ (task.f - sense.f))
+        if (ticks + 1.0) * self.tick < self.period:
+            return torque, SearchState(stiffness, damping, expected, tried, cost, ticks + 1.0, seed)
+        better = expected @ context - cost / ((self.period - self.after) / self.tick)
         gain = self.rate * clip(better, 1.0)
-        first = 16807.0 * state.seed % MODULUS
+        first = 16807.0 * seed % MODULUS
         second = 16807.0 * first % MODULUS
-        expected = state.expected - (self.learning * better / (context @ context)) * context
+        stiffness += (gain * tried.x) * context
+        damping += (gain * tried.y) * context
+        expected -= (self.learning * better / (context @ context)) * context
         width = self.spread * max(expected @ context, 0.0)
         tried = width * Vec3(2.0 * first / MODULUS - 1.0, 2.0 * second / MODULUS - 1.0, 0.0)
-        return torque, SearchState(
-            state.stiffness + (gain * state.tried.x) * context,
-            state.damping + (gain * state.tried.y) * context,
-            expected,
-            tried,
-            0.0,
-            0.0,
-            second,
-        )
+        return torque, SearchState(stiffness, damping, expected, tried, 0.0, 0.0, second)
 
     def rest(self, state, sense):
         """Keeps what it has learned; the trial begins anew."""

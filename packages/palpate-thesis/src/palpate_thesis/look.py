@@ -12,8 +12,12 @@ if TYPE_CHECKING:
 else:  # for annotations alone: matplotlib is imported when a figure is drawn
     Axes = Figure = Any
 
-__all__ = ["LOOK", "Axes", "Figure", "apply_look"]
+__all__ = ["LIMIT_LINE", "LOOK", "STATED", "ZERO", "Axes", "Figure", "apply_look"]
 
+LIMIT_LINE: dict[str, Any] = {"color": style.INK, "linewidth": 1, "linestyle": "--"}
+STATED: dict[str, Any] = {"color": style.FAIL, "linewidth": 0.9, "linestyle": ":"}
+ZERO: dict[str, Any] = {"color": style.MEASURED, "linewidth": 0.9}
+"""Lines across a panel: where a claim ceases to hold, what the thesis states, and zero."""
 LOOK: dict[str, Any] = {
     "font.size": 9.0,
     "axes.labelsize": 8.5,

@@ -16,7 +16,7 @@ from palpate.report.chart import panel_scripts
 from palpate.report.look.assets import data, text_of
 from palpate.report.page import render
 from palpate_thesis import look
-from palpate_thesis.claims import Done, ThesisClaim, count_in_words, count_verdicts, rows_of, tables
+from palpate_thesis.claims import Done, ThesisClaim, count_in_words, count_verdicts, rows_of, tables, texts
 from palpate_thesis.drawn_panels import panels_of
 from palpate_thesis.figure import FigureModule
 from palpate_thesis.runs import Runs
@@ -92,7 +92,7 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
         for ending in dict.fromkeys((".png", *written.endings)):
             style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
         write_json(folder / f"{study.NUMBER}{PANELS}", with_author({"panels": panels_of(drawing)}))
-    return Done(study.NUMBER, study.TITLE, study.CAPTION, claims, time.perf_counter() - begun)
+    return Done(study.NUMBER, *texts(study.NUMBER), claims, time.perf_counter() - begun)
 
 
 def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:

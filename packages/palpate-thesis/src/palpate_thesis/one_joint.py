@@ -300,14 +300,9 @@ class DirectNeural(NamedTuple):
 
     def step(self, state, desired, f, x):
         """Torque [N m] for the desired and the measured force [N]; learns on the way."""
-        net, memory = self.network, state.network
-        see(
-            memory.signals,
-            desired / self.force,
-            f / self.force,
-            state.f / self.force,
-            state.torque / net.amplitude[0],
-        )
+        net, memory, scale = self.network, state.network, self.force
+        before = state.torque / net.amplitude[0]
+        see(memory.signals, desired / scale, f / scale, state.f / scale, before)
         net.forward(memory)
         torque = net.output(memory, 0)
         net.want(memory, 0, desired - f)

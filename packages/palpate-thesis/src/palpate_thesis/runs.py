@@ -1,17 +1,21 @@
 """Many runs of an experiment: over seeds, over parameters, on all cores."""
 
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
-from palpate.bench.force_input import INTERRUPTED
 from palpate.bench.speed import cores
+from palpate.bench.summary import INTERRUPTED
 from palpate.records import Record
 
+K = TypeVar("K")
 T = TypeVar("T")
+
+VARIED_SEEDS = 3
+"""Runs of each variation; the nominal case has all seeds."""
 
 
 class HandChosen:
@@ -64,6 +68,21 @@ class Runs:
             return measure(self.one(*case))
 
         return self.map(work, list(cases))
+
+    def by_name(
+        self, experiments: Mapping[K, Experiment], measure: Callable[[Record], T], seeds: int | None = None
+    ) -> dict[K, list[T]]:
+        """`measure` of each experiment's records, by its name; over the first so many seeds if not over all."""
+        own = self.seeds[:seeds]
+        return self.map_each(
+            lambda case: measure(self.one(*case)),
+            {name: [(e, s) for s in own] for name, e in experiments.items()},
+        )
+
+    def map_each(self, work: Callable[[Any], T], items: Mapping[K, Sequence[Any]]) -> dict[K, list[T]]:
+        """`work` of each item of each name; all names at once, on all cores."""
+        found = iter(self.map(work, [item for some in items.values() for item in some]))
+        return {name: [next(found) for _ in some] for name, some in items.items()}
 
     def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
         """`work` of each item, in their order, on all cores."""

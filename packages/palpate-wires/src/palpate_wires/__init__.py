@@ -1,6 +1,6 @@
 """Wires to real arms: readings in, commands out, each by the arm's own library."""
 
-from palpate.wires import Command, LostError, Sense, Wire
+from palpate.wires import ArmReading, Command, LostError, Wire
 from palpate_wires.at_rest import AtRest, look
 from palpate_wires.opening import KINDS, open_wire
 from palpate_wires.order import Order, PressLimits, PressTask, check_order
@@ -9,6 +9,7 @@ from palpate_wires.press import press
 
 __all__ = [
     "KINDS",
+    "ArmReading",
     "AtRest",
     "Command",
     "LostError",
@@ -17,7 +18,6 @@ __all__ = [
     "PressLimits",
     "PressTask",
     "Rows",
-    "Sense",
     "Wire",
     "check_order",
     "look",

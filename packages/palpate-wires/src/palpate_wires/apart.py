@@ -12,7 +12,7 @@ import sys
 import time
 
 from palpate.errors import InputError
-from palpate.wires import SILENCE, Command, LostError, Sense, SilentError
+from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError
 from palpate_wires import realtime
 from palpate_wires.realtime import schedule
 
@@ -60,7 +60,7 @@ class ApartWire:
             raise
         self.title, self.watchdog, self._source = about.split("\n")
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The newest reading of the arm."""
         end, found = time.monotonic() + timeout, None
         while True:

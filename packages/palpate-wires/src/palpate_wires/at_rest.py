@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.contact_frame import Payload
 from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
+from palpate.contact_frame.load import Payload
 from palpate.errors import InputError
 from palpate.force import ForceLoop
-from palpate.press.tare import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
-from palpate.wires import Sense, Wire, unreadable
+from palpate.press.sequence import SURE, TARE, check_drift, check_range, fitting, noise_and_drift
+from palpate.wires import ArmReading, Wire, unreadable
 from palpate_wires.order import Order, check_order
 from palpate_wires.orientation import turn_vector
 
@@ -44,7 +44,7 @@ class AtRest:
     drift: float
     drift_std: float
     rate: float
-    last: Sense
+    last: ArmReading
     offset: float
 
 
@@ -128,7 +128,7 @@ def rate_of(stamps: Array) -> float:
     return float(np.maximum(np.round(steps / tick), 1.0).sum() / max(float(steps.sum()), 1e-9))
 
 
-def _readings(wire: Wire) -> list[Sense]:
+def _readings(wire: Wire) -> list[ArmReading]:
     """Those of half a second, and enough of them."""
     sensed = [wire.read(1.0)]
     while (span := sensed[-1].received - sensed[0].received) < TARE or len(sensed) < _FEWEST:

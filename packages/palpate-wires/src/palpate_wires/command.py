@@ -27,7 +27,7 @@ from palpate_wires.press import press
 from palpate_wires.realtime import realtime_priority
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Payload
+    from palpate.contact_frame.load import Payload
     from palpate.force.gains import Gains
 
 RETREAT = 0.002

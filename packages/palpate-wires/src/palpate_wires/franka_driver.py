@@ -15,7 +15,7 @@ import time
 from collections import deque
 from typing import Any
 
-from palpate.wires import Sense, Triple
+from palpate.wires import ArmReading, Triple
 from palpate_wires import realtime
 from palpate_wires.host import line, prepare
 from palpate_wires.orientation import from_matrix_by_columns
@@ -63,11 +63,13 @@ class Driver:
             if self._control is not None:
                 self._write()
 
-    def _sense(self, state: Any) -> Sense:
+    def _sense(self, state: Any) -> ArmReading:
         received, m = time.monotonic(), state.O_T_EE
         a, b, c, d, e, f = (self._sign * float(value) for value in state.O_F_ext_hat_K)
         place = (float(m[12]), float(m[13]), float(m[14]))
-        return Sense(received, state.time.to_sec(), (a, b, c), (d, e, f), place, from_matrix_by_columns(m))
+        return ArmReading(
+            received, state.time.to_sec(), (a, b, c), (d, e, f), place, from_matrix_by_columns(m)
+        )
 
     def _answer(self, kind: int, words: str = "") -> None:
         """Answer a request. The wire waits for that answer: it is kept until there is room for it."""

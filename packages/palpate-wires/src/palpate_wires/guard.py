@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.wires import Command, EndedError, LostError, Sense, SilentError, Wire, unreadable
+from palpate.wires import ArmReading, Command, EndedError, LostError, SilentError, Wire, unreadable
 from palpate_wires.at_rest import AtRest
 from palpate_wires.order import Order, PressLimits
 from palpate_wires.realtime import CLOCKS
@@ -56,7 +56,7 @@ class Guard:
         self._wire.begin(self._lag)
         self._seen = _now()
 
-    def read(self) -> Sense:
+    def read(self) -> ArmReading:
         """The next reading; between two looks at the user's wish there is a tick at most.
 
         Raises:
@@ -89,7 +89,7 @@ class Guard:
         """Bring the arm to rest."""
         self._wire.stop()
 
-    def _wait(self) -> tuple[Sense | None, LostError | None]:
+    def _wait(self) -> tuple[ArmReading | None, LostError | None]:
         """A reading of this tick, or what is wrong."""
         try:
             return self._wire.read(self._tick), None
@@ -147,7 +147,7 @@ class Moment(NamedTuple):
         since_touch: likewise [s]; None before it.
     """
 
-    sense: Sense
+    sense: ArmReading
     force: float
     depth: float
     speed: float
@@ -157,7 +157,7 @@ class Moment(NamedTuple):
     since_touch: float | None
 
 
-def fault_of(sense: Sense, last: Sense, rest: AtRest, theta: float) -> str | None:
+def fault_of(sense: ArmReading, last: ArmReading, rest: AtRest, theta: float) -> str | None:
     """Why a reading is none, in words; None if it is one.
 
     Args:

@@ -13,8 +13,7 @@ from palpate.force.gains import Gains
 from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_state import beside
-from palpate.press.sequence import Plan
-from palpate.press.tare import TARE
+from palpate.press.sequence import TARE, Plan
 from palpate.wires import Triple, triple
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.wires import Command, Sense
+from palpate.wires import ArmReading, Command
 
 _PRIORITY = 40
 _BOTH = 3  # MCL_CURRENT | MCL_FUTURE
@@ -185,16 +185,16 @@ _MOVE = struct.Struct("<B6d")
 _BEGIN = struct.Struct("<Bd")
 
 
-def state(sense: Sense) -> bytes:
+def state(sense: ArmReading) -> bytes:
     """Message that carries a reading."""
     s = sense
     return _STATE.pack(STATE, s.received, s.stamp, *s.force, *s.torque, *s.position, *s.quaternion)
 
 
-def read_state(message: bytes) -> Sense:
+def read_state(message: bytes) -> ArmReading:
     """The reading of a message of that kind."""
     _, received, stamp, *v = _STATE.unpack(message)
-    return Sense(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]))
+    return ArmReading(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]))
 
 
 def move(command: Command) -> bytes:

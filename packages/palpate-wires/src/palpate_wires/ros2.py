@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl
 import msgspec
 
 from palpate.errors import InputError
-from palpate.wires import SILENCE, Command, LostError, Sense, SilentError, Triple
+from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError, Triple
 from palpate_wires.apart import ApartWire
 from palpate_wires.orientation import turn_vector
 from palpate_wires.ros2_tool import JointTool, PoseTool, seconds
@@ -156,7 +156,7 @@ class DdsWire:
         """Topic of the wrench."""
         return f" at {self._topics.wrench}"
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The next wrench, with the newest place of the tool."""
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0:
@@ -173,7 +173,7 @@ class DdsWire:
         lacking = self._topics.wrench if self._tool.stamp is not None else self._topics.place
         raise SilentError(f" at {lacking}", timeout)
 
-    def _sense(self, sample: Any) -> Sense | None:
+    def _sense(self, sample: Any) -> ArmReading | None:
         received, stamp = time.monotonic(), seconds(sample.header.stamp)
         if not stamp > self._last:
             return None
@@ -189,7 +189,7 @@ class DdsWire:
         f, m = ((sign * v.x, sign * v.y, sign * v.z) for v in (sample.wrench.force, sample.wrench.torque))
         if self._topics.wrench_frame == "tool":
             f, m = turn_vector(quaternion, f), turn_vector(quaternion, m)
-        return Sense(received, stamp, f, m, position, quaternion)
+        return ArmReading(received, stamp, f, m, position, quaternion)
 
     def tare(self) -> None:
         """ROS 2 has no one way to zero a sensor."""

@@ -7,7 +7,7 @@ import struct
 import time
 
 from palpate.errors import InputError
-from palpate.wires import SILENCE, Command, LostError, Sense, SilentError
+from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError
 
 MAGIC = b"palpate1"
 HELLO, WELCOME, BUSY, STATE, MOVE, STOP = range(6)
@@ -132,7 +132,7 @@ class SimWire:
                 return rate
         raise TimeoutError(0, f"no answer within {_ANSWER:g} s")
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The next reading; what is no reading of this session is passed over."""
         end = time.monotonic() + timeout
         strange = 0
@@ -150,7 +150,7 @@ class SimWire:
             strange += 1
         raise SilentError("", timeout, f", only {strange} datagrams that are none" if strange else "")
 
-    def _latest(self, sense: Sense | None) -> Sense | None:
+    def _latest(self, sense: ArmReading | None) -> ArmReading | None:
         """The newest of what has come: a late loop does not answer what is past."""
         self._socket.settimeout(0.0)
         while True:
@@ -159,7 +159,7 @@ class SimWire:
             except OSError:  # nothing more, or broken: the next read says so
                 return sense
 
-    def _sense(self, data: bytes) -> Sense | None:
+    def _sense(self, data: bytes) -> ArmReading | None:
         received = time.monotonic()
         found = unpack(data)
         if found is None or found[0] != STATE or found[1] != self._session:
@@ -168,7 +168,7 @@ class SimWire:
         if number <= self._last or not math.isfinite(stamp):
             return None
         self._last = number
-        return Sense(received, stamp, v[0:3], v[3:6], v[6:9], v[9:13])  # type: ignore[arg-type]
+        return ArmReading(received, stamp, v[0:3], v[3:6], v[6:9], v[9:13])  # type: ignore[arg-type]
 
     def tare(self) -> None:
         """The simulated sensor has no zero of its own."""

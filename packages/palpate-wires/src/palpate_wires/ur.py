@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.wires import SILENCE, Command, LostError, Sense, SilentError
+from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError
 from palpate_wires.apart import ApartWire
 from palpate_wires.orientation import from_rotation_vector
 
@@ -87,7 +87,7 @@ class RtdeWire:
             f" it when no command came for {1e3 * SILENCE:g} ms or less (RTDE's watchdog)"
         )
 
-    def read(self, timeout: float) -> Sense:
+    def read(self, timeout: float) -> ArmReading:
         """The next packet of the controller."""
         end = time.monotonic() + timeout
         receive = self._receive
@@ -114,7 +114,7 @@ class RtdeWire:
         x, y, z = pose[:3]
         # The controller gives what the surface exerts on the tool.
         a, b, c, d, e, f = (-value for value in force)
-        return Sense(received, stamp, (a, b, c), (d, e, f), (x, y, z), from_rotation_vector(pose[3:]))
+        return ArmReading(received, stamp, (a, b, c), (d, e, f), (x, y, z), from_rotation_vector(pose[3:]))
 
     def tare(self) -> None:
         """zero_ftsensor of the controller."""

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.force import load_arm
-from palpate.press.engines import gains_for
+from palpate.press.engines import press_gains
 from palpate_wires.outcome import UNITS
 
 ARM = """
@@ -91,7 +91,7 @@ _MADE: dict[str, str] = {}
 def _gains(text: str, arm_file: Path) -> str:
     """Gains of an arm's text, made once: of a lag of hundreds of ticks that takes seconds."""
     if text not in _MADE:
-        _MADE[text] = gains_for(load_arm(str(arm_file)), 10.0).to_toml()
+        _MADE[text] = press_gains(load_arm(str(arm_file)), 10.0).to_toml()
     return _MADE[text]
 
 

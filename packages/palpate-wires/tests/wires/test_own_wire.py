@@ -11,7 +11,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.errors import InputError, PluginError
-from palpate.wires import LostError, Sense, SilentError
+from palpate.wires import ArmReading, LostError, SilentError
 from palpate_checks import outcomes
 from palpate_rehearsal.conformance import LAWS, wire_checks
 from palpate_wires import open_wire
@@ -42,7 +42,9 @@ class Resting:
         return self.sense(1e-3 * self.number, time.monotonic())
 
     def sense(self, stamp, received):
-        return Sense(received, stamp, (0.0, 0.0, 1.0), (0.0,) * 3, (0.4, 0.0, self.z), (1.0, 0.0, 0.0, 0.0))
+        return ArmReading(
+            received, stamp, (0.0, 0.0, 1.0), (0.0,) * 3, (0.4, 0.0, self.z), (1.0, 0.0, 0.0, 0.0)
+        )
 
     def tare(self):
         pass

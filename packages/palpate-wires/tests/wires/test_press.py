@@ -10,7 +10,7 @@ import pytest
 from palpate.errors import InputError
 from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
-from palpate.wires import LostError, Sense
+from palpate.wires import ArmReading, LostError
 from palpate_rehearsal.rehearsal import REST, ToolAxisArm
 from palpate_wires import PressLimits, PressTask, Rows, check_order, press
 from palpate_wires.order import travel_for
@@ -37,7 +37,7 @@ class FakeWire:
     def read(self, timeout):
         self.arm.tick(self.velocity)
         v = self.arm.reading()
-        sense = Sense(1000.0 + self.arm.time, self.arm.time, v[0:3], v[3:6], v[6:9], v[9:13])
+        sense = ArmReading(1000.0 + self.arm.time, self.arm.time, v[0:3], v[3:6], v[6:9], v[9:13])
         if self.arm.time < self.since:
             return sense
         self.first = self.first or sense

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from palpate.force import ForceLoop, load_arm
-from palpate.press.engines import gains_for
-from palpate.wires import Sense
+from palpate.press.engines import press_gains
+from palpate.wires import ArmReading
 from palpate_wires import AtRest, PressLimits, PressTask, check_order
 from palpate_wires.guard import Moment, fault_of, reason_to_stop
 
-GAINS = gains_for(load_arm("ur5e"), 10.0)
+GAINS = press_gains(load_arm("ur5e"), 10.0)
 THETA = GAINS.theta
-SENSE = Sense(100.0, 5.0, (0.0, 0.0, -10.0), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
+SENSE = ArmReading(100.0, 5.0, (0.0, 0.0, -10.0), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
 REST = AtRest(np.array(SENSE.position), np.zeros(3), 0.1, 0.0, 0.1, 500.0, SENSE, 95.0)
 MOMENT = Moment(SENSE, 10.0, 0.001, 0.0, 0, 0.0, 1.0, None)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.contact_frame import Payload
-from palpate.wires import Sense
+from palpate.wires import ArmReading
 from palpate_wires import AtRest
 from palpate_wires.at_rest import notes_on
 
@@ -23,7 +23,7 @@ def payload(**changed):
 
 def at_rest(force):
     """The tool points down: turned by half a turn about x."""
-    sense = Sense(0.0, 0.0, tuple(force), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
+    sense = ArmReading(0.0, 0.0, tuple(force), (0.0,) * 3, (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
     return AtRest(np.zeros(3), np.array(force), 0.1, 0.0, 0.1, 500.0, sense, 0.0)
 
 

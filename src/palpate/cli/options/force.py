@@ -16,7 +16,6 @@ from palpate.errors import InputError
 if TYPE_CHECKING:
     from palpate.force import Arm, Gains
     from palpate.force.inner_loop import InnerLoop
-    from palpate.identification.indenter import Indenter
 
 
 @Parameter(name="*", group=Group("The arm", sort_key=1))
@@ -206,35 +205,3 @@ def inner_loop(log: Path, columns: ColumnOptions, push: str | None = None) -> In
     return identify_inner_loop(
         record["time"], record["command"], record["position"], where=str(log), force=force
     )
-
-
-@Parameter(name="*", group=Group("Young's modulus", sort_key=5))
-@dataclass(frozen=True, kw_only=True)
-class IndenterOptions:
-    """Shape of the indenter, if it is known."""
-
-    indenter: str | None = None
-    """sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or
-    cone:70:deg. It adds Young's modulus E."""
-    poisson: Annotated[str | None, SIGNED] = None
-    "Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given."
-
-    def check(self) -> None:
-        """Check the options before any work is done."""
-        from palpate.identification.indenter import check_poisson
-
-        if self.poisson is not None and self.indenter is None:
-            raise InputError("--poisson needs a known shape of the indenter; add --indenter")
-        check_poisson(self.ratio)
-        self.shape()
-
-    def shape(self) -> Indenter | None:
-        """The shape; None if not given."""
-        from palpate.identification.indenter import Indenter
-
-        return None if self.indenter is None else Indenter.parse(self.indenter)
-
-    @property
-    def ratio(self) -> tuple[float, float] | None:
-        """Poisson's ratio, with its standard deviation."""
-        return values.with_std("poisson", self.poisson, "0.45:0.05")

@@ -1,13 +1,23 @@
-"""Options that name the signals of a log and how they are read."""
+"""Options of an identification: signals of a log, frames of wrench and pose, the arm, the model, the indenter."""
 
-# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
-from dataclasses import dataclass
-from typing import Annotated
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from palpate.cli.options.values import SIGNED
+from palpate.cli.options.common import QUIET, Model
+from palpate.cli.options.values import FLAG, SIGNED, Angles, Interval, Point, lag_of, si, vector, with_std
+from palpate.errors import InputError
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
+
+if TYPE_CHECKING:
+    from palpate.contact_frame.arm import ArmDynamics
+    from palpate.contact_frame.load import Payload
+    from palpate.contact_frame.signals_in_base import ContactFrame
+    from palpate.identification.indenter import Indenter
 
 
 @Parameter(name="*", group=Group("Signals of the log", sort_key=1))
@@ -21,3 +31,177 @@ class LogOptions(Signals):
     "Leave out the rows before, in seconds from the first row."
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
+
+
+@Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class FrameOptions:
+    """Axes, points and signs of a wrench and a pose."""
+
+    wrench_frame: Literal["base", "tool", "sensor"] | None = None
+    "Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool."
+    sensor_rpy: Angles | None = None
+    "Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad."
+    tcp: Point | None = None
+    "The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm."
+    wrench_at: Point | None = None
+    "The reference point of the torque, likewise; the pose's origin if not given."
+    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
+    """+1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction:
+    from the surface on the tool. Detected if not given."""
+    normal: Annotated[str | None, SIGNED] = None
+    """Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not
+    given."""
+    gravity_compensated: Annotated[bool, FLAG] = False
+    "The tool's weight is already subtracted from the wrench."
+    free: Interval | None = None
+    "BEGIN,END in seconds of an interval of free motion; detected if not given."
+
+    @property
+    def sign(self) -> int | None:
+        """1 if the force grows with penetration, -1 if it falls; None if not given."""
+        if self.force_sign is None:
+            return None
+        return -1 if self.force_sign in {"reaction", "-1"} else 1
+
+    @property
+    def of_space(self) -> bool:
+        """Whether an option was given that needs a wrench and a pose."""
+        return replace(self, force_sign=None) != FrameOptions()
+
+    def frame(self, hung: Payload | None = None) -> ContactFrame | None:
+        """The contact frame; None if not given."""
+        from palpate.contact_frame.signals_in_base import ContactFrame
+
+        if self == FrameOptions() and hung is None:
+            return None
+        sides: dict[int | None, Literal["action", "reaction"] | None] = {
+            None: None,
+            1: "action",
+            -1: "reaction",
+        }
+        axes, colon, plain = (self.normal or "").rpartition(":")
+        if colon and axes not in {"base", "tool"}:
+            raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
+        return ContactFrame(
+            wrench_frame=self.wrench_frame,
+            sensor_rpy=si(self.sensor_rpy),
+            tcp=si(self.tcp) or (0.0, 0.0, 0.0),
+            wrench_at=si(self.wrench_at) or (0.0, 0.0, 0.0),
+            force_sign=sides[self.sign],
+            normal=vector("--normal", plain, "number") if plain else None,
+            normal_frame="tool" if axes == "tool" else "base",
+            gravity_compensated=self.gravity_compensated,
+            free=si(self.free),
+            payload=hung,
+        )
+
+
+@Parameter(name="*", group=Group("The arm", sort_key=3))
+@dataclass(frozen=True, kw_only=True)
+class ArmOptions:
+    """Mass and stiffness between the sensors and the surface."""
+
+    tool_mass: str | None = None
+    "Mass between force sensor and surface in kg, VALUE or VALUE:STD; it is subtracted from M."
+    payload: Path | None = None
+    "File of palpate payload: the tool's weight, and the mass to subtract from M."
+    robot_stiffness: Annotated[str | None, Parameter(name=["--robot-stiffness", "--series-stiffness"])] = None
+    """Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of
+    K."""
+    robot_mass: str | None = None
+    "The arm's mass at the tip, before the force sensor, which swings on its own stiffness, in kg or kg:STD."
+    robot_stiffness_from: Path | None = None
+    "A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it."
+    position_from: Literal["joints", "tip"] | None = None
+    "joints: the position comes from joint encoders and does not contain the arm's deflection; tip: it does."
+
+    def weighed_tool(self) -> Payload | None:
+        """The payload on the sensor, if it was weighed."""
+        from palpate.contact_frame.load import load_payload
+
+        return None if self.payload is None else load_payload(self.payload)
+
+    def arm(self) -> ArmDynamics:
+        """The arm as given; a press on a wall is another log."""
+        from palpate.contact_frame.arm import ArmDynamics
+
+        if self.robot_stiffness is not None and self.robot_stiffness_from is not None:
+            raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
+        hung = self.weighed_tool()
+        return ArmDynamics(
+            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
+            stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
+            mass=with_std("robot-mass", self.robot_mass, "3.7:0.4"),
+            position_from=self.position_from,
+        )
+
+
+@Parameter(name="*", group=Group("Young's modulus", sort_key=5))
+@dataclass(frozen=True, kw_only=True)
+class IndenterOptions:
+    """Shape of the indenter, if it is known."""
+
+    indenter: str | None = None
+    """sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or
+    cone:70:deg. It adds Young's modulus E."""
+    poisson: Annotated[str | None, SIGNED] = None
+    "Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given."
+
+    def check(self) -> None:
+        """Check the options before any work is done."""
+        from palpate.identification.indenter import check_poisson
+
+        if self.poisson is not None and self.indenter is None:
+            raise InputError("--poisson needs a known shape of the indenter; add --indenter")
+        check_poisson(self.ratio)
+        self.shape()
+
+    def shape(self) -> Indenter | None:
+        """The shape; None if not given."""
+        from palpate.identification.indenter import Indenter
+
+        return None if self.indenter is None else Indenter.parse(self.indenter)
+
+    @property
+    def ratio(self) -> tuple[float, float] | None:
+        """Poisson's ratio, with its standard deviation."""
+        return with_std("poisson", self.poisson, "0.45:0.05")
+
+
+@Parameter(name="*", group=Group("The model", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class ModelOptions:
+    """The model, the lag, and the priors."""
+
+    model: Annotated[Model | None, QUIET] = None
+    """kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
+    chosen if not given."""
+    lag: Annotated[str | None, SIGNED] = None
+    """Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard
+    deviation)."""
+    force_filter: str | None = None
+    "Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none."
+    mass: str | None = None
+    "Prior of the mass, in kg, VALUE or VALUE:STD."
+    tolerance: float = 0.25
+    "Largest half-width of an identified parameter's 95 % interval, as a share of its value."
+    calibration: float = 0.0
+    "Relative standard deviation of the scales of force and position together, as 0.01."
+    bonded: bool | None = None
+    "Whether the probe is fixed to the surface; detected if not given."
+    cutoff: float | None = None
+    "Cut-off of the filters of all channels, in Hz; chosen if not given."
+
+    def keywords(self) -> dict[str, Any]:
+        """The keywords of `palpate.identify`."""
+        known: dict[str, Any] = {}
+        lag = lag_of(self.lag)
+        if lag is not None:
+            known |= {"lag": lag[0], "lag_std": lag[1]}
+        if self.force_filter is not None:
+            known["force_filter"] = None if self.force_filter == "none" else self.force_filter
+        if self.mass is not None:
+            known["mass"] = with_std("mass", self.mass, "0.5:0.02")
+        names = ("model", "tolerance", "calibration", "bonded", "cutoff")
+        return known | {name: getattr(self, name) for name in names}

@@ -15,7 +15,7 @@ from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
-    from palpate.contact_frame import Payload
+    from palpate.contact_frame.load import Payload
     from palpate.environments.kelvin_voigt import KelvinVoigt
     from palpate.press.prepare import Question
 
@@ -46,7 +46,7 @@ class AskOptions:
     @property
     def tool(self) -> Payload | None:
         """The weighed tool; None if not given."""
-        from palpate.contact_frame import load_payload
+        from palpate.contact_frame.load import load_payload
 
         return None if self.payload is None else load_payload(self.payload)
 

@@ -50,7 +50,7 @@ def sliding_claim(gains: Gains, low: float, high: float) -> Claim | None:
     search, cells, top = Search(prover), list[Cell](), high
     while not cells or cells[-1].box.low > low:
         boxes = (Box(max(top / (most / least) ** width, low), top, 0.0, 0.0) for width in WIDTHS)
-        found = next((found for found, _ in map(search.covered, boxes) if len(found) == 1), None)
+        found = next((found for found, _ in map(search.cover, boxes) if len(found) == 1), None)
         if found is None:
             return None
         cells += found

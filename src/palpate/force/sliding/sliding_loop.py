@@ -13,7 +13,7 @@ from palpate._jit import kernel, law, part, reader
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.flat import flattened
+from palpate.force.flat import flatten
 from palpate.force.gains import Gains, load_gains
 from palpate.force.guard import LEAST
 from palpate.force.sliding import slide_state as places
@@ -153,7 +153,7 @@ class SlidingLoop(Readable):
         self.gains = gains
         self.law = sliding(gains, into)
         self._desired = gains.force
-        self._numbers, self._state, self._work = flattened(self.law), np.zeros(SIZE), np.zeros(STATES)
+        self._numbers, self._state, self._work = flatten(self.law), np.zeros(SIZE), np.zeros(STATES)
         self._velocity = np.zeros(3)
         self.reset()
         _slide(self._numbers, self._state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
@@ -188,8 +188,8 @@ class SlidingLoop(Readable):
     def limit_speed(self, speed: float) -> None:
         """Lets no command be faster than this [m/s], where that is below the arm's own limit."""
         press = self.law.press
-        slower = press._replace(speed=min(press.speed, speed))
-        self._numbers = flattened(self.law._replace(press=slower))
+        self.law = self.law._replace(press=press._replace(speed=min(press.speed, speed)))
+        self._numbers = flatten(self.law)
 
     def update(
         self, force: ArrayLike, position: ArrayLike, direction: ArrayLike, missed: float = 0.0

@@ -1,74 +1,35 @@
-"""The figures of a run."""
+"""Charts of a run: of its figures and of its page alike."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.files import write_text
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.chart import KNOWN, Chart, Series, figure_of, page_figures, panels
+from palpate.report.answer import PageAnswer, answer_page
+from palpate.report.chart import KNOWN, Band, Chart, Interval, Mark, Series, figure_of, panels
 from palpate.report.numbers import NONE, quantity
-from palpate.report.page import Table, render
-from palpate.report.run.table import notes, sentence, settling
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from palpate.report.page import Table
+from palpate.report.run.table import alerts, sentence, settling
+from palpate.signals.types import NORMAL
 
 BEFORE = 1.0
 """Seconds before contact that are still shown."""
-SINCE = "time since the switch to force control [s]"
-FRONT_ENDS = {
-    "thesis": ("filtered as in the thesis", (0, (5, 2))),
-    "raw": ("raw signals", "-"),
-}
-"""Beside the estimate from matched channels, which has its quantity's colour: what the thesis feeds it, in grey."""
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A figure, not yet drawn.
-
-    Args:
-        name: of its file.
-        caption: of the figure.
-        draw: makes it.
-    """
-
-    name: str
-    caption: str
-    draw: Callable[[Record], Figure]
-
-
-def drawings(record: Record) -> Iterator[Drawing]:
-    """All figures that a run has, in the order to be read."""
-    yield Drawing(
-        "approach",
-        "The whole run. The desired position moves in steps until contact; friction delays the tip. Shaded: force "
-        "control, and loss of contact.",
-        _approach,
-    )
-    if (record["phase"] == CONTACT).any():
-        yield Drawing(
-            "force",
-            "Contact force. The true force acts on the simulated surface; the controller receives the measured one.",
-            _force,
-        )
-        yield Drawing(
-            "identification",
-            "Recursive least squares with three kinds of signals. Shaded: 95 % interval of the matched one. The "
-            "initial transient of the estimates is cut off.",
-            _identification,
-        )
-    yield Drawing("torque", "Applied torque. Dashed: the limit, if the torque comes near it.", _torque)
+PARAMETERS = {"K": ("Stiffness K", "N/m"), "B": ("Damping B", "N s/m"), "M": ("Mass M", "kg")}
+_MOST_STRETCHES = 40
+"""Contacts, and losses of contact, that are marked."""
+_FAR = 50.0
+"""Times the range of nearly all values; what is farther leaves no resolution for the others, and is a gap."""
+_NEAR_LIMIT = 0.7
+"""Fraction of a motor's limit from which on the limit is shown."""
 
 
 def draw(
@@ -83,101 +44,160 @@ def draw(
         dpi: of a PNG; `style.DPI` if none is given.
     """
     captions = {}
-    for one in drawings(record):
-        with style.ink():
-            figure = one.draw(record)
-            for ending in endings:
-                style.save(figure, folder / f"{one.name}{ending}", dpi)
-                captions[f"{one.name}{ending}"] = one.caption
+    for name, (charts, caption) in figures_of(record).items():
+        figure = figure_of(charts)
+        for ending in endings:
+            style.save(figure, folder / f"{name}{ending}", dpi)
+            captions[f"{name}{ending}"] = caption
     return captions
 
 
-def _approach(record: Record) -> Figure:
-    figure, (position, force) = style.figure(2, height=2.1)
-    t, wall = record["t"], record.meta["experiment"]["wall"]["x"]
-    for axis in (position, force):
-        _shade(axis, record)
-    style.panel(position, "x [mm]")
-    position.axhline(1e3 * wall, color=style.QUIET, linewidth=1, linestyle=":", label="surface at rest")
-    position.plot(t, 1e3 * record["x_desired"], **style.KNOWN, label="desired")
-    position.plot(t, 1e3 * record["x"], color=style.F, linewidth=1.6, label="tip")
-    style.legend(position)
-    style.panel(force, "force [N]", "time [s]")
-    force.plot(t, record["force_measured"], color=style.MEASURED, linewidth=0.8, label="measured")
-    force.plot(t, record["force_desired"], **style.KNOWN, label="desired")
-    style.legend(force)
-    return figure
-
-
-def _force(record: Record) -> Figure:
-    figure, (axis,) = style.figure(1, height=3.4)
-    since, shown = around_contact(record)
-    style.panel(axis, "force on the surface [N]", SINCE)
-    axis.plot(
-        since,
-        record["force_measured"][shown],
-        color=style.MEASURED,
-        linewidth=0.8,
-        label="measured, filtered",
+def figures_of(record: Record) -> dict[str, tuple[list[Chart], str]]:
+    """Charts of each figure and its caption, by its name, in the order to be read."""
+    charts = charts_of(record)
+    window = window_of(record)
+    shown = {name: replace(chart, xlim=window) for name, chart in charts.items()}
+    approach = [_position(record), charts["force"]]
+    approach_words = (
+        "The whole run. The desired position moves in steps until contact; friction delays the tip."
     )
-    axis.plot(since, record["force"][shown], color=style.F, linewidth=1.6, label="true")
-    desired = np.where(record["phase"] == CONTACT, record["force_desired"], np.nan)[shown]
-    axis.plot(since, desired, **style.KNOWN, label="desired")
-    switch = record.meta["experiment"]["approach"]["switch"]
-    axis.axhline(switch, color=style.QUIET, linewidth=0.8, linestyle=":", label=f"switch, {switch:g} N")
-    for i in (1, 2, 3):
-        _mark(axis, since, record[f"saturated{i}"][shown], f"motor {i} at its limit")
-    style.legend(axis)
-    return figure
+    found = {"approach": (approach, f"{approach_words} Shaded: force control, and loss of contact.")}
+    if "K" in charts:
+        words = "Contact force. The true force acts on the simulated surface; the controller receives the measured one."
+        found["force"] = ([shown["force"]], words)
+        words = (
+            "Recursive least squares on channels matched in lag, its 95 % interval, and the stiffness from three kinds "
+            "of signals. The initial transient of the estimates is cut off."
+        )
+        found["identification"] = ([shown[name] for name in (*PARAMETERS, "thesis")], words)
+    torques = [chart for name, chart in charts.items() if name.startswith("motor")]
+    found["torque"] = (torques, "Applied torque. Dashed: the limit, if the torque comes near it.")
+    return found
 
 
-def _identification(record: Record) -> Figure:
-    figure, axes = style.figure(3, height=2.0)
-    since, shown = around_contact(record, 0.0)  # before it there is nothing to be known
-    truth: dict[str, Any] = record.meta["truth"]
-    units = (("K", "N/m"), ("B", "N s/m"), ("M", "kg"))
-    for axis, (name, unit) in zip(axes, units, strict=True):
-        style.panel(axis, f"{name} [{unit}]", SINCE if axis is axes[-1] else "")
-        for front, (label, dashes) in FRONT_ENDS.items():
-            estimate = record[f"{name}_{front}"][shown]
-            axis.plot(since, estimate, color=style.MEASURED, linestyle=dashes, linewidth=1.1, label=label)
-        colour = getattr(style, name)
-        value, std = record[f"{name}_matched"][shown], record[f"{name}_matched_std"][shown]
-        ends = value - 1.96 * std, value + 1.96 * std
-        axis.fill_between(since, *ends, color=colour, alpha=0.22, linewidth=0)
-        axis.plot(since, value, color=colour, linewidth=1.6, label=f"{name}, channels matched in lag")
-        if name in truth:
-            axis.axhline(truth[name]["value"], **style.KNOWN, label="truth")
-        _limits(axis, record, name, shown)
-        style.legend(axis)
-    return figure
+def window_of(record: Record) -> tuple[float, float]:
+    """From a little before the first contact to the end of the run [s]; all of a run without one."""
+    t, contact = record["t"], record["phase"] == CONTACT
+    first = float(t[np.argmax(contact)]) - BEFORE if contact.any() else float(t[0])
+    return max(float(t[0]), first), float(t[-1])
 
 
-def _limits(axis: Axes, record: Record, name: str, shown: Mask) -> None:
-    """Shows where the estimates come to rest, and the truth, not where they come from."""
-    half = np.nonzero(shown)[0][-max(1, int(0.75 * shown.sum())) :]
-    seen = [record[f"{name}_{front}"][half] for front in (*FRONT_ENDS, "matched")]
-    if name in record.meta["truth"]:
-        seen.append(np.array([record.meta["truth"][name]["value"]]))
-    low = min(float(np.quantile(s, 0.02)) for s in seen)
-    high = max(float(np.quantile(s, 0.98)) for s in seen)
-    margin = 0.25 * max(high - low, 1e-9)
-    axis.set_ylim(low - margin, high + margin)
+def charts_of(record: Record) -> dict[str, Chart]:
+    """Charts of force, motors, each parameter, and stiffness from three kinds of signals; the latter need contact."""
+    t, marks = record["t"], _marks(record)
+    desired = np.where(record["phase"] == CONTACT, record["force_desired"], np.nan)
+    forces = [
+        Series(t, record["force_measured"], "measured", "measured, filtered", 0.8),
+        Series(t, record["force"], "F", "true"),
+        Series(t, desired, label="desired", **KNOWN),
+        *(_at_limit(record, i, record["force"], f"motor {i} at its limit") for i in (1, 2, 3)),
+    ]
+    charts = {"force": _chart("Force", "force [N]", forces, marks=marks)} | _torques(record)
+    if not (record["phase"] == CONTACT).any():
+        return charts
+    truth = {name: float(known["value"]) for name, known in record.meta["truth"].items()}
+    lost = [mark for mark in marks if mark.colour == "fail"]
+    touched = np.maximum.accumulate(record["phase"]) > 0.0
+
+    def estimate(name: str) -> Array:
+        return _without_far(np.where(touched, record[name], np.nan))
+
+    for name, (title, unit) in PARAMETERS.items():
+        value, half = estimate(f"{name}_matched"), NORMAL * record[f"{name}_matched_std"]
+        label = "95 % if the model holds"
+        interval = Interval(t, _without_far(value - half), _without_far(value + half), name, label)
+        late = [
+            record[f"{name}_matched"] + sign * NORMAL * record[f"{name}_matched_std"] for sign in (-1.0, 1.0)
+        ]
+        charts[name] = _chart(
+            title, f"{name} [{unit}]", [Series(t, value, name, "on line")], _known(truth.get(name)),
+            intervals=[interval], ylim=_settled_range(record, late, truth.get(name)), marks=lost,
+        )  # fmt: skip
+    fronts = {"thesis": ("measured", "--", "thesis' signals"), "raw": ("measured", "", "raw signals")}
+    fronts |= {"matched": ("K", "", "matched in lag")}
+    charts["thesis"] = _chart(
+        "Stiffness by signals", "K [N/m]",
+        [
+            Series(t, estimate(f"K_{front}"), colour, label, 1.6 if front == "matched" else 1.1, dash)
+            for front, (colour, dash, label) in fronts.items()
+        ],
+        _known(truth.get("K")), marks=lost,
+        ylim=_settled_range(record, [record[f"K_{front}"] for front in fronts], truth.get("K")),
+    )  # fmt: skip
+    return charts
 
 
-def _torque(record: Record) -> Figure:
-    figure, axes = style.figure(3, height=1.5)
-    t, limits = record["t"], record.meta["experiment"]["robot"]["torque_limits"]
-    for i, (axis, limit) in enumerate(zip(axes, limits, strict=True), start=1):
-        style.panel(axis, f"motor {i} [N m]", "time [s]" if axis is axes[-1] else "")
-        _shade(axis, record)
+def _chart(
+    title: str, y: str, series: Sequence[Series | None], bands: Sequence[Band] = (), **more: Any
+) -> Chart:
+    return Chart(y, [one for one in series if one is not None], bands, title=title, x="time [s]", **more)
+
+
+def _known(value: float | None) -> list[Band]:
+    return [] if value is None else [Band(value, value, label="truth", **KNOWN)]
+
+
+def _position(record: Record) -> Chart:
+    t, wall = record["t"], 1e3 * record.meta["experiment"]["wall"]["x"]
+    series = [
+        Series(t, 1e3 * record["x_desired"], label="desired", **KNOWN),
+        Series(t, 1e3 * record["x"], "F", "tip"),
+    ]
+    at_rest = Band(wall, wall, "quiet", "surface at rest", 1.0, ":")
+    return _chart("Position", "x [mm]", series, [at_rest], marks=_marks(record))
+
+
+def _torques(record: Record) -> dict[str, Chart]:
+    """A chart a motor, and its limit if the torque comes near it."""
+    charts = {}
+    for i, limit in enumerate(record.meta["experiment"]["robot"]["torque_limits"], 1):
         torque = record[f"torque{i}"]
-        axis.plot(t, torque, color=style.INK, linewidth=0.8)
-        _mark(axis, t, record[f"saturated{i}"], "at the limit")
-        if len(t) and np.max(np.abs(torque)) > 0.7 * limit:
-            for sign in (-1, 1):
-                axis.axhline(sign * limit, color=style.FAIL, linewidth=0.8, linestyle="--")
-    return figure
+        is_near = len(torque) and np.max(np.abs(torque)) > _NEAR_LIMIT * limit
+        bands = [Band(end, end, "fail", "", 0.8, "--") for end in ((-limit, limit) if is_near else ())]
+        series = [Series(record["t"], torque, "ink", width=0.8), _at_limit(record, i, torque, "at the limit")]
+        title, marks = f"Motor {i}", _marks(record)
+        charts[f"motor{i}"] = _chart(title, "torque [N m]", series, bands, marks=marks, height=1.9)
+    return charts
+
+
+def _at_limit(record: Record, motor: int, values: Array, label: str) -> Series | None:
+    """Dots on a line where a motor is at its limit; None where it never is."""
+    up = record[f"saturated{motor}"] > 0.0
+    return Series(record["t"][up], values[up], "fail", label, dots=2.0) if up.any() else None
+
+
+def _marks(record: Record) -> list[Mark]:
+    """Where force is controlled, and where contact is lost."""
+    t, phase = record["t"], record["phase"]
+    kinds = ((CONTACT, "F", "force control"), (LOST, "fail", "contact lost"))
+    found = [Mark(_stretches(t, phase == kind), colour, label) for kind, colour, label in kinds]
+    return [mark for mark in found if mark.spans]
+
+
+def _stretches(t: Array, inside: Mask) -> list[tuple[float, float]]:
+    edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
+    ends = zip(edges[::2], edges[1::2], strict=True)
+    return [(float(t[a]), float(t[b - 1])) for a, b in ends][:_MOST_STRETCHES]
+
+
+def _without_far(values: Array) -> Array:
+    """Values with gaps in place of the few that are far from all others."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return values
+    low, high = np.quantile(known, (0.02, 0.98))
+    room = _FAR * (high - low) or np.inf
+    return np.where((values < low - room) | (values > high + room), np.nan, values)
+
+
+def _settled_range(record: Record, parts: Sequence[Array], truth: float | None) -> tuple[float, float]:
+    """Range of a chart: where the estimates come to rest, and the truth, not where they come from."""
+    pressed = np.flatnonzero(record["phase"] == CONTACT)
+    late = pressed[len(pressed) // 4 :]
+    ends = [float(np.quantile(part[late], q)) for part in parts for q in (0.02, 0.98)]
+    ends += [] if truth is None else [truth]
+    room = 0.25 * (max(ends) - min(ends)) or 1.0
+    return min(ends) - room, max(ends) + room
 
 
 def around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]:
@@ -186,23 +206,6 @@ def around_contact(record: Record, before: float = BEFORE) -> tuple[Array, Mask]
     start = t[np.argmax(record["phase"] == CONTACT)]
     shown = t >= start - before
     return (t - start)[shown], shown
-
-
-def _shade(axis: Axes, record: Record) -> None:
-    """Where force is controlled, and where contact is lost."""
-    across = axis.get_xaxis_transform()
-    for phase, colour in ((CONTACT, style.F), (LOST, style.FAIL)):
-        inside = record["phase"] == phase
-        ends = {"where": inside, "transform": across, "linewidth": 0, "zorder": 0}
-        axis.fill_between(record["t"], 0, 1, color=colour, alpha=0.09, **ends)
-
-
-def _mark(axis: Axes, t: Array, flags: Array, label: str) -> None:
-    """Ticks at the lower edge where a flag is up."""
-    up = flags > 0.0
-    if up.any():
-        low = np.full(up.sum(), 0.02)
-        axis.plot(t[up], low, "|", color=style.FAIL, transform=axis.get_xaxis_transform(), label=label)
 
 
 BEFORE_CONTACT = 0.1
@@ -236,17 +239,16 @@ def write_one_direction(
         for ending in dict.fromkeys((*endings, ".png")):
             style.save(drawing, folder / f"{name}{ending}", dpi)
         figures.append({"panels": panels(charts), "caption": caption})
-    text = render(
-        "page.html",
+    answer = PageAnswer(
         title=experiment["title"],
-        about=f"{sentence(summary)} {experiment['about']}",
+        sentence=sentence(summary),
+        about=experiment["about"],
+        alerts=alerts(summary),
         tables=one_direction_tables(record, summary),
-        command=summary["command"],
-        source=source,
-        notes=notes(summary),
-        **page_figures(figures),
+        figures=figures,
+        source=("The experiment", source),
     )
-    write_text(folder / "report.html", text)
+    write_text(folder / "report.html", answer_page(answer, room="run", command=summary["command"]))
 
 
 def one_direction_tables(record: Record, summary: dict[str, Any]) -> list[Table]:

@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from palpate.arrays import Array, Mask
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT
 from palpate.identification.result import Identification
 from palpate.records import Record
-from palpate.report import style
 from palpate.report.answer import Card
+from palpate.report.chart import figure_of, panels
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, full_number
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import quantity
 from palpate.report.page import data_address, render
-from palpate.report.run.figures import drawings
+from palpate.report.run.figures import BEFORE, PARAMETERS, charts_of, figures_of, window_of
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
 from palpate.report.style import svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    pass
 
 
 ROWS = 4000
 """Of the record that lie in the page, the peaks of the measured force among them."""
 _FEWER = 1500
 """Of it in the pictures for a browser that runs no scripts."""
-_PARAMETERS = ("K", "B", "M")
 _PACKAGE = "palpate.report.run"
 _STILL = ("force", "identification")
 
@@ -80,8 +75,8 @@ def run_page(record: Record, content: Content) -> str:
         motors=motors(summary),
         facts=force_rows(summary) if contact else [],
         source=content.source,
-        charts=data(_charts(record, summary)) if worth else "",
-        pictures=list(_pictures(record)) if worth else [],
+        charts=data(_shown(record)) if worth else "",
+        pictures=_pictures(record) if worth else [],
         scripts=(*scripts(*CHARTS, *ARM, *TABLES), text_of("run.js", _PACKAGE))
         if worth
         else scripts(*TABLES),
@@ -146,7 +141,7 @@ def _surface(content: Content) -> list[dict[str, str]]:
             {
                 "name": printable(name),
                 "called": CALLED.get(name, ""),
-                "colour": name if name in _PARAMETERS else "other",
+                "colour": name if name in PARAMETERS else "other",
                 "tone": TONES[p.verdict],
                 "verdict": str(p.verdict),
                 "value": full_number(p) if p.value is not None else "no number",
@@ -157,109 +152,28 @@ def _surface(content: Content) -> list[dict[str, str]]:
     return rows
 
 
-def _pictures(record: Record) -> Iterator[dict[str, str]]:
+def _pictures(record: Record) -> list[dict[str, str]]:
     """Still pictures, for a browser that runs no scripts."""
     rows = rows_shown(record["force_measured"], _FEWER, record["phase"] == CONTACT)
     few = Record({name: column[rows] for name, column in record.columns.items()}, record.units, record.meta)
-    for one in drawings(few):
-        if one.name in _STILL:
-            with style.ink():
-                picture = svg(one.draw(few))
-            yield {"source": data_address(picture, "image/svg+xml"), "caption": one.caption}
+    found = figures_of(few)
+    return [
+        {"source": data_address(svg(figure_of(found[name][0])), "image/svg+xml"), "caption": found[name][1]}
+        for name in _STILL
+        if name in found
+    ]
 
 
-def _charts(record: Record, summary: dict[str, Any]) -> dict[str, Any]:
+def _shown(record: Record) -> dict[str, Any]:
     """Data of the charts and the arm, in plain values."""
-    t, phase = record["t"], record["phase"]
-    touched = summary["contact_at_s"]
-    near = np.zeros(len(t), dtype=bool) if touched is None else (t > touched - 1.0) & (t < touched + 2.0)
-    rows = rows_shown(record["force_measured"], ROWS, near)
-    columns = {name: values[rows] for name, values in _columns(record).items()}
-    length = Arm3().length
-    end = float(t[-1])
-    shown_from = float(t[0]) if touched is None else max(float(t[0]), touched - 1.0)
-    truth = {name: value["value"] for name, value in record.meta["truth"].items() if name in _PARAMETERS}
+    charts, window = charts_of(record), window_of(record)
+    rows = rows_shown(record["force_measured"], ROWS, record["t"] > window[0])
+    motion = {name: record[name][rows] for name in ("t", "q1", "q2", "q3", "force")}
+    motion |= {"depth": record["penetration"][rows], "wall": (record["x"] - record["penetration"])[rows]}
     return {
-        "columns": {name: packed_column(values) for name, values in columns.items()},
-        "truth": truth,
-        "ranges": _ranges(record, truth),
-        "marks": _marks(t, phase),
-        "shades": _stretches(t, phase == CONTACT),
-        "links": [length.x, length.y, length.z],
-        "window": [shown_from, end],
-        "shown": end if touched is None else min(touched + 1.2, end),
+        "charts": dict(zip(charts, panels(list(charts.values()), ROWS), strict=True)),
+        "columns": {name: packed_column(values) for name, values in motion.items()},
+        "links": list(Arm3().length),
+        "window": window,
+        "shown": min(window[0] + BEFORE + 1.2, window[1]),
     }
-
-
-def _columns(record: Record) -> dict[str, Array]:
-    plain_ones = {
-        "t": "t",
-        "measured": "force_measured",
-        "force": "force",
-        "desired": "force_desired",
-        "K_thesis": "K_thesis",
-        "K_raw": "K_raw",
-    }
-    plain_ones |= {name: name for name in ("q1", "q2", "q3", "torque1", "torque2", "torque3")}
-    columns = {name: record[own] for name, own in plain_ones.items()}
-    contact = np.maximum.accumulate(record["phase"]) > 0.0
-    for name in ("K_thesis", "K_raw"):
-        columns[name] = np.where(contact, columns[name], np.nan)
-    for name in _PARAMETERS:
-        value, half = record[f"{name}_matched"], 1.96 * record[f"{name}_matched_std"]
-        columns[name] = np.where(contact, value, np.nan)
-        columns[f"{name}_low"], columns[f"{name}_high"] = columns[name] - half, columns[name] + half
-    columns["depth"] = 1e3 * record["penetration"]
-    columns["wall"] = record["x"] - record["penetration"]
-    return {name: _limit(values) for name, values in columns.items()}
-
-
-def _limit(values: Array) -> Array:
-    """Without the few values from far away that would leave no steps for the others: gaps in their place."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return values
-    low, high = np.quantile(known, (0.02, 0.98))
-    room = 50.0 * (high - low) or np.inf
-    return np.where((values < low - room) | (values > high + room), np.nan, values)
-
-
-def _ranges(record: Record, truth: dict[str, float]) -> dict[str, list[float]]:
-    """Of the charts: where the estimates come to rest, their interval and the truth, not where they come from."""
-    pressed = np.flatnonzero(record["phase"] == CONTACT)
-    if not len(pressed):
-        return {}
-    late = pressed[len(pressed) // 4 :]
-    found = {}
-    for name in _PARAMETERS:
-        value, half = record[f"{name}_matched"][late], 1.96 * record[f"{name}_matched_std"][late]
-        found[name] = _range([value - half, value + half], truth.get(name))
-    found["thesis"] = _range(
-        [record[f"K_{front}"][late] for front in ("thesis", "raw", "matched")], truth.get("K")
-    )
-    return found
-
-
-def _range(parts: Sequence[Array], known: float | None) -> list[float]:
-    low = min(float(np.quantile(part, 0.02)) for part in parts)
-    high = max(float(np.quantile(part, 0.98)) for part in parts)
-    if known is not None:
-        low, high = min(low, known), max(high, known)
-    room = 0.25 * (high - low) or 1.0
-    return [low - room, high + room]
-
-
-def _marks(t: Array, phase: Array) -> list[dict[str, Any]]:
-    """Marks at touches and losses of contact."""
-    found = []
-    for i in np.flatnonzero(np.diff(phase, prepend=0.0))[:40]:
-        if phase[i] == CONTACT:
-            found.append({"x": float(t[i]), "text": "switch to force", "tone": ""})
-        elif phase[i] == LOST:
-            found.append({"x": float(t[i]), "text": "✕ contact lost", "tone": "fail"})
-    return found
-
-
-def _stretches(t: Array, inside: Mask) -> list[list[float]]:
-    edges = np.flatnonzero(np.diff(inside.astype(int), prepend=0, append=0))
-    return [[float(t[a]), float(t[b - 1])] for a, b in zip(edges[::2], edges[1::2], strict=True)][:40]

@@ -9,8 +9,9 @@ from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
 from palpate.bench.build import build
-from palpate.bench.force_input import COLUMNS, CONTACT, SequenceState
+from palpate.bench.force_input import COLUMNS, SequenceState
 from palpate.bench.plant import Loop, LoopState, start_at
+from palpate.bench.summary import CONTACT
 from palpate.bench.tables import Experiment
 from palpate.errors import InputError
 from palpate_studies.analysis.linear_loop import LinearLoop, LoopMotion, change

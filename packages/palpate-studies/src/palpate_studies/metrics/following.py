@@ -5,8 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from palpate.bench.force_input import LOST
-from palpate.bench.summary import BAND, FRONT_ENDS, IDENTIFIER, PARAMETERS, losses
+from palpate.bench.summary import BAND, FRONT_ENDS, IDENTIFIER, LOST, PARAMETERS, losses
 from palpate_studies.metrics.window import SETTLE, Metric, Value, Window, rms
 
 JOINTS = (1, 2, 3)

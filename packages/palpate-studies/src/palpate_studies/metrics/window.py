@@ -12,8 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.bench.force_input import CONTACT, DIVERGED, LOST_CONTACT
-from palpate.bench.summary import TICK_ROUNDING, summarise
+from palpate.bench.summary import CONTACT, DIVERGED, LOST_CONTACT, TICK_ROUNDING, summarise
 from palpate.records import Record
 
 Value = float | None

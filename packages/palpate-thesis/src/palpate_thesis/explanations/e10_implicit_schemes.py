@@ -1,7 +1,6 @@
 """Explanation 10: schemes that learn an unknown surface implicitly (sec. 2.3), on the arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,8 @@ from palpate.bench import Experiment, build, load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis import implicit_schemes
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RUBBER_SURFACE, SHORT, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import (
@@ -21,17 +21,10 @@ from palpate_thesis.force_control.tracking import (
     slot,
     tracking,
 )
-from palpate_thesis.implicit_schemes import (
-    FuzzyCompensation,
-    feedback_error_learning,
-    impedance_search,
-    one_loop,
-)
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "implicit-schemes"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-neural"), {**SHORT, "run.losses": 0, "run.duration": 450.0})
 BEYOND = 0.0138
 """Of the search's desired x beyond the wall [m], as in figure 2.2."""
@@ -47,9 +40,11 @@ class Scheme(NamedTuple):
 
 
 SCHEMES = {
-    "fuzzy": Scheme(lambda _: FuzzyCompensation(), 20.0),
-    "feedback-error": Scheme(lambda seed: feedback_error_learning(seed=seed), 20.0),
-    "impedance-search": Scheme(lambda seed: impedance_search(PARAMETERS.wall.x + BEYOND, seed), 400.0),
+    "fuzzy": Scheme(lambda _: implicit_schemes.FuzzyCompensation(), 20.0),
+    "feedback-error": Scheme(lambda seed: implicit_schemes.feedback_error_learning(seed=seed), 20.0),
+    "impedance-search": Scheme(
+        lambda seed: implicit_schemes.impedance_search(PARAMETERS.wall.x + BEYOND, seed), 400.0
+    ),
 }
 WORLDS: Mapping[str, Mapping[str, Any]] = {
     "foam": {},
@@ -60,19 +55,17 @@ WORLDS: Mapping[str, Mapping[str, Any]] = {
 _NAMED = ("foam", "rubber")
 
 
-@dataclass(frozen=True)
-class Learned:
+class Learned(NamedTuple):
     """End of a run, and its way there."""
 
     last: Tracking  # in the last window, whatever was lost before it
-    y: float  # mean error of y there [mm]
+    y: float  # mean error of y there [m]
     angle: float  # and of the angle [degrees]
     lost: int  # losses of contact, from the start on
     path: tuple[float, ...]  # rms of each window
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
@@ -99,16 +92,16 @@ def run(runs: Runs) -> Data:
 
 def press(scheme: Scheme, experiment: Experiment, seed: int) -> Record:
     """A press under a scheme; the seed is that of the noise and of its weights or its search."""
-    bench = build(experiment).with_controller(one_loop(scheme.make(seed)))
+    bench = build(experiment).with_controller(implicit_schemes.one_loop(scheme.make(seed)))
     return bench.run(experiment.run.duration, seed, press=scheme.seconds)
 
 
 def _learning_of(record: Record, seconds: float) -> Learned:
     windows = [tracking(at, at + WINDOW)(record) for at in np.arange(0.0, seconds, WINDOW)]
     late, last = since_contact(record) >= seconds - WINDOW, windows[-1]
-    y, angle = 1e3 * record["y"][late].mean(), np.degrees(record["phi"][late].mean())
+    y, angle = record["y"][late].mean(), np.degrees(record["phi"][late].mean())
     path = tuple(w.settled for w in windows)
-    return Learned(replace(last, lost=0), float(y), float(angle), last.lost, path)
+    return Learned(last._replace(lost=0), float(y), float(angle), last.lost, path)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -117,7 +110,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def _claim(name: str, found: dict[str, list[Learned]]) -> ThesisClaim:
-    free = found["tip that\nslides"]
     return claim(
         f"implicit-schemes.{name}",
         all(following([one.last for one in found[world]]) for world in _NAMED),
@@ -128,10 +120,8 @@ def _claim(name: str, found: dict[str, list[Learned]]) -> ThesisClaim:
         window=WINDOW,
         rms=LIMIT,
         share=SHARE,
-        y=[one.y for one in found["foam"]],
-        angle=[one.angle for one in found["foam"]],
-        free_y=[one.y for one in free],
-        free_angle=[one.angle for one in free],
+        end=found["foam"],
+        free=found["tip that\nslides"],
         first=[one.path[0] for one in found["foam"]],
         where=stops_holding(found, lambda one: one.last.follows),
     )
@@ -141,9 +131,9 @@ def plot(data: Data) -> Figure:
     """The last seconds of each scheme on foam, the search over its run, and all runs."""
     drawing, grid = panels([2.6, 2.0, 2.0])
     (force,), (search,), (dots,) = grid
-    for (name, one), color in zip(data.traces.items(), style.SERIES[:3], strict=True):
+    for name, one in data.traces.items():
         since = one["t"] - one["t"][0]
-        force.plot(since, one["force"], color=color, linewidth=1.1, label=name)
+        force.plot(since, one["force"], linewidth=1.1, label=name)
     force.plot(since, one["force_desired"], **style.KNOWN, label="desired")
     force.set(xlabel="time in the last seconds [s]", ylabel="true force [N]", xlim=(0.0, WINDOW))
     style.legend(force)
@@ -157,13 +147,6 @@ def plot(data: Data) -> Figure:
     search.set_title("the search: median and range of the runs")
     style.legend(search)
     shown = {f"{name}\n{world}": found[world] for name, found in data.found.items() for world in _NAMED}
-    dots_panel(
-        dots,
-        shown,
-        lambda one: one.last.settled,
-        lambda one: one.last.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title="in the last seconds; a dot follows, a cross does not",
-    )
+    dots_panel(dots, shown, lambda one: one.last.settled, lambda one: one.last.follows, LIMIT)
+    dots.set(ylabel="RMS error [N]", title="in the last seconds; a dot follows, a cross does not")
     return drawing

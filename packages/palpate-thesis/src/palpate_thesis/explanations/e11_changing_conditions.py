@@ -1,7 +1,8 @@
 """Explanation 11: conditions that change: friction with the configuration, a surface with its temperature."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.uncertainty import student
 from palpate.report import style
 from palpate.robots.arm3 import Arm3, directions, onto_joints
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import by_condition, move_wall
 from palpate_thesis.explanations.e6_friction_compensation import PARAMETERS as COMPENSATED
 from palpate_thesis.explanations.e6_friction_compensation import PLAIN, held_in
@@ -25,7 +26,6 @@ from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "changing-conditions"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(COMPENSATED, {"force.first": 15.0})
 WALLS = (0.40, 0.43, 0.465, 0.49)
 """x of the surface [m]; friction is as chosen for the third."""
@@ -51,8 +51,7 @@ def errors(experiment: Experiment, seed: int) -> tuple[float, float]:
     return constant, dependent
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     levels: Array  # friction of the joints over that of the start, shape (walls, 3)
@@ -64,23 +63,17 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Presses at each wall with both frictions, and a press at each temperature."""
-    walls = [with_values(PARAMETERS, move_wall(PARAMETERS, x)) for x in WALLS]
+    walls = {f"{x:g}": with_values(PARAMETERS, move_wall(PARAMETERS, x)) for x in WALLS}
     arm = build(PARAMETERS).loop.conditioning.arm
-    moments = np.array([list(tilting(arm, build(wall).q)) for wall in walls])
+    moments = np.array([list(tilting(arm, build(wall).q)) for wall in walls.values()])
     plain, compensated = (
-        by_condition(
-            runs,
-            {f"{x:g}": with_values(wall, change) for x, wall in zip(WALLS, walls, strict=True)},
-            errors,
-            [f"{x:g}" for x in WALLS],
-        )
+        by_condition(runs, {x: with_values(wall, change) for x, wall in walls.items()}, errors, walls)
         for change in ({"compensation.level": PLAIN.compensation.level}, {})
     )
-    presses = [
-        with_values(IDENTIFIED, {"surface.stiffness": stiffness_at(t), "run.press": 4.0})
-        for t in TEMPERATURES
+    cases = [
+        (with_values(IDENTIFIED, {"surface.stiffness": stiffness_at(t), "run.press": 4.0}), seed)
+        for t, seed in zip(TEMPERATURES, cycle(runs.seeds), strict=False)
     ]
-    cases = [(press, runs.seeds[i % len(runs.seeds)]) for i, press in enumerate(presses)]
     ends = np.array(runs.over(cases, lambda r: (r["K_matched"][-1], r["K_matched_std"][-1])))
     return Data(moments / moments[2], plain, compensated, ends[:, 0], ends[:, 1])
 
@@ -97,9 +90,8 @@ def pool_presses(data: Data, covariate: bool) -> Mean:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Friction at the joints, friction at the tip, a compensation of it, and the temperature."""
-    at = {name: np.array(found) for name, found in data.plain.items()}
+    near, _, start, far = (np.array(found)[:, 1] for found in data.plain.values())
     known = {name: np.array(found) for name, found in data.compensated.items()}
-    last, start = f"{WALLS[-1]:g}", f"{WALLS[2]:g}"
     worse = {name: found[:, 1] / found[:, 0] for name, found in known.items()}
     own, alone = pool_presses(data, True), pool_presses(data, False)
     slope, std = own.slopes[0]
@@ -117,10 +109,10 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         ),
         claim(
             "changing-conditions.tip",
-            often(at[last][:, 1] / at[start][:, 1] >= MORE),
-            near=list(at[f"{WALLS[0]:g}"][:, 1]),
-            middle=list(at[start][:, 1]),
-            far=list(at[last][:, 1]),
+            often(far / start >= MORE),
+            near=near,
+            middle=start,
+            far=far,
             more=MORE,
         ),
         claim(
@@ -139,26 +131,21 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 def plot(data: Data) -> Figure:
     """Errors over the configuration, and stiffness over the temperature."""
     drawing, ((force, stiffness),) = panels([3.0], 2, 11.0)
-    for (label, found), color in zip(
-        {"no compensation": data.plain, "compensated": data.compensated}.items(),
-        style.SERIES[:2],
-        strict=True,
-    ):
-        middle = np.array([np.median(one, axis=0) for one in found.values()])
-        force.plot(WALLS, middle[:, 1], "o-", color=color, linewidth=1.2, markersize=4, label=label)
-        force.plot(WALLS, middle[:, 0], "--", color=color, linewidth=1.0)
+    kinds = {"no compensation": data.plain, "compensated": data.compensated}
+    for (label, found), color in zip(kinds.items(), style.SERIES, strict=False):
+        constant, dependent = np.median(list(found.values()), axis=1).T
+        force.plot(WALLS, dependent, "o-", color=color, linewidth=1.2, markersize=4, label=label)
+        force.plot(WALLS, constant, "--", color=color, linewidth=1.0)
     force.set(xlabel="wall at [m]", ylabel="force error [N]", ylim=(0.0, None))
     force.set_title("friction by configuration; dashed: constant")
     force.legend()
     own = pool_presses(data, True)
     offsets = TEMPERATURES - TEMPERATURES.mean()
-    stiffness.errorbar(
-        TEMPERATURES, data.stiffness, 1.96 * data.deviation, fmt="o", color=style.K, markersize=4
-    )
+    bars = 1.96 * data.deviation
+    stiffness.errorbar(TEMPERATURES, data.stiffness, bars, fmt="o", color=style.K, markersize=4)
     stiffness.plot(TEMPERATURES, own.value + own.slopes[0][0] * offsets, color=style.K, linewidth=1.2)
     stiffness.plot(TEMPERATURES, [stiffness_at(t) for t in TEMPERATURES], **style.KNOWN)
-    stiffness.set(xlabel="temperature [C]", ylabel="K [N/m]")
-    stiffness.set_title("pooled presses; dashed: as chosen")
+    stiffness.set(xlabel="temperature [C]", ylabel="K [N/m]", title="pooled presses; dashed: as chosen")
     return drawing
 
 

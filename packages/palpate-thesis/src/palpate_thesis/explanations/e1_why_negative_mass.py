@@ -1,20 +1,21 @@
 """Why M_e comes out negative: every fault of the signals switched on, one after the other."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad, butterworth2, butterworth3
-from palpate_thesis.claims import ThesisClaim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.look import ZERO, Axes, Figure
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 CAUSES = {
     "offset": "displacement from the 5 N point",
@@ -30,8 +31,7 @@ TICK = 1e-3
 START, COVARIANCE = (0.0, 0.0, 2e5), 1e10
 
 
-@dataclass(frozen=True)
-class RegressionWindow:
+class RegressionWindow(NamedTuple):
     """A press with what came before it, so that filters have settled; true and measured."""
 
     x: Array  # true [m]
@@ -127,15 +127,14 @@ def delayed_fit(M: float, B: float, K: float, lag: float) -> tuple[float, float]
 
 
 NUMBER = "why-negative-mass"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = {
-    name: with_values(e, {"run.press": 4.2})
-    for name, e in {
-        "plain foam": press_runs.PLAIN,
-        "rubber": press_runs.RUBBER,
-        "relaxing foam": press_runs.RELAXING,
-    }.items()
+    "plain foam": with_values(press_runs.PLAIN, {"run.press": 4.2}),
+    "rubber": with_values(press_runs.RUBBER, {"run.press": 4.2}),
+    "relaxing foam": with_values(press_runs.RELAXING, {"run.press": 4.2}),
 }
+MODELLED = ("plain foam", "rubber")
+"""Surfaces that the estimator's model fits."""
+LABELS = ("$M_e$ [kg]", "$B_e$ [N s/m]")
 LAGS = 1e-3 * np.arange(0.0, 11.0)
 SENSOR_LAG = 5.6e-3
 """[s]; of the force sensor alone, for the lag formula's test."""
@@ -150,8 +149,7 @@ NEAR_TRUTH = {"K": 0.02, "B": 0.05, "M": 0.25}
 """Shares of K and B; kilograms."""
 
 
-@dataclass(frozen=True)
-class EstimatesOfPress:
+class EstimatesOfPress(NamedTuple):
     """Least-squares estimates of one press, each (M, B, K)."""
 
     steps: Array  # with perfect signals, then with one cause more each, shape (7, 3)
@@ -162,8 +160,7 @@ class EstimatesOfPress:
     matched: Array
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Presses on each surface, as chosen and varied."""
 
     presses: dict[str, list[EstimatesOfPress]]
@@ -177,17 +174,11 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One press a seed on each surface; conditions varied on the two that the model fits."""
-    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
-    plain = {name: PARAMETERS[name] for name in ("plain foam", "rubber")}
     varied = {
-        name: {
-            condition: runs.over([(e, seed) for seed in few], _press)
-            for condition, e in press_runs.conditions(one).items()
-        }
-        for name, one in plain.items()
+        name: runs.by_name(press_runs.conditions(PARAMETERS[name]), _press, VARIED_SEEDS) for name in MODELLED
     }
     truth = {name: (e.surface.mass, e.surface.damping, e.surface.stiffness) for name, e in PARAMETERS.items()}
-    return Data({name: runs.over_seeds(e, _press) for name, e in PARAMETERS.items()}, varied, truth)
+    return Data(runs.by_name(PARAMETERS, _press), varied, truth)
 
 
 def _press(record: Record) -> EstimatesOfPress:
@@ -205,30 +196,48 @@ def _press(record: Record) -> EstimatesOfPress:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The thesis' own reason, the lag, the wrong model, and the cure."""
-    return [_smallness(data), _lag(data), _wrong_model(data), _matched_claim(data)]
+    masses = _masses(data, "relaxing foam", "perfect signals")
+    wrong_model = claim("negative-mass.model", max(masses) < 0.0, masses=masses)
+    perfect = {s: _masses(data, s, "perfect signals") for s in MODELLED}
+    right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in MODELLED)
+    told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in MODELLED)
+    parts, worst = [], 0.0
+    for surface in MODELLED:
+        M, B, K = data.truth[surface]
+        predicted = np.array(delayed_fit(M, B, K, SENSOR_LAG))
+        fitted = data.middle(surface, "sensor")[:2]
+        apart = np.abs(fitted - predicted) / np.abs(predicted - np.array([M, B]))
+        worst = max(worst, float(apart.max()))
+        parts.append(
+            f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
+        )
+    return [
+        claim(
+            "negative-mass.small",
+            not right,
+            masses=told,
+            foam_added=_contributions(data, "plain foam"),
+            rubber_added=_contributions(data, "rubber"),
+            filter=data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0],
+            foam_without=np.median(_masses(data, "plain foam", "all but the force's lag")),
+            rubber_without=np.median(_masses(data, "rubber", "all but the force's lag")),
+            signs=_signs(data),
+        ),
+        claim(
+            "negative-mass.lag",
+            worst < NEAR_FORMULA,
+            sensor_lag=1e3 * SENSOR_LAG,
+            surfaces="; ".join(parts),
+            reach=_reach(data),
+        ),
+        wrong_model,
+        _matched_claim(data),
+    ]
 
 
 def _masses(data: Data, surface: str, chain: str) -> list[float]:
     at = list(CHAINS).index(chain)
     return [float(p.chains[at, 0]) for p in data.presses[surface]]
-
-
-def _smallness(data: Data) -> ThesisClaim:
-    surfaces = ("plain foam", "rubber")
-    perfect = {s: _masses(data, s, "perfect signals") for s in surfaces}
-    right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in surfaces)
-    told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in surfaces)
-    return claim(
-        "negative-mass.small",
-        not right,
-        masses=told,
-        foam_added=_contributions(data, "plain foam"),
-        rubber_added=_contributions(data, "rubber"),
-        filter=data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0],
-        foam_without=np.median(_masses(data, "plain foam", "all but the force's lag")),
-        rubber_without=np.median(_masses(data, "rubber", "all but the force's lag")),
-        signs=_signs(data),
-    )
 
 
 def _contributions(data: Data, surface: str) -> str:
@@ -256,50 +265,22 @@ def _signs(data: Data) -> str:
     return f"Friction, pose, mass and damping were varied. {' '.join(told)}"
 
 
-def _lag(data: Data) -> ThesisClaim:
-    parts, worst = [], 0.0
-    for surface in ("plain foam", "rubber"):
-        M, B, K = data.truth[surface]
-        predicted = np.array(delayed_fit(M, B, K, SENSOR_LAG))
-        fitted = data.middle(surface, "sensor")[:2]
-        apart = np.abs(fitted - predicted) / np.abs(predicted - np.array([M, B]))
-        worst = max(worst, float(apart.max()))
-        parts.append(
-            f"{surface}: M {fitted[0]:.2f} ({predicted[0]:.2f}) kg, B {fitted[1]:.0f} ({predicted[1]:.0f}) N s/m"
-        )
-    return claim(
-        "negative-mass.lag",
-        worst < NEAR_FORMULA,
-        sensor_lag=1e3 * SENSOR_LAG,
-        surfaces="; ".join(parts),
-        reach=_reach(data),
-    )
-
-
 def _reach(data: Data) -> str:
     """Up to which lag the formula is right."""
     parts = []
-    for surface in ("plain foam", "rubber"):
+    for surface in MODELLED:
         truth = data.truth[surface]
         fits = data.middle(surface, "lags")
-        good = [
-            abs(fit[0] - delayed_fit(*truth, lag)[0])
-            < NEAR_FORMULA * abs(delayed_fit(*truth, lag)[0] - truth[0])
-            for fit, lag in zip(fits[1:], LAGS[1:], strict=True)
-        ]
-        upto = len(good) if all(good) else int(np.argmin(good))
+        shifted = np.array([delayed_fit(*truth, lag)[0] for lag in LAGS[1:]])
+        good = np.abs(fits[1:, 0] - shifted) < NEAR_FORMULA * np.abs(shifted - truth[0])
+        upto = int(np.cumprod(good).sum())
         parts.append(f"{1e3 * LAGS[upto]:g} ms on {surface}")
     return f"For M it is within a quarter of the shift up to {' and '.join(parts)} (tried up to {1e3 * LAGS[-1]:g} ms)."
 
 
-def _wrong_model(data: Data) -> ThesisClaim:
-    masses = _masses(data, "relaxing foam", "perfect signals")
-    return claim("negative-mass.model", max(masses) < 0.0, masses=masses)
-
-
 def _matched_claim(data: Data) -> ThesisClaim:
     parts, good = [], True
-    for surface in ("plain foam", "rubber"):
+    for surface in MODELLED:
         truth = dict(zip("MBK", data.truth[surface], strict=True))
         found = dict(zip("MBK", np.transpose([p.matched for p in data.presses[surface]]), strict=True))
         middle = {key: float(np.median(found[key])) for key in "MBK"}
@@ -316,14 +297,12 @@ def _matched_claim(data: Data) -> ThesisClaim:
 def plot(data: Data) -> Figure:
     """Waterfalls of M and B on three surfaces, the lag formula, and conditions."""
     drawing, axes = panels.grid(5)
-    for row, surface in enumerate(PARAMETERS):
-        for column, (index, label) in enumerate((((0), "$M_e$ [kg]"), ((1), "$B_e$ [N s/m]"))):
-            axis = axes[2 * row + column]
-            panels.set_title(axis, "abcdef"[2 * row + column], f"{label.split(' ')[0]} on {surface}")
-            _waterfall(axis, data, surface, index)
-            axis.set_xlabel(label)
-            if column:
-                axis.set_yticklabels([])
+    for axis, letter, (surface, index) in zip(axes, "abcdef", product(PARAMETERS, (0, 1)), strict=False):
+        panels.set_title(axis, letter, f"{LABELS[index].split(' ')[0]} on {surface}")
+        _waterfall(axis, data, surface, index)
+        axis.set_xlabel(LABELS[index])
+        if index:
+            axis.set_yticklabels([])
     for index, axis in enumerate(axes[6:8]):
         _lag_panel(axis, data, index)
     for surface, axis, letter in zip(data.varied, axes[8:10], "ij", strict=True):
@@ -335,19 +314,17 @@ def plot(data: Data) -> Figure:
 
 def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
     steps = data.middle(surface, "steps")[:, index]
-    seeds = np.array([p.steps[:, index] for p in data.presses[surface]])
+    seeds = np.array([[*p.steps[:, index], p.matched[index]] for p in data.presses[surface]])
     labels = ["perfect signals", *(f"+ {name}" for name in CAUSES.values()), "channels matched"]
-    for i, value in enumerate(steps):
-        before = steps[i - 1] if i else 0.0
-        color = style.MEASURED if i == 0 else (style.FAIL if value < before else style.SERIES[0])
+    for i, value in enumerate((*steps, np.median(seeds[:, -1]))):
+        before = steps[i - 1] if 0 < i < len(steps) else 0.0
+        color = style.FAIL if value < before else style.SERIES[0]
+        color = {0: style.MEASURED, len(steps): style.OK}.get(i, color)
         axis.barh(i, value - before, left=before, color=color, height=0.62)
         axis.plot(seeds[:, i], np.full(len(seeds), i), "o", color=style.INK, markersize=1.8, alpha=0.5)
-        if i:
+        if 0 < i < len(steps):
             axis.plot([before, before], [i - 1, i], color=style.MEASURED, linewidth=0.8)
-    matched = [float(p.matched[index]) for p in data.presses[surface]]
-    axis.barh(len(steps), float(np.median(matched)), color=style.OK, height=0.62)
-    axis.plot(matched, np.full(len(matched), len(steps)), "o", color=style.INK, markersize=1.8, alpha=0.5)
-    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, **ZERO)
     if surface != "relaxing foam":
         axis.axvline(data.truth[surface][index], color=style.OK, linewidth=1.1, linestyle="--")
     axis.set_yticks(range(len(labels)), labels)
@@ -355,19 +332,17 @@ def _waterfall(axis: Axes, data: Data, surface: str, index: int) -> None:
 
 
 def _lag_panel(axis: Axes, data: Data, index: int) -> None:
-    panels.set_title(
-        axis, "gh"[index], f"{('$M_e$', '$B_e$')[index]} of perfect signals, the force late by T"
-    )
+    name = LABELS[index].split(" ")[0]
+    panels.set_title(axis, "gh"[index], f"{name} of perfect signals, the force late by T")
     fine = np.linspace(0.0, float(LAGS[-1]), 100)
-    for surface in ("plain foam", "rubber"):
+    for surface in MODELLED:
         color = panels.COLORS[surface]
-        axis.plot(
-            1e3 * LAGS, data.middle(surface, "lags")[:, index], "o", color=color, markersize=4, label=surface
-        )
+        fits = data.middle(surface, "lags")[:, index]
+        axis.plot(1e3 * LAGS, fits, "o", color=color, markersize=4, label=surface)
         predicted = [delayed_fit(*data.truth[surface], lag)[index] for lag in fine]
         axis.plot(1e3 * fine, predicted, "--", color=color, linewidth=1.1)
-    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
-    axis.set(xlabel="T [ms]", ylabel=("$M_e$ [kg]", "$B_e$ [N s/m]")[index])
+    axis.axhline(0.0, **ZERO)
+    axis.set(xlabel="T [ms]", ylabel=LABELS[index])
     axis.legend()
 
 
@@ -382,5 +357,5 @@ def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
         for i, chain in enumerate(CHAINS)
     }
     panels.dots(axis, groups, colors)
-    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axvline(0.0, **ZERO)
     axis.set_xlabel("$M_e$ [kg]")

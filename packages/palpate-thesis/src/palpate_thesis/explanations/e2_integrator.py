@@ -1,8 +1,7 @@
 """Explanation 2: the neural controller is, to first order, an integral controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
-from palpate_thesis.claims import ThesisClaim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, on_one_line, spread
 from palpate_thesis.force_control.panels import limits, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
@@ -23,15 +22,17 @@ from palpate_thesis.force_control.tracking import (
     tracking,
     variations,
 )
-from palpate_thesis.force_control.weights import COLUMN, HOLD, TORQUES, WeightsAtMoment, hold, watch
+from palpate_thesis.force_control.weights import COLUMN, HELD, HOLD, WeightsAtMoment, hold, watch
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "neural-is-an-integrator"
-TITLE, CAPTION = texts(NUMBER)
 AMPLITUDE, TICK, RATE = 20.0, 1e-3, 5e-5
 GAIN = RATE * (AMPLITUDE / 2) ** 2 / TICK
 """Integral gain equivalent to the text's learning rate: 5 per second."""
+RATES = (1e-6, 5e-6, 1e-5, 5e-5, 1e-4, 2e-4, 5e-4)
+GAINS = np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK
+"""That of each learning rate tried [1/s]."""
 PI: Mapping[str, Any] = {"controller": {"kind": "proportional-integral", "kf": 0.25, "ki": GAIN}}
 LONG = {"run.press": 15.0}
 PARAMETERS: Mapping[str, Experiment] = {
@@ -40,7 +41,6 @@ PARAMETERS: Mapping[str, Experiment] = {
     "rubber, steps": with_values(RUBBER, LONG),
     "rubber, steps and sine": with_values(RUBBER, {**LONG, **SINE}),
 }
-RATES = (1e-6, 5e-6, 1e-5, 5e-5, 1e-4, 2e-4, 5e-4)
 JUDGED = (10.0, 15.0)
 SHARE = 0.10
 """Within which gains and RMS errors have to agree."""
@@ -50,8 +50,7 @@ OUTSIDE = ("random\nweights", "rate of\nthe listing", "clock\nruns on")
 """Variations that are of the network or the reference alone."""
 
 
-@dataclass(frozen=True)
-class BothControllers:
+class BothControllers(NamedTuple):
     """An experiment under both controllers."""
 
     network: Record
@@ -62,8 +61,7 @@ class BothControllers:
     held: dict[str, float]  # the same with the network's weights from the torques held at zero
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     pairs: dict[str, BothControllers]
@@ -81,14 +79,12 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     """Gains and errors have to agree within a tenth."""
     at = RATES.index(RATE)
     small = [i for i, rate in enumerate(RATES) if rate <= 1e-4]
-    share = {
-        name: g / (np.array(RATES)[:, None] * (AMPLITUDE / 2) ** 2 / TICK) for name, g in data.gains.items()
-    }
-    worst = max(float(np.max(np.abs(s[small] - 1.0))) for s in share.values())
+    worst = max(np.abs(g / GAINS[:, None] - 1.0)[small].max() for g in data.gains.values())
     table = "; ".join(
         f"{name} {_median(p.network_found):.2f} and {_median(p.pi_found):.2f} N"
         for name, p in data.pairs.items()
     )
+    held = [value for pair in data.pairs.values() for value in pair.held.values()]
     seeds = len(next(iter(data.pairs.values())).pi_found)
     apart = max(abs(_median(p.network_found) / _median(p.pi_found) - 1.0) for p in data.pairs.values())
     return [
@@ -111,7 +107,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             seeds=seeds,
             share=SHARE,
             outliers=_outliers(data),
-            held_range=_held_range(data),
+            held_range=f"{min(held):.2f} to {max(held):.2f}",
         ),
     ]
 
@@ -130,37 +126,20 @@ def plot(data: Data) -> Figure:
 
 
 def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
-    axis.plot(
-        pair.network["t"],
-        pair.network["force"],
-        color=style.SERIES[1],
-        linewidth=3.2,
-        alpha=0.5,
-        label="network",
-    )
+    wide: Any = {"color": style.SERIES[1], "linewidth": 3.2, "alpha": 0.5, "label": "network"}
+    axis.plot(pair.network["t"], pair.network["force"], **wide)
     axis.plot(pair.pi["t"], pair.pi["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
     axis.plot(pair.pi["t"], pair.pi["force_desired"], **style.KNOWN, label="desired")
     limits(axis, pair.network)
-    axis.set_title(
-        f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N",
-        loc="left",
-        fontsize=9.5,
-    )
+    axis.set_title(f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N")
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
 def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
-    axis.plot(
-        RATES,
-        np.array(RATES) * (AMPLITUDE / 2) ** 2 / TICK,
-        color=style.INK,
-        linewidth=1,
-        label="eta (A/2)²/Ts",
-    )
+    axis.plot(RATES, GAINS, color=style.INK, linewidth=1, label="eta (A/2)²/Ts")
     for (name, found), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
-        axis.plot(
-            RATES, np.median(found, axis=1), marker, color=color, markersize=6, fillstyle="none", label=name
-        )
+        ring: Any = {"color": color, "markersize": 6, "fillstyle": "none", "label": name}
+        axis.plot(RATES, np.median(found, axis=1), marker, **ring)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle="--", label="the text's")
     axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
@@ -171,24 +150,13 @@ def _ratio_panel(axis: Axes, pairs: Mapping[str, BothControllers]) -> None:
     colors = (*style.SERIES, style.INK)
     names = list(dict.fromkeys(name for p in pairs.values() for name in p.ratios))
     for i, name in enumerate(names):
-        at = [
-            k + 0.11 * (i - len(names) / 2)
-            for k, p in enumerate(pairs.values())
-            for _ in p.ratios.get(name, ())
-        ]
-        values = [v for p in pairs.values() for v in p.ratios.get(name, ())]
-        axis.scatter(at, values, s=16, color=colors[i], linewidths=0, label=name.replace("\n", " "))
-    held = [(k, value) for k, p in enumerate(pairs.values()) for value in p.held.values()]
-    at = [k + 0.4 for k, _ in held]
-    axis.scatter(
-        at,
-        [v for _, v in held],
-        s=16,
-        color=style.INK,
-        marker="x",
-        linewidths=0.9,
-        label="torque weights zero",
-    )
+        found = [(k, v) for k, p in enumerate(pairs.values()) for v in p.ratios.get(name, ())]
+        at, values = np.array(found).T
+        at += 0.11 * (i - len(names) / 2)
+        axis.scatter(at, values, s=16, color=colors[i], linewidths=0, label=on_one_line(name))
+    at, held = np.array([(k + 0.4, v) for k, p in enumerate(pairs.values()) for v in p.held.values()]).T
+    cross: Any = {"s": 16, "color": style.INK, "marker": "x", "linewidths": 0.9}
+    axis.scatter(at, held, **cross, label="torque weights zero")
     axis.axhspan(1 - SHARE, 1 + SHARE, color=style.OK, alpha=0.1, zorder=0)
     axis.set_xticks(range(len(pairs)), [n.replace(", ", "\n", 1) for n in pairs])
     axis.set(ylabel="RMS, network / PI", ylim=(0.5, 1.5))
@@ -212,7 +180,7 @@ def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
 
 def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
     """RMS error of the first seed when the network's weights from the torques are held at zero [N]."""
-    zero = hold(TORQUES)
+    zero = hold(HELD["all torques"])
     errors: list[Array] = []
 
     def look(one: WeightsAtMoment) -> None:
@@ -225,10 +193,9 @@ def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
 
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
-    by_rate = [
-        with_values(experiment, {"controller.learning_rate": rate, "run.press": FITTED}) for rate in RATES
-    ]
-    return np.array([runs.over_seeds(e, gain_of) for e in by_rate])
+    e = with_values(experiment, {"run.press": FITTED})
+    by_rate = {rate: with_values(e, {"controller.learning_rate": rate}) for rate in RATES}
+    return np.array(list(runs.by_name(by_rate, gain_of).values()))
 
 
 def gain_of(record: Record) -> float:
@@ -243,15 +210,10 @@ def _median(found: Sequence[Tracking]) -> float:
     return float(np.median([one.rms for one in found]))
 
 
-def _held_range(data: Data) -> str:
-    held = [value for pair in data.pairs.values() for value in pair.held.values()]
-    return f"{min(held):.2f} to {max(held):.2f}"
-
-
 def _outliers(data: Data) -> str:
     """A sentence: where the errors are further apart."""
     far = [
-        f"{experiment}, {name.replace(chr(10), ' ')} ({np.median(values):.2f})"
+        f"{experiment}, {on_one_line(name)} ({np.median(values):.2f})"
         for experiment, pair in data.pairs.items()
         for name, values in pair.ratios.items()
         if abs(np.median(values) - 1.0) > SHARE

@@ -1,8 +1,7 @@
 """Explanation 3: the neural controller's delayed divergence."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,22 +9,13 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.controllers.neural import NeuralState
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RELAXING_FOAM, move_wall, rougher
 from palpate_thesis.explanations.e2_integrator import PI
 from palpate_thesis.force_control.panels import across, legend_inside, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
-from palpate_thesis.force_control.weights import (
-    HOLD,
-    POSES,
-    TORQUE1,
-    TORQUES,
-    WeightsAtMoment,
-    hold,
-    layers,
-    watch,
-)
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.force_control.weights import HELD, HOLD, WeightsAtMoment, hold, layers, watch
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 from palpate_thesis.runs import Runs
 
 DURATION = 240.0
@@ -39,8 +29,7 @@ PARTS = (
 )
 
 
-@dataclass(frozen=True)
-class LongRun:
+class LongRun(NamedTuple):
     """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
 
     t: Array  # (n,) [s]
@@ -49,8 +38,7 @@ class LongRun:
     lost: float | None  # when contact was lost [s]
 
 
-@dataclass(frozen=True)
-class Loss:
+class Loss(NamedTuple):
     """Signals in the last moments before the loss of contact."""
 
     t: Array  # before the loss [s]
@@ -61,11 +49,10 @@ class Loss:
 
 def weights_panel(axis: Axes, course: LongRun, name: str) -> None:
     """Sizes of the weights over a run."""
-    colors = style.SERIES[:5]
-    for sizes, part, color in zip(course.sizes.T, PARTS, colors, strict=True):
-        axis.plot(course.t, sizes, color=color, linewidth=1.2, label=part)
+    for sizes, part in zip(course.sizes.T, PARTS, strict=True):
+        axis.plot(course.t, sizes, linewidth=1.2, label=part)
     if course.lost is not None:
-        axis.axvline(course.lost, color=style.INK, linestyle="--", linewidth=1)
+        axis.axvline(course.lost, **LIMIT_LINE)
     axis.set(xlabel="time since contact [s]", ylabel="size of the weights", ylim=(0.0, 1.05))
     axis.set_title(f"{name}, eta 5e-5")
 
@@ -74,16 +61,10 @@ def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[LongRu
     """Gain from the torques to the force, on each surface."""
     for (name, found), color in zip(courses.items(), style.SERIES[:3], strict=True):
         course = found[5e-5][0]
-        axis.plot(course.t, np.linalg.norm(course.gains, axis=1), color=color, linewidth=1.2, label=name)
+        gain = np.linalg.norm(course.gains, axis=1)
+        axis.plot(course.t, gain, color=color, linewidth=1.2, label=name)
         if course.lost is not None:
-            axis.plot(
-                course.t[-1],
-                np.linalg.norm(course.gains[-1]),
-                "x",
-                color=color,
-                markersize=9,
-                markeredgewidth=2,
-            )
+            axis.plot(course.t[-1], gain[-1], "x", color=color, markersize=9, markeredgewidth=2)
     axis.set(xlabel="time since contact [s]", ylabel="gain [N per N m]", ylim=(0.0, 2.9))
     axis.set_title("from the torques to the network's force, eta 5e-5")
     legend_inside(axis, loc="upper right", ncols=3)
@@ -104,11 +85,12 @@ def loss_panel(axis: Axes, loss: Loss | None) -> None:
 
 def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
     """Times of loss over the learning rate, on each surface."""
-    for (name, found), color, shift in zip(
-        found_on.items(), style.SERIES[:3], (1.0, 0.94, 1.06), strict=True
-    ):
+    shifts = (1.0, 0.94, 1.06)
+    for (name, found), color, shift in zip(found_on.items(), style.SERIES, shifts, strict=False):
         for rate, courses in found.items():
-            _mark_losses(axis, [rate * shift] * len(courses), [c.lost for c in courses], color)
+            for lost in (one.lost for one in courses):
+                at, mark = (DURATION, "^") if lost is None else (lost, "o")
+                axis.plot(rate * shift, at, mark, color=color, markersize=5)
         axis.plot([], [], "o", color=color, markersize=4, label=name)
     axis.plot([], [], "^", color=style.MEASURED, markersize=5, label=f"kept for {DURATION:g} s, as with PI")
     axis.set(
@@ -117,18 +99,10 @@ def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[LongR
     legend_inside(axis, loc="center right", bbox_to_anchor=(1.0, 0.62))
 
 
-def _mark_losses(axis: Axes, at: Sequence[float], times: Sequence[float | None], color: str) -> None:
-    for x, lost in zip(at, times, strict=True):
-        axis.plot(
-            x, DURATION if lost is None else lost, "^" if lost is None else "o", color=color, markersize=5
-        )
-
-
 def steps_panel(axis: Axes, found: Mapping[float, Sequence[LongRun]]) -> None:
     """Growth of the output weights of the force over the steps asked for, at each learning rate."""
-    for (rate, courses), color in zip(found.items(), style.SERIES[:5], strict=True):
-        one = courses[0]
-        axis.plot(one.t / 2.5, one.sizes[:, 3], color=color, linewidth=1.5, label=f"{rate:g}")
+    for rate, (one, *_) in found.items():
+        axis.plot(one.t / 2.5, one.sizes[:, 3], linewidth=1.5, label=f"{rate:g}")
     axis.set(xlabel="steps of the desired force", ylabel="force's output weights", yscale="log")
     axis.set_title("growth by steps, foam that relaxes")
     legend_inside(axis, loc="lower right", title="eta")
@@ -153,7 +127,6 @@ def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> No
 
 
 NUMBER = "delayed-divergence"
-TITLE, CAPTION = texts(NUMBER)
 RELAXING = with_values(FOAM, RELAXING_FOAM)
 PARAMETERS: Mapping[str, Experiment] = {"foam that relaxes": RELAXING, "foam": FOAM, "rubber": RUBBER}
 RATES = (1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
@@ -180,16 +153,9 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "wall at 0.49 m": move_wall(FOAM, 0.49),
     "PI, K_i = 5 per second": PI,
 }
-HELD: Mapping[str, slice] = {
-    "weights from poses held at zero": POSES,
-    "weights from motor 1's torque held at zero": TORQUE1,
-    "weights from all torques held at zero": TORQUES,
-}
-"""Hidden weights that are not allowed to grow."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     courses: dict[str, dict[float, list[LongRun]]]  # by surface and learning rate
@@ -203,16 +169,15 @@ def run(runs: Runs) -> Data:
     courses: dict[str, dict[float, list[LongRun]]] = {}
     for name, e in PARAMETERS.items():
         rates, seeds = (RATES, runs.seeds[:5]) if e is RELAXING else (FEW_RATES, runs.seeds[:1])
-        cases = [(with_values(e, {"controller.learning_rate": r}), s) for r in rates for s in seeds]
-        found = runs.map(lambda case: _course(runs, *case), cases)
-        courses[name] = {r: found[i * len(seeds) : (i + 1) * len(seeds)] for i, r in enumerate(rates)}
-    plain = {name: _losses(runs, with_values(e, PI), 1) for name, e in PARAMETERS.items()}
-    causes = {name: _losses(runs, with_values(RELAXING, change), 1) for name, change in CAUSES.items()}
-    held = runs.map(
+        at_rate = {r: with_values(e, {"controller.learning_rate": r}) for r in rates}
+        cases = {r: [(one, seed) for seed in seeds] for r, one in at_rate.items()}
+        courses[name] = runs.map_each(lambda case: _course(runs, *case), cases)
+    plain = _losses(runs, {name: with_values(e, PI) for name, e in PARAMETERS.items()})
+    causes = _losses(runs, {name: with_values(RELAXING, change) for name, change in CAUSES.items()})
+    causes |= runs.map_each(
         lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD),
-        list(HELD.values()),
+        {f"weights from {name} held at zero": [columns] for name, columns in HELD.items()},
     )
-    causes.update((name, [lost]) for name, lost in zip(HELD, held, strict=True))
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
 
@@ -223,14 +188,17 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     steady = all(lost is None for found in data.pi.values() for lost in found)
     others = [c.lost for name in ("foam", "rubber") for found in data.courses[name].values() for c in found]
     gone = sum(lost is not None for lost in others)
+    held = _range(data.causes["weights from all torques held at zero"])
     return [
         claim(
             "neural-diverges.loss",
             all(lost is not None for lost in times) and steady,
-            cases=_table(relaxing),
+            cases=", ".join(
+                f"{rate:g} after {_range([c.lost for c in some])}" for rate, some in relaxing.items()
+            ),
             steady="steady" if steady else "lost",
             duration=DURATION,
-            kept=_keeps_contact(data.causes, "weights from all torques held at zero"),
+            kept=f"kept for {DURATION:g} s" if held == "never" else f"not kept beyond {held}",
             negative_damping=_negative_damping(data.loss),
         ),
         claim(
@@ -239,7 +207,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             gone=gone,
             others=len(others),
             duration=DURATION,
-            causes=_times_by_cause(data.causes),
+            causes=", ".join(f"{name} {_range(times)}" for name, times in data.causes.items()),
         ),
     ]
 
@@ -259,18 +227,15 @@ def plot(data: Data) -> Figure:
 
 
 def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:
-    t: list[float] = []
-    sizes: list[Array] = []
-    gains: list[Array] = []
+    seen: list[tuple[Any, ...]] = []
 
     def look(one: WeightsAtMoment) -> None:
         assert one.neural is not None
-        t.append(one.t)
-        sizes.append(sizes_of(one.neural))
-        gains.append(torque_gains_of(one.neural))
+        seen.append((one.t, sizes_of(one.neural), torque_gains_of(one.neural)))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
-    return LongRun(np.array(t), np.array(sizes), np.array(gains), lost)
+    t, sizes, gains = map(np.array, zip(*seen, strict=True))
+    return LongRun(t, sizes, gains, lost)
 
 
 def sizes_of(state: NeuralState) -> Array:
@@ -288,9 +253,11 @@ def torque_gains_of(state: NeuralState) -> Array:
     return np.array(20.0 * 0.5 * (1.0 - out**2) * through @ hidden[:, 7:])
 
 
-def _losses(runs: Runs, experiment: Experiment, seeds: int) -> list[float | None]:
-    return runs.map(
-        lambda seed: watch(experiment, seed, DURATION, lambda _: None, runs.waiting), list(runs.seeds[:seeds])
+def _losses(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[float | None]]:
+    """When each loses contact with the first seed [s]."""
+    return runs.map_each(
+        lambda e: watch(e, runs.seeds[0], DURATION, lambda _: None, runs.waiting),
+        {name: [e] for name, e in experiments.items()},
     )
 
 
@@ -305,30 +272,13 @@ def _loss(runs: Runs, lost: float | None) -> Loss | None:
     return Loss(t[last], *columns)
 
 
-def _table(found: Mapping[float, Sequence[LongRun]]) -> str:
-    """Times of loss by learning rate."""
-    return ", ".join(f"{rate:g} after {_range([c.lost for c in courses])}" for rate, courses in found.items())
-
-
-def _keeps_contact(causes: Mapping[str, Sequence[float | None]], name: str) -> str:
-    lost = _range(causes[name])
-    return f"not kept beyond {lost}" if lost != "never" else f"kept for {DURATION:g} s"
-
-
 def _range(times: Sequence[float | None]) -> str:
     lost = [one for one in times if one is not None]
     if not lost:
         return "never"
-    text = (
-        f"{min(lost):.0f} s"
-        if round(min(lost)) == round(max(lost))
-        else f"{min(lost):.0f} to {max(lost):.0f} s"
-    )
+    ends = dict.fromkeys((f"{min(lost):.0f}", f"{max(lost):.0f}"))
+    text = f"{' to '.join(ends)} s"
     return text if len(lost) == len(times) else f"{text} (in {len(lost)} of {len(times)} runs)"
-
-
-def _times_by_cause(causes: Mapping[str, Sequence[float | None]]) -> str:
-    return ", ".join(f"{name} {_range(times)}" for name, times in causes.items())
 
 
 def _negative_damping(loss: Loss | None) -> str:

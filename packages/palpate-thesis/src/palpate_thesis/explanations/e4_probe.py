@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
 from palpate_thesis.least_squares import panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, Axes, Figure
 from palpate_thesis.neural_identifier import network
-from palpate_thesis.neural_identifier.claims import share_of_starts
+from palpate_thesis.neural_identifier.claims import describe_spread, share_of_starts
 from palpate_thesis.neural_identifier.network import STARTS, NetworkAnswer, NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
 
@@ -35,24 +34,18 @@ TITLES = (
 )
 
 
-def causes(data: Mapping[str, SurfaceResults], fixed: NetworkChoice, straight: NetworkChoice) -> Figure:
-    """Eight panels; `fixed` and `straight` are shown beside the networks as chosen in (a) and (b)."""
+def plot(data: Mapping[str, SurfaceResults]) -> Figure:
+    """Learned force, K by probing, every variation, and M by initial weights."""
     drawing, axes = panels.grid(5)
     tall = _merge(drawing, axes)
     eight = [axes[0], axes[1], *tall, axes[6], axes[7], axes[8], axes[9]]
     for axis, letter, title in zip(eight, "abcdefgh", TITLES, strict=True):
         panels.set_title(axis, letter, title)
     foam = data["foam"]
-    kinds = {
-        "as chosen": (NetworkChoice(), style.SERIES[0]),
-        "thresholds at zero": (fixed, style.SERIES[1]),
-        "zero, 200 N, 0.1": (straight, style.SERIES[2]),
-    }
-    _draw_known_force(eight[0], eight[1], foam, kinds)
-    for axis, surface in zip(eight[2:4], data.values(), strict=True):
-        _toggles(axis, surface, named=surface is foam)
-    for axis, surface in zip(eight[4:6], data.values(), strict=True):
-        _masses(axis, surface)
+    _draw_known_force(eight[0], eight[1], foam)
+    for toggles, masses, surface in zip(eight[2:4], eight[4:6], data.values(), strict=True):
+        _toggles(toggles, surface, named=surface is foam)
+        _masses(masses, surface)
     _lasting(eight[6], foam)
     _draw_conditions(eight[7], data)
     return drawing
@@ -65,37 +58,31 @@ def _merge(drawing: Figure, axes: list[Axes]) -> list[Axes]:
         axis.remove()
     tall = [drawing.add_subplot(grid[1:3, column]) for column in (0, 1)]
     for axis in tall:
-        axis.grid(visible=True, axis="x", color=style.GRID, linewidth=0.8)
-        axis.set_axisbelow(True)
-        axis.spines[["top", "right"]].set_visible(False)
+        style.plain(axis)
+        axis.grid(visible=False, axis="y")
     return tall
 
 
-def _draw_known_force(
-    force: Axes, stiffness: Axes, surface: SurfaceResults, kinds: Mapping[str, tuple[NetworkChoice, str]]
-) -> None:
+def _draw_known_force(force: Axes, stiffness: Axes, surface: SurfaceResults) -> None:
     press = surface.press
     x = np.linspace(0.0, 2.0 * press.rest, 80)
-    truth = press.force[-500:].mean() + surface.stiffness * (x - press.rest)
-    for label, (choice, color) in kinds.items():
+
+    def both(known: Array, label: str | None, **options: Any) -> None:
+        force.plot(1e3 * x, known, label=label, **options)
+        stiffness.plot(1e3 * x[1:], known[1:] / x[1:] / press.ratio, **options)
+
+    for (label, choice), color in zip(SHOWN.items(), style.SERIES, strict=False):
         for start in SHOWN_STARTS:
             probe, _ = network.learn(press, choice, start)
             known = np.array([probe.force((d, 0.0, 0.0)) for d in x])
-            force.plot(
-                1e3 * x, known, color=color, linewidth=0.9, alpha=0.8, label=label if start == 0 else None
-            )
-            stiffness.plot(
-                1e3 * x[1:], known[1:] / x[1:] / press.ratio, color=color, linewidth=0.9, alpha=0.8
-            )
-    force.plot(1e3 * x, truth, color=style.INK, linewidth=1.3, linestyle="--", label="the surface")
-    stiffness.plot(
-        1e3 * x[1:], truth[1:] / x[1:] / press.ratio, color=style.INK, linewidth=1.3, linestyle="--"
-    )
+            both(known, None if start else label, color=color, linewidth=0.9, alpha=0.8)
+    truth = press.force[-500:].mean() + surface.stiffness * (x - press.rest)
+    both(truth, "the surface", color=style.INK, linewidth=1.3, linestyle="--")
     stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
     asked = 1e3 * NetworkChoice().probe(press.surface, 0).values[0]
     for axis in (force, stiffness):
         axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
-        axis.axvline(asked, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.axvline(asked, **STATED)
         axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
     force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
     stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
@@ -104,17 +91,13 @@ def _draw_known_force(
 
 def _toggles(axis: Axes, surface: SurfaceResults, *, named: bool) -> None:
     names = list(surface.toggled)
-    for i, name in enumerate(names):
-        some = surface.toggled[name]
+    for i, some in enumerate(surface.toggled.values()):
         warned = all(look.warned for look in some)
-        over, slopes = [look.over for look in some], [look.tangent for look in some]
-        _strip(axis, over, i - 0.16, style.FAIL if warned else style.SERIES[0])
-        _strip(axis, slopes, i + 0.16, style.SERIES[1])
+        _strip(axis, [look.over for look in some], i - 0.16, style.FAIL if warned else style.SERIES[0])
+        _strip(axis, [look.tangent for look in some], i + 0.16, style.SERIES[1])
     axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
-    axis.axvline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
-    axis.axvline(
-        surface.stiffness / surface.press.ratio, color=style.SERIES[1], linewidth=0.9, linestyle="--"
-    )
+    for at, color in zip((surface.perfect, surface.slope), style.SERIES, strict=False):
+        axis.axvline(at, color=color, linewidth=0.9, linestyle="--")
     axis.set_yticks(range(len(names)), names if named else [""] * len(names))
     axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
     axis.set_xlabel("above: K; below: slope; dashed: no error")
@@ -128,15 +111,13 @@ def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
 def _masses(axis: Axes, surface: SurfaceResults) -> None:
     order = np.argsort(np.median(surface.masses, axis=0))
     rows = np.arange(len(MANY_STARTS))
-    axis.plot(
-        rows, surface.before[order], "o", color=style.MEASURED, markersize=4, fillstyle="none", label="before"
-    )
-    for seed in surface.masses[:, order]:
-        axis.plot(rows, seed, ".", color=style.SERIES[0], markersize=3)
+    ring: Any = {"color": style.MEASURED, "markersize": 4, "fillstyle": "none", "label": "untrained"}
+    axis.plot(rows, surface.before[order], "o", **ring)
+    after = axis.plot(rows, surface.masses[:, order].T, ".", color=style.SERIES[0], markersize=3)
+    after[0].set_label("after 4 s, each noise seed")
     axis.axhline(0.0, color=style.INK, linewidth=0.8)
     axis.set(xlabel="start, by its M", ylabel="$M_e$ [kg]")
-    handles = [axis.lines[0], axis.lines[1]]
-    axis.legend(handles, ["untrained", "after 4 s, each noise seed"], loc="upper left")
+    axis.legend(loc="upper left")
 
 
 def _lasting(axis: Axes, surface: SurfaceResults) -> None:
@@ -156,10 +137,9 @@ def _lasting(axis: Axes, surface: SurfaceResults) -> None:
 
 def _draw_conditions(axis: Axes, data: Mapping[str, SurfaceResults]) -> None:
     names = list(dict.fromkeys(name for s in data.values() for name in s.varied))
-    for shift, (surface, color) in enumerate(zip(data.values(), style.SERIES[:2], strict=True)):
-        for i, name in enumerate(names):
-            if name in surface.varied:
-                _strip(axis, [a.over for a in surface.varied[name]], i - 0.15 + 0.3 * shift, color)
+    for surface, color, shift in zip(data.values(), style.SERIES, (-0.15, 0.15), strict=False):
+        for name, some in surface.varied.items():
+            _strip(axis, [a.over for a in some], names.index(name) + shift, color)
     axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
     axis.set_yticks(range(len(names)), names)
     axis.set(ylim=(len(names) - 0.5, -0.5), xlabel="K over f/x; above: foam, below: rubber")
@@ -175,13 +155,12 @@ FEW = 2
 """Noise seeds for the toggles, with ten starts on each."""
 MANY_STARTS = tuple(range(30))
 STRAIGHT = NetworkChoice(200.0, 0.1, thresholds=False)
+CHOSEN, FIXED = NetworkChoice(), NetworkChoice(thresholds=False)
+SHOWN = {"as chosen": CHOSEN, "thresholds at zero": FIXED, "zero, 200 N, 0.1": STRAIGHT}
+"""Networks of the first two panels."""
 
 
-CHOSEN = NetworkChoice()
-
-
-@dataclass(frozen=True)
-class Toggle:
+class Toggle(NamedTuple):
     """One change against the networks as chosen."""
 
     choice: NetworkChoice = CHOSEN
@@ -189,9 +168,10 @@ class Toggle:
     duration: float = network.PRESS  # of contact [s]
 
 
+UNSCALED = "inputs not scaled"
 TOGGLES = {
     "as chosen": Toggle(),
-    "thresholds at zero": Toggle(NetworkChoice(thresholds=False)),
+    "thresholds at zero": Toggle(FIXED),
     "zero, 200 N, weights 0.1": Toggle(STRAIGHT),
     "weights to 0.01": Toggle(NetworkChoice(weights=0.01)),
     "weights to 2": Toggle(NetworkChoice(weights=2.0)),
@@ -199,7 +179,7 @@ TOGGLES = {
     "amplitude 100 N": Toggle(NetworkChoice(amplitude=100.0)),
     "rate 1e-5": Toggle(NetworkChoice(rate=1e-5)),
     "rate 1e-3": Toggle(NetworkChoice(rate=1e-3)),
-    "inputs not scaled": Toggle(NetworkChoice(scale=(1.0, 1.0, 1.0))),
+    UNSCALED: Toggle(NetworkChoice(scale=(1.0, 1.0, 1.0))),
     "probe at half": Toggle(displacement=0.5),
     "probe where it rests": Toggle(displacement=None),
     "probe at twice": Toggle(displacement=2.0),
@@ -208,8 +188,7 @@ TOGGLES = {
 }
 
 
-@dataclass(frozen=True)
-class Looked:
+class Looked(NamedTuple):
     """One network after one press, asked at a probe of one's own."""
 
     over: float  # K by probing over f/x
@@ -217,8 +196,7 @@ class Looked:
     warned: bool
 
 
-@dataclass(frozen=True)
-class SurfaceResults:
+class SurfaceResults(NamedTuple):
     """Results on one surface."""
 
     press: NetworkPress  # of the first noise seed, 4 s
@@ -228,14 +206,15 @@ class SurfaceResults:
     toggled: dict[str, list[Looked]]
     nominal: list[NetworkAnswer]  # every start of MANY_STARTS on the press of every noise seed
     before: Array  # M of each start before it has learned anything [kg]
-    far: list[
-        tuple[float, bool]
-    ]  # at twice the largest displacement: force over the surface's, whether warned
+    far: list[tuple[float, bool]]  # at twice the largest depth: force over the surface's, whether warned
     near: list[float]  # at the thesis' probe: force over the surface's
-    gap: tuple[
-        float, float
-    ]  # from the probes for K and for M to the nearest sample, in the network's scaled inputs
+    gap: tuple[float, float]  # from the probes for K and M to the nearest sample, in the network's inputs
     varied: dict[str, list[NetworkAnswer]]
+
+    @property
+    def slope(self) -> float:
+        """The surface's stiffness over f/x."""
+        return self.stiffness / self.press.ratio
 
     @property
     def masses(self) -> Array:
@@ -255,8 +234,7 @@ def _surface(runs: Runs, name: str) -> SurfaceResults:
     experiment = PARAMETERS[name]
     whole = network.presses(runs, experiment, name, list(runs.seeds)[:FEW])
     some = network.presses(runs, with_values(experiment, {"run.press": network.PRESS}), name)
-    cases = [(t, p, s) for t in TOGGLES.values() for p in whole for s in network.STARTS]
-    looked = iter(runs.map(lambda case: look(*case), cases))
+    cases = {name: [(t, p, s) for p in whole for s in network.STARTS] for name, t in TOGGLES.items()}
     x = NetworkChoice().probe(name, 0).values[0]
     switch, stiffness = experiment.approach.switch, experiment.surface.stiffness
     far, near = _truths(runs, some, switch, stiffness, float(x))
@@ -265,15 +243,13 @@ def _surface(runs: Runs, name: str) -> SurfaceResults:
         long=whole[0],
         stiffness=stiffness,
         perfect=float((switch / x + stiffness) / np.median([press.ratio for press in some])),
-        toggled={t: [next(looked) for _ in range(len(whole) * len(network.STARTS))] for t in TOGGLES},
+        toggled=runs.map_each(lambda case: look(*case), cases),
         nominal=network.answers(runs, some, NetworkChoice(), MANY_STARTS),
         before=np.array([NetworkChoice().probe(name, start).probe().mass for start in MANY_STARTS]),
         far=far,
         near=near,
         gap=gap(some[0]),
-        varied=network.answers_under_conditions(
-            runs, network.FOAM if name == "foam" else network.RUBBER, name
-        ),
+        varied=network.answers_under_conditions(runs, getattr(network, name.upper()), name),
     )
 
 
@@ -308,19 +284,11 @@ def gap(press: NetworkPress) -> tuple[float, float]:
     probe = NetworkChoice().probe(press.surface, 0)
     seen = press.inputs * probe.scale
     asked = probe.values * probe.scale
-    for_stiffness, for_mass = (
-        np.linalg.norm(seen - asked * np.array(m), axis=1).min() for m in ((1, 0, 0), (1, 1, 1))
-    )
+    for_stiffness, for_mass = (np.linalg.norm(seen - at, axis=1).min() for at in (asked * [1, 0, 0], asked))
     return float(for_stiffness), float(for_mass)
 
 
-__all__ = ["CAPTION", "NUMBER", "PARAMETERS", "TITLE", "check", "plot", "run"]
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 NUMBER = "what-the-probe-depends-on"
-TITLE, CAPTION = texts(NUMBER)
 STUDY = (1.3, 2.3)
 """K over f/x with learning thresholds, from an earlier study of ours."""
 FAR = 0.10
@@ -329,10 +297,6 @@ FAR = 0.10
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Results of an earlier study, and the statements of sections 5.2 and 6.2 on dummy values and scaling."""
-    return [_stiffness(data), _mass(data), _outside(data), _scaling(data)]
-
-
-def _stiffness(data: Data) -> ThesisClaim:
     inside = {name: [STUDY[0] <= a.over <= STUDY[1] for a in s.nominal] for name, s in data.items()}
     foam, rubber = data["foam"], data["rubber"]
     chosen = [a.over for s in data.values() for a in s.nominal]
@@ -343,32 +307,33 @@ def _stiffness(data: Data) -> ThesisClaim:
         for condition, some in s.varied.items()
     }
     low, high = min(medians, key=lambda m: medians[m]), max(medians, key=lambda m: medians[m])
-    return claim(
-        "network-probe.K",
-        all(often(i) for i in inside.values()),
-        surfaces="; ".join(
-            f"{name} {_spread([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
+    return [
+        claim(
+            "network-probe.K",
+            all(often(i) for i in inside.values()),
+            surfaces="; ".join(
+                f"{name} {_spread([a.over for a in s.nominal], 'times f/x')}" for name, s in data.items()
+            ),
+            perfect=foam.perfect,
+            toggled={toggle: _median(foam, toggle) for toggle in TOGGLES},
+            foam_slope=np.median([a.tangent / a.ratio for a in foam.nominal]),
+            foam_true=foam.slope,
+            rubber_slope=np.median([a.tangent / a.ratio for a in rubber.nominal]),
+            rubber_true=rubber.slope,
+            least=min(chosen),
+            most=max(chosen),
+            large_least=min(large),
+            large_most=max(large),
+            conditions=len(medians),
+            low=medians[low],
+            low_with=low,
+            high=medians[high],
+            high_with=high,
         ),
-        perfect=foam.perfect,
-        fixed=_median(foam, "thresholds at zero"),
-        straight=_median(foam, "zero, 200 N, weights 0.1"),
-        half=_median(foam, "probe at half"),
-        rest=_median(foam, "probe where it rests"),
-        short=_median(foam, "1 s of contact"),
-        foam_slope=np.median([a.tangent / a.ratio for a in foam.nominal]),
-        foam_true=foam.stiffness / foam.press.ratio,
-        rubber_slope=np.median([a.tangent / a.ratio for a in rubber.nominal]),
-        rubber_true=rubber.stiffness / rubber.press.ratio,
-        least=min(chosen),
-        most=max(chosen),
-        large_least=min(large),
-        large_most=max(large),
-        conditions=len(medians),
-        low=medians[low],
-        low_with=low,
-        high=medians[high],
-        high_with=high,
-    )
+        _mass(data),
+        _outside(data),
+        _scaling(data),
+    ]
 
 
 def _mass(data: Data) -> ThesisClaim:
@@ -434,21 +399,17 @@ def _outside(data: Data) -> ThesisClaim:
 
 def _scaling(data: Data) -> ThesisClaim:
     slopes = {
-        name: [[abs(look.tangent) for look in s.toggled[t]] for t in ("as chosen", "inputs not scaled")]
+        name: [np.median([abs(look.tangent) for look in s.toggled[t]]) for t in ("as chosen", UNSCALED)]
         for name, s in data.items()
     }
-    holds = all(np.median(without) < 0.1 * np.median(scaled) for scaled, without in slopes.values())
-    K = {name: _median(s, "inputs not scaled") for name, s in data.items()}
     return claim(
         "network-probe.scale",
-        holds,
+        all(without < 0.1 * scaled for scaled, without in slopes.values()),
         surfaces="; ".join(
-            f"{name}: slope over displacement {np.median(without):.2g} times f/x without, "
-            f"{np.median(scaled):.2g} with"
+            f"{name}: slope over displacement {without:.2g} times f/x without, {scaled:.2g} with"
             for name, (scaled, without) in slopes.items()
         ),
-        foam_K=K["foam"],
-        rubber_K=K["rubber"],
+        **{f"{name}_K": _median(s, UNSCALED) for name, s in data.items()},
     )
 
 
@@ -462,10 +423,4 @@ def _percent(surface: SurfaceResults) -> str:
 
 
 def _spread(values: Sequence[float], unit: str) -> str:
-    seeds = len(values) // len(MANY_STARTS)
-    return spread(values, unit).replace(f"{len(values)} seeds", f"{seeds} seeds x {len(MANY_STARTS)} starts")
-
-
-def plot(data: Data) -> Figure:
-    """Learned force, K by probing, every variation, and M by initial weights."""
-    return causes(data, replace(NetworkChoice(), thresholds=False), STRAIGHT)
+    return describe_spread(values, unit, len(MANY_STARTS))

@@ -1,14 +1,14 @@
 """Explanation 5: left open by the thesis: the best learning rate, layers and neurons, architectures, stability."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.bench import Experiment, with_values
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.force_control.architectures import bench_with, radial_basis, recurrent
 from palpate_thesis.force_control.panels import legend_inside, panels
@@ -18,20 +18,16 @@ from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "rate-layers-neurons"
-TITLE, CAPTION = texts(NUMBER)
 RATE = 5e-5
 """The text's."""
 RATES = (5e-6, 2e-5, 5e-5, 1e-4, 2e-4, 3e-4, 5e-4, 1e-3)
 SIZES = ((1,), (2,), (4,), (12,), (30,), (60,), (12, 12), (12, 12, 12))
+_RANDOM: Mapping[str, Any] = {"run.press": 15.0, "controller.weights": "random"}
 SURFACES: Mapping[str, Experiment] = {
-    name: with_values(e, {"run.press": 15.0, "controller.weights": "random"})
-    for name, e in (
-        ("foam", FOAM),
-        ("rubber", RUBBER),
-        ("foam that relaxes", with_values(FOAM, RELAXING_FOAM)),
-    )
+    "foam": with_values(FOAM, _RANDOM),
+    "rubber": with_values(RUBBER, _RANDOM),
+    "foam that relaxes": with_values(FOAM, {**_RANDOM, **RELAXING_FOAM}),
 }
-PARAMETERS = SURFACES
 JUDGED = (10.0, 15.0)
 LONG = 120.0
 """Seconds of contact over which a network's size is tried for a loss [s]."""
@@ -44,8 +40,10 @@ GONE = 3.8
 """Where runs that lost contact are drawn [N]."""
 
 
-@dataclass(frozen=True)
-class Data:
+Case = tuple[Experiment, int]
+
+
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     network: dict[str, dict[float, list[Tracking]]]  # by surface and rate
@@ -58,31 +56,35 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """A sweep over rates on three surfaces, and one over sizes on both foams."""
-    measure = tracking(*JUDGED)
-    network: dict[str, dict[float, list[Tracking]]] = {}
-    pi: dict[str, dict[float, Tracking]] = {}
-    for name, e in SURFACES.items():
-        cases = [(_from(e, seed, rate), seed) for rate in RATES for seed in runs.seeds[:PER_RATE]]
-        found = runs.over(cases, measure)
-        network[name] = {rate: found[i * PER_RATE : (i + 1) * PER_RATE] for i, rate in enumerate(RATES)}
-        plain = [(with_values(e, _pi(rate)), runs.seeds[0]) for rate in RATES]
-        pi[name] = dict(zip(RATES, runs.over(plain, measure), strict=True))
-    sized = [(_with_layers(SURFACES["foam"], size, s), s) for size in SIZES for s in runs.seeds[:PER_SIZE]]
-    errors = runs.over(sized, measure)
-    pressed = [
-        (_with_layers(SURFACES["foam that relaxes"], size, s), s)
-        for size in SIZES
-        for s in runs.seeds[:PER_LOSS]
-    ]
-    lost = runs.map(lambda case: watch(case[0], case[1], LONG, lambda _: None, runs.waiting), pressed)
+
+    def measure(case: Case) -> Tracking:
+        return tracking(*JUDGED)(runs.one(*case))
+
+    def loss(case: Case) -> float | None:
+        return watch(*case, LONG, lambda _: None, runs.waiting)
+
+    def with_rates(e: Experiment) -> dict[float, list[Case]]:
+        return {r: _seeded(runs, PER_RATE, e, {"controller.learning_rate": r}) for r in RATES}
+
+    def with_sizes(surface: str, seeds: int) -> dict[tuple[int, ...], list[Case]]:
+        return {s: _seeded(runs, seeds, SURFACES[surface], {"controller.layers": s}) for s in SIZES}
+
+    first = runs.seeds[0]
+    plain = {name: {r: [(with_values(e, _pi(r)), first)] for r in RATES} for name, e in SURFACES.items()}
     return Data(
-        network,
-        pi,
-        {size: errors[i * PER_SIZE : (i + 1) * PER_SIZE] for i, size in enumerate(SIZES)},
-        {size: lost[i * PER_LOSS : (i + 1) * PER_LOSS] for i, size in enumerate(SIZES)},
+        {name: runs.map_each(measure, with_rates(e)) for name, e in SURFACES.items()},
+        {n: {r: one for r, (one,) in runs.map_each(measure, cases).items()} for n, cases in plain.items()},
+        runs.map_each(measure, with_sizes("foam", PER_SIZE)),
+        runs.map_each(loss, with_sizes("foam that relaxes", PER_LOSS)),
         {name: {s: _errors_of(runs, name, s) for s in ("foam", "rubber")} for name in ARCHITECTURES},
         {name: runs.map(partial(_loss, runs, name), runs.seeds[:PER_RATE]) for name in ARCHITECTURES},
     )
+
+
+def _seeded(runs: Runs, seeds: int, experiment: Experiment, changes: Mapping[str, Any]) -> list[Case]:
+    """The experiment with these changes, with other weights for each of the first so many seeds."""
+    changed = with_values(experiment, changes)
+    return [(with_values(changed, {"controller.weights_seed": s}), s) for s in runs.seeds[:seeds]]
 
 
 def _errors_of(runs: Runs, name: str, surface: str) -> list[Tracking]:
@@ -137,8 +139,7 @@ def _architecture(data: Data, name: str) -> ThesisClaim:
         all(s <= LESS for s in shares.values())
         and all(map(following, found.values()))
         and kept == len(losses),
-        foam=[one.rms for one in found["foam"]],
-        rubber=[one.rms for one in found["rubber"]],
+        **found,
         shares=" and ".join(f"{share:.0%}" for share in shares.values()),
         following="; ".join(f"{s}: {sum(o.follows for o in f)} of {len(f)} follow" for s, f in found.items()),
         gone=", ".join("never" if lost is None else f"{lost:.0f} s" for lost in losses),
@@ -154,13 +155,8 @@ def plot(data: Data) -> Figure:
     for axis, names in zip(grid[0], (("foam", "rubber"), ("foam that relaxes",)), strict=True):
         for name, color in zip(names, style.SERIES[:2], strict=False):
             _rates(axis, data, name, style.FAIL if name == "foam that relaxes" else color)
-        axis.set(
-            xscale="log",
-            xlabel="learning rate eta",
-            ylabel="RMS error [N]",
-            ylim=(0.0, 4.1),
-            xlim=(4e-6, 1.3e-3),
-        )
+        axis.set(xlabel="learning rate eta", xscale="log", xlim=(4e-6, 1.3e-3))
+        axis.set(ylabel="RMS error [N]", ylim=(0.0, 4.1))
         legend_inside(axis, loc="upper center", ncols=len(names), bbox_to_anchor=(0.42, 0.97))
     labels = ["-".join(map(str, size)) for size in SIZES]
     labels += ["radial\nbasis", "recur-\nrent"]
@@ -190,14 +186,6 @@ def _rates(axis: Axes, data: Data, name: str, color: str) -> None:
     axis.plot(list(steady), list(steady.values()), color=color, linewidth=1, alpha=0.6, label=f"{name}: PI")
     axis.plot([], [], "o", color=color, markersize=4, label=f"{name}: network")
     axis.plot([], [], "x", color=color, markersize=7, label=f"{name}: contact lost")
-
-
-def _from(experiment: Experiment, seed: int, rate: float) -> Experiment:
-    return with_values(experiment, {"controller.learning_rate": rate, "controller.weights_seed": seed})
-
-
-def _with_layers(experiment: Experiment, size: tuple[int, ...], seed: int) -> Experiment:
-    return with_values(experiment, {"controller.layers": size, "controller.weights_seed": seed})
 
 
 def _pi(rate: float) -> dict[str, object]:

@@ -1,34 +1,24 @@
 """Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT, LOST
-from palpate.bench.summary import losses
+from palpate.bench.summary import CONTACT, LOST, losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import SHARE
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    VARIED_SEEDS,
-    by_condition,
-    friction_and_pose,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.disturbances import Disturbance, run_with, surface_back
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.look import ZERO, Axes, Figure
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 LOSS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
 GONE, BACK, FOUND = 2.5, 0.005, 10.0
@@ -37,8 +27,7 @@ AGAIN, PEAK = 3.0, 1.25
 """Seconds from regain to the desired force; largest force on the way, over the desired one."""
 
 
-@dataclass(frozen=True)
-class Recovery:
+class Recovery(NamedTuple):
     """Outcome of a lost contact."""
 
     took: float  # from loss to contact [s]; infinite if never
@@ -57,10 +46,8 @@ def found_again(found: Sequence[Recovery]) -> ThesisClaim:
     return claim(
         "contact-regained",
         often(r.well for r in found),
-        took=[r.took for r in found],
-        off=[100 * r.off for r in found],
+        found=found,
         again=AGAIN,
-        peak=[r.peak for r in found],
         within=FOUND,
         share=SHARE,
         limit=PEAK,
@@ -73,12 +60,8 @@ def loss_panel(axis: Axes, one: Record) -> None:
     shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
     lost = one["phase"] != CONTACT
     axis.fill_between(one["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
-    axis.set(
-        xlabel="time since contact [s]",
-        ylabel="true force [N]",
-        xlim=(0.0, LOSS.run.press),
-        ylim=(-0.5, 24.0),
-    )
+    axis.set(xlabel="time since contact [s]", xlim=(0.0, LOSS.run.press))
+    axis.set(ylabel="true force [N]", ylim=(-0.5, 24.0))
     style.legend(axis)
 
 
@@ -103,7 +86,6 @@ def recovery_of(record: Record) -> Recovery:
 
 
 NUMBER = "friction-compensation"
-TITLE, CAPTION = texts(NUMBER)
 LEVEL = (3.0, 0.25, 0.03)
 """Compensated levels [N m]: the Coulomb levels of the bench; the listing's own are doubtful, see the errata."""
 PLAIN = with_values(load("foam-hybrid"), {**SHORT, "controller.ki": 0.0, "run.press": 4.0})
@@ -115,8 +97,7 @@ HALF, SHAKES = 0.5, 5.0
 """Largest share of the error that is left where compensation works; least ratio of shaking that is called a hammer."""
 
 
-@dataclass(frozen=True)
-class Held:
+class Held(NamedTuple):
     """The last second of a press."""
 
     error: float  # of the true force, absolute mean [N]
@@ -124,8 +105,7 @@ class Held:
     factor: float  # largest share of the Coulomb level that the listing's rule would have applied
 
 
-@dataclass(frozen=True)
-class Ratio:
+class Ratio(NamedTuple):
     """With compensation, over without, in the same world."""
 
     error: float
@@ -137,14 +117,13 @@ class Ratio:
         return not self.lost and self.error <= HALF
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
     plain: list[Held]
     printed_blend: list[Held]
-    sweep: list[list[Held]]  # over BLENDS
+    sweep: dict[float, list[Held]]  # by BLENDS
     varied: dict[str, list[Ratio]]
     regains: list[Recovery]
     regain: Record
@@ -154,10 +133,7 @@ def run(runs: Runs) -> Data:
     """Presses without compensation, over blends, in other worlds; and presses whose surface goes."""
     plain = runs.over_seeds(PLAIN, held_in)
     hammer = runs.over_seeds(with_blend(PARAMETERS, PRINTED_BLEND), held_in)
-    few = runs.seeds[:VARIED_SEEDS]
-    cases = [(with_blend(PARAMETERS, b), seed) for b in BLENDS for seed in few]
-    swept = runs.over(cases, held_in)
-    sweep = [swept[i * len(few) : (i + 1) * len(few)] for i in range(len(BLENDS))]
+    sweep = runs.by_name({b: with_blend(PARAMETERS, b) for b in BLENDS}, held_in, VARIED_SEEDS)
     traces = {
         "as printed: never acts": slot(runs.one(PLAIN)),
         "blend 0.002 rad/s, acting": slot(runs.one(with_blend(PARAMETERS, PRINTED_BLEND))),
@@ -169,85 +145,58 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The listing's rule; a blend that acts; the blend of the listing, acting; loss and regain."""
-    return [_never(data), _acting(data), _hammer(data), found_again(data.regains)]
-
-
-def _never(data: Data) -> ThesisClaim:
-    factors = [h.factor for h in data.plain]
-    return claim("friction-compensation.printed", often(f >= 0.9 for f in factors), factors=factors)
-
-
-def _acting(data: Data) -> ThesisClaim:
     nominal = data.varied["foam"]
-    wide = [np.median([h.error for h in found]) for found in data.sweep]
-    best = BLENDS[int(np.argmin(wide))]
-    return claim(
-        "friction-compensation.blend",
-        often(r.helps for r in nominal),
-        error=[100 * r.error for r in nominal],
-        plain=[h.error for h in data.plain],
-        half=HALF,
-        best=best,
-        where=stops_holding(data.varied, lambda r: r.helps),
-    )
-
-
-def _hammer(data: Data) -> ThesisClaim:
-    still = [h.shaking for h in data.plain]
-    shares = [h.shaking / p for h, p in zip(data.printed_blend, still, strict=True)]
-    return claim(
-        "friction-compensation.hammer",
-        often(s >= SHAKES for s in shares),
-        shaking=[h.shaking for h in data.printed_blend],
-        still=still,
-        error=[h.error for h in data.printed_blend],
-        shakes=SHAKES,
-    )
+    best = min(BLENDS, key=lambda blend: np.median([h.error for h in data.sweep[blend]]))
+    pairs = zip(data.printed_blend, data.plain, strict=True)
+    return [
+        claim("friction-compensation.printed", often(h.factor >= 0.9 for h in data.plain), plain=data.plain),
+        claim(
+            "friction-compensation.blend",
+            often(r.helps for r in nominal),
+            nominal=nominal,
+            plain=data.plain,
+            half=HALF,
+            best=best,
+            where=stops_holding(data.varied, lambda r: r.helps),
+        ),
+        claim(
+            "friction-compensation.hammer",
+            often(h.shaking / p.shaking >= SHAKES for h, p in pairs),
+            printed=data.printed_blend,
+            plain=data.plain,
+            shakes=SHAKES,
+        ),
+        found_again(data.regains),
+    ]
 
 
 def plot(data: Data) -> Figure:
     """The press, the blends, the worlds, the loss."""
     drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
     wide = [across(grid[i]) for i in (0, 2, 3)]
-    for (name, one), color in zip(data.traces.items(), style.SERIES[:3], strict=True):
-        wide[0].plot(one["t"], one["force"], color=color, linewidth=1.0, label=name)
+    for name, one in data.traces.items():
+        wide[0].plot(one["t"], one["force"], linewidth=1.0, label=name)
     wide[0].axhline(20.0, **style.KNOWN)
-    wide[0].set(
-        xlabel="time since contact [s]",
-        ylabel="true force [N]",
-        xlim=(0.0, PLAIN.run.press),
-        ylim=(14.0, 23.0),
-    )
+    wide[0].set(xlabel="time since contact [s]", xlim=(0.0, PLAIN.run.press))
+    wide[0].set(ylabel="true force [N]", ylim=(14.0, 23.0))
     style.legend(wide[0])
     _blend_panel(grid[1][0], data, lambda h: h.error, "force error [N]")
     _blend_panel(grid[1][1], data, lambda h: h.shaking, "shaking of the force [N]")
-    dots_panel(
-        wide[1],
-        data.varied,
-        lambda r: 100 * r.error,
-        lambda r: r.helps,
-        limit=100 * HALF,
-        label="error left [%]",
-        title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half",
+    dots_panel(wide[1], data.varied, lambda r: 100 * r.error, lambda r: r.helps, 100 * HALF)
+    wide[1].set(
+        ylabel="error left [%]", title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half"
     )
     loss_panel(wide[2], data.regain)
     return drawing
 
 
 def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: str) -> None:
-    for blend, found in zip(BLENDS, data.sweep, strict=True):
+    for blend, found in data.sweep.items():
         axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.SERIES[0], markersize=4)
-    axis.axhline(
-        np.median([value(h) for h in data.plain]), color=style.MEASURED, linewidth=1.2, label="without"
-    )
-    for i, quantum in enumerate(_quanta()[:2]):
-        axis.axvline(
-            quantum,
-            color=style.MEASURED,
-            linewidth=0.9,
-            linestyle=":",
-            label="one count a tick" if i == 0 else None,
-        )
+    without = np.median([value(h) for h in data.plain])
+    axis.axhline(without, color=style.MEASURED, linewidth=1.2, label="without")
+    for quantum, name in zip(_quanta(), ("one count a tick", None), strict=False):
+        axis.axvline(quantum, **ZERO, linestyle=":", label=name)
     axis.set_xscale("log")
     axis.set_ylim(bottom=0.0)
     axis.set(xlabel="blend [rad/s]", ylabel=label)
@@ -265,22 +214,14 @@ def with_blend(experiment: Experiment, blend: float) -> Experiment:
     return with_values(experiment, {"compensation.blend": (blend, blend, blend)})
 
 
-def _worlds() -> dict[str, Mapping[str, Any]]:
-    return {
-        "foam": {},
-        "rubber": RUBBER_SURFACE,
-        "relaxing\nfoam": RELAXING_FOAM,
-        **friction_and_pose(PLAIN),
-    }
-
-
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
     def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
         without = held_in(runs.one(with_values(PLAIN, world), seed))
         compensated = runs.one(with_values(PARAMETERS, world), seed)
         return Ratio(held_in(compensated).error / without.error, losses(compensated) > 0)
 
-    return by_condition(runs, _worlds(), ratio, {"foam"})
+    worlds = SURFACES
+    return by_condition(runs, {**worlds, **friction_and_pose(PLAIN)}, ratio, {"foam"})
 
 
 def held_in(record: Record) -> Held:

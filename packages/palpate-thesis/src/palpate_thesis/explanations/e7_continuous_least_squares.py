@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,19 +14,17 @@ from palpate.identifiers import RecursiveLeastSquares
 from palpate.identifiers.estimator import LARGEST, NAMES, VAGUE
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.force_control.panels import panels
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "continuous-least-squares"
-TITLE, CAPTION = texts(NUMBER)
 SURFACES: Mapping[str, Experiment] = {
-    name: with_values(e, {"run.press": press_runs.FIRST})
-    for name, e in (("foam", press_runs.PLAIN), ("rubber", press_runs.RUBBER))
+    "foam": with_values(press_runs.PLAIN, {"run.press": press_runs.FIRST}),
+    "rubber": with_values(press_runs.RUBBER, {"run.press": press_runs.FIRST}),
 }
-PARAMETERS = SURFACES
 TICK = 1e-3
 START = (0.0, 0.0, 2e5)
 LARGE = (1e10, 1e10, 1e10)
@@ -40,8 +37,7 @@ SAME, RIGHT = 0.02, 0.10
 KEYS = "MBK"
 
 
-@dataclass(frozen=True)
-class BothIdentifiers:
+class BothIdentifiers(NamedTuple):
     """One press: both identifiers on the same samples, and Euler's steps of the continuous one's equations."""
 
     recursive: Array  # M, B, K after each sample, shape (k, 3)
@@ -100,7 +96,7 @@ def by_euler(phi: Array, force: Array, scale: Sequence[float]) -> Array:
 
 def run(runs: Runs) -> dict[str, list[BothIdentifiers]]:
     """One press a seed on each surface."""
-    return {name: runs.over_seeds(e, compare) for name, e in SURFACES.items()}
+    return runs.by_name(SURFACES, compare)
 
 
 def check(data: Mapping[str, Sequence[BothIdentifiers]]) -> Sequence[ThesisClaim]:
@@ -156,24 +152,18 @@ def plot(data: Mapping[str, Sequence[BothIdentifiers]]) -> Figure:
     """M, B and K of both over time; K by Euler's steps over the size of P(0)."""
     drawing, grid = panels([1.9, 1.9, 2.2], 2, 11.0)
     cells = [axis for row in grid for axis in row]
-    colors = dict(zip(data, style.SERIES, strict=False))
-    for name, found in data.items():
-        one, color = found[0], colors[name]
-        t = TICK * np.arange(len(one.continuous))
-        for axis, i in zip(cells, (2, 1, 0), strict=False):
-            scale = 1e-3 if i == 2 else 1.0
-            axis.plot(
-                t[30:], scale * one.recursive[30:, i], color=color, linewidth=2.6, alpha=0.3, label=name
-            )
-            axis.plot(t[30:], scale * one.continuous[30:, i], color=style.INK, linewidth=0.8)
-        cells[3].semilogy(
-            t[30:], np.abs(one.continuous / one.recursive - 1.0)[30:, 2], color=color, linewidth=1.0
-        )
+    for (name, (one, *_)), color in zip(data.items(), style.SERIES, strict=False):
+        recursive, continuous = one.recursive[30:], one.continuous[30:]
+        t = TICK * np.arange(30, len(one.continuous))
+        for axis, i, scale in zip(cells, (2, 1, 0), (1e-3, 1.0, 1.0), strict=False):
+            axis.plot(t, scale * recursive[:, i], color=color, linewidth=2.6, alpha=0.3, label=name)
+            axis.plot(t, scale * continuous[:, i], color=style.INK, linewidth=0.8)
+        apart = np.abs(continuous / recursive - 1.0)[:, 2]
+        cells[3].semilogy(t, apart, color=color, linewidth=1.0)
         for axis, shape in zip(cells[4:], SCALES, strict=True):
             axis.loglog(SIZES, one.euler[shape], "o-", color=color, linewidth=1.0, markersize=4, label=name)
-    for axis, label in zip(
-        cells, ("$K_e$ [kN/m]", "$B_e$ [N s/m]", "$M_e$ [kg]", "difference in $K_e$"), strict=False
-    ):
+    labels = ("$K_e$ [kN/m]", "$B_e$ [N s/m]", "$M_e$ [kg]", "difference in $K_e$")
+    for axis, label in zip(cells, labels, strict=False):
         axis.set(ylabel=label, xlabel="time since 5 N [s]", xlim=(0.0, press_runs.FIRST))
     cells[0].set_title("pale: recursive; dark: continuous")
     cells[3].set_title("as a share")

@@ -1,9 +1,8 @@
 """Explanation 8: networks that approach the environment and recognise the contact with it (after Fukuda et al.)."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,16 +13,14 @@ from palpate.networks import Network, NetworkState, network, random_layers
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.force_control.panels import panels
-from palpate_thesis.look import Figure
+from palpate_thesis.look import LIMIT_LINE, Figure
 from palpate_thesis.one_joint import JOINT_2, one_joint
 from palpate_thesis.runs import Runs
 
 NUMBER = "contact-network"
-TITLE, CAPTION = texts(NUMBER)
 SURFACES = {"foam": KelvinVoigt(5200.0, 200.0, 0.10), "rubber": KelvinVoigt(34500.0, 480.0, 0.05)}
-PARAMETERS = SURFACES
 TICK, LEVER = 1e-3, JOINT_2.lever
 TIP = JOINT_2.inertia / LEVER**2
 """Mass of the joint at its tip [kg]."""
@@ -178,8 +175,7 @@ def approach(surface: KelvinVoigt, part: ApproachByNetwork, seed: int) -> Record
     return one_joint(surface, part, schedule, steps=10).run(duration, seed, gap=GAP)
 
 
-@dataclass(frozen=True)
-class Arrival:
+class Arrival(NamedTuple):
     """How an approach ended."""
 
     time: float  # to the first touch [s]
@@ -196,8 +192,7 @@ def arrival(record: Record) -> Arrival:
     return Arrival(TICK * touched, told < touched, felt, float(force[touched : touched + 500].max()))
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`; arrivals by surface, one a seed."""
 
     shown: dict[str, tuple[ApproachByNetwork, Record]]  # of the first seed
@@ -233,25 +228,6 @@ def run(runs: Runs) -> Data:
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Recognising, surface by surface; and the time of an approach that is gentle enough."""
     quiet = [f for f, some in data.lower.items() if often(not a.early for a in some)]
-    return [*(_recognises(data, name, min(quiet, default=SWITCH)) for name in SURFACES), _efficient(data)]
-
-
-def _recognises(data: Data, name: str, quiet: float) -> ThesisClaim:
-    pairs = list(zip(data.found[name], data.by_switch[name], strict=True))
-    return claim(
-        f"{NUMBER}.{name}",
-        often(not a.early and a.felt <= HALF * b.felt for a, b in pairs),
-        surface=name,
-        felt=[a.felt for a, _ in pairs],
-        switched=[b.felt for _, b in pairs],
-        early=sum(a.early for a, _ in pairs),
-        runs=len(pairs),
-        half=HALF,
-        quiet=quiet,
-    )
-
-
-def _efficient(data: Data) -> ThesisClaim:
     gentle = {
         name: max((v for v, some in by.items() if often(a.most <= MOST for a in some)), default=np.nan)
         for name, by in data.constant.items()
@@ -260,24 +236,38 @@ def _efficient(data: Data) -> ThesisClaim:
         name: float(np.median([a.time for a in data.constant[name].get(v, [])] or [np.inf]))
         for name, v in gentle.items()
     }
-    own = {name: [a.time for a in some] for name, some in data.found.items()}
-    return claim(
-        f"{NUMBER}.efficient",
-        all(
-            often(a.most <= MOST and a.time <= HALF * times[name] for a in some)
-            for name, some in data.found.items()
+    return [
+        *(_recognises(data, name, min(quiet, default=SWITCH)) for name in SURFACES),
+        claim(
+            f"{NUMBER}.efficient",
+            all(
+                often(a.most <= MOST and a.time <= HALF * times[name] for a in some)
+                for name, some in data.found.items()
+            ),
+            **data.found,
+            gentle="; ".join(f"{n} {times[n]:.2g} s at {1e3 * v:.2g} mm/s" for n, v in gentle.items()),
+            thesis=float(np.median([a.time for a in data.constant["foam"][SPEEDS[0]]])),
+            half=HALF,
+            most=MOST,
+            stray=1e3 * STRAY,
+            gap=1e3 * GAP,
+            lessons=LESSONS,
         ),
-        foam=own["foam"],
-        rubber=own["rubber"],
-        gentle="; ".join(f"{n} {times[n]:.2g} s at {1e3 * v:.2g} mm/s" for n, v in gentle.items()),
-        foam_most=[a.most for a in data.found["foam"]],
-        rubber_most=[a.most for a in data.found["rubber"]],
-        thesis=float(np.median([a.time for a in data.constant["foam"][SPEEDS[0]]])),
+    ]
+
+
+def _recognises(data: Data, name: str, quiet: float) -> ThesisClaim:
+    pairs = list(zip(data.found[name], data.by_switch[name], strict=True))
+    return claim(
+        f"{NUMBER}.{name}",
+        often(not a.early and a.felt <= HALF * b.felt for a, b in pairs),
+        surface=name,
+        found=data.found[name],
+        switched=data.by_switch[name],
+        early=sum(a.early for a, _ in pairs),
+        runs=len(pairs),
         half=HALF,
-        most=MOST,
-        stray=1e3 * STRAY,
-        gap=1e3 * GAP,
-        lessons=LESSONS,
+        quiet=quiet,
     )
 
 
@@ -293,26 +283,22 @@ def plot(data: Data) -> Figure:
         grid[0][1].plot(since, record["force_measured"][near], color=color, linewidth=0.7, alpha=0.6)
         grid[0][1].plot(since, record["force"][near], color=color, linewidth=1.4, label=name)
         by = data.constant[name]
-        middle = [
-            [float(np.median([getattr(a, k) for a in some])) for some in by.values()]
-            for k in ("time", "most")
-        ]
-        grid[1][0].loglog(
-            *middle, "o-", color=color, linewidth=1.0, markersize=3, label=f"{name}, constant speeds"
-        )
+        times, most = np.median([[(a.time, a.most) for a in some] for some in by.values()], axis=1).T
+        line: Any = {"linewidth": 1.0, "markersize": 3, "label": f"{name}, constant speeds"}
+        grid[1][0].loglog(times, most, "o-", color=color, **line)
         own = data.found[name]
         grid[1][0].plot([a.time for a in own], [a.most for a in own], "x", color=color, markersize=6)
     grid[0][0].set(xlabel="time [s]", ylabel="depth [mm]", xlim=(0.0, 2.0))
     grid[0][1].axhline(SWITCH, **style.KNOWN)
     grid[0][1].set(xlabel="time since recognised [ms]", ylabel="force [N]", ylim=(-2.5, 8.0))
     grid[0][1].set_title("true force, and pale as measured; dashed: the switch")
-    grid[1][0].axhline(MOST, color=style.INK, linewidth=1, linestyle="--")
+    grid[1][0].axhline(MOST, **LIMIT_LINE)
     grid[1][0].set(xlabel="time to the first touch [s]", ylabel="largest force [N]")
     grid[1][0].set_title("crosses: networks; dashed: gentle enough")
     share = [100 * np.mean([a.early for a in some]) for some in data.lower.values()]
     grid[1][1].plot(SWITCHES, share, "o-", color=style.FAIL, markersize=4)
     early = [a.early for some in data.found.values() for a in some]
-    grid[1][1].axhline(100 * sum(early) / len(early), color=style.INK, linewidth=1, linestyle="--")
+    grid[1][1].axhline(100 * sum(early) / len(early), **LIMIT_LINE)
     grid[1][1].set(xlabel="switch [N]", ylabel="in free motion [%]")
     grid[1][1].set_title("recognised before the touch, by a switch; dashed: by the network")
     for axis in (grid[0][0], grid[1][0]):

@@ -1,7 +1,6 @@
 """Explanation 9: a network is the model of a nonlinear environment, and its local slopes tune the controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, clip
 from palpate.arrays import Array
 from palpate.bench import Experiment, build, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.controllers.controller import controller
 from palpate.controllers.decoupled_hybrid import decoupled_hybrid
 from palpate.controllers.resolved_acceleration import position_command
@@ -19,7 +18,7 @@ from palpate.networks import Network, NetworkState, network
 from palpate.networks.network import backward
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import SHORT
 from palpate_thesis.explanations.e8_contact_network import fit
 from palpate_thesis.force_control.panels import across, panels
@@ -29,19 +28,13 @@ from palpate_thesis.neural_identifier.network import STIFFENING
 from palpate_thesis.runs import Runs
 
 NUMBER = "model-tunes"
-TITLE, CAPTION = texts(NUMBER)
 PI = {"foam": {"kf": 1.0, "ki": 3.0}, "rubber": {"kf": 0.25, "ki": 1.5}}
 """The thesis' gains, under which the surface is identified."""
+_RICH = {"first": 18.0, "second": 8.0, "period": 1.0, "amplitude": 2.0, "frequency": 3.0}
 PARAMETERS: Mapping[str, Experiment] = {
     name: with_values(
-        load("foam-decoupled"),
-        {
-            **SHORT,
-            "run.press": 10.0,
-            "surface": surface,
-            "controller": {"kind": "proportional-integral", **PI[name]},
-            "force": {"first": 18.0, "second": 8.0, "period": 1.0, "amplitude": 2.0, "frequency": 3.0},
-        },
+        with_values(load("foam-decoupled"), {**SHORT, "run.press": 10.0, "force": _RICH}),
+        {"surface": surface, "controller": {"kind": "proportional-integral", **PI[name]}},
     )
     for name, surface in STIFFENING.items()
 }
@@ -54,6 +47,7 @@ SEEN = 0.15
 SIZES, OPTIONS = (2, 6, 1), {"amplitude": 40.0, "rate": 1e-4, "epochs": 300}
 """Depth and rate in, the force out; the thesis' amplitude and learning rate."""
 HALF = 0.5
+MODELS = ("network", "line")
 ONE = Vec3(1.0, 1.0, 1.0)
 
 
@@ -127,8 +121,7 @@ def input_slope(net, memory, i):
     return total
 
 
-@dataclass(frozen=True)
-class Tuned:
+class Tuned(NamedTuple):
     """One surface and seed: both models, and the responses under each."""
 
     forces: Array  # at which the slopes are looked at [N]
@@ -176,15 +169,17 @@ def tune(experiment: Experiment, seed: int) -> Tuned:
     for name, one in found.items():
         memory = one.start().network
         slopes[name] = np.array([one.slopes(memory, wall + d, 0.0)[0] for d in depth])
-    responses: dict[str, dict[str, Array]] = {}
-    ends = []
-    for name, one in found.items():
-        for level, (first, second) in LEVELS.items():
-            asked = {"force": {"first": first, "second": second, "period": 1.0}}
-            record = build(with_values(experiment, asked)).with_controller(one).run(60.0, seed, press=10.0)
-            ends.append(record.meta["end"] != "done")
-            responses.setdefault(name, {})[level] = response(record)
-    return Tuned(forces, slopes, responses, any(ends))
+    benches = {
+        level: build(with_values(experiment, {"force": {"first": high, "second": low, "period": 1.0}}))
+        for level, (high, low) in LEVELS.items()
+    }
+    records = {
+        name: {n: bench.with_controller(one).run(60.0, seed, press=10.0) for n, bench in benches.items()}
+        for name, one in found.items()
+    }
+    responses = {name: {n: response(r) for n, r in by.items()} for name, by in records.items()}
+    ends = [record.meta["end"] for by in records.values() for record in by.values()]
+    return Tuned(forces, slopes, responses, any(end != "done" for end in ends))
 
 
 def response(record: Record) -> Array:
@@ -208,15 +203,12 @@ def check(data: Mapping[str, Sequence[Tuned]]) -> Sequence[ThesisClaim]:
     wrong = {
         f"{name}_{model}": [100 * one.wrong(model) for one in found]
         for name, found in data.items()
-        for model in ("network", "line")
+        for model in MODELS
     }
     slopes = all(
         often(o.wrong("network") <= HALF * o.wrong("line") for o in found) for found in data.values()
     )
-    return [
-        claim(f"{NUMBER}.slopes", slopes, half=HALF, **wrong),
-        *(_alike(name, data[name]) for name in data),
-    ]
+    return [claim(f"{NUMBER}.slopes", slopes, half=HALF, **wrong), *map(_alike, data, data.values())]
 
 
 def _alike(name: str, found: Sequence[Tuned]) -> ThesisClaim:
@@ -224,9 +216,8 @@ def _alike(name: str, found: Sequence[Tuned]) -> ThesisClaim:
         f"{NUMBER}.{name}",
         often(not one.lost and one.apart("network") <= HALF * one.apart("line") for one in found),
         surface=name,
-        network=[100 * one.apart("network") for one in found],
-        line=[100 * one.apart("line") for one in found],
-        furthest=", ".join(f"{model} {_furthest(found, model)}" for model in ("network", "line")),
+        **{model: [100 * one.apart(model) for one in found] for model in MODELS},
+        furthest=", ".join(f"{model} {_furthest(found, model)}" for model in MODELS),
         half=HALF,
         seen=1e3 * SEEN,
     )
@@ -242,21 +233,20 @@ def _furthest(found: Sequence[Tuned], model: str) -> str:
 def plot(data: Mapping[str, Sequence[Tuned]]) -> Figure:
     """Stiffness over the force; responses at both levels; how far apart they are."""
     drawing, grid = panels([2.4, 2.4, 1.5], 2, 11.0)
-    colors = dict(zip(("network", "line"), style.SERIES, strict=False))
+    colors = dict(zip(MODELS, style.SERIES, strict=False))
     apart = across(grid[2])
     for (slopes, answers), (name, found) in zip(grid, data.items(), strict=False):
         one = found[0]
         slopes.plot(one.forces, 1e-3 * one.slopes["true"], **style.KNOWN, label="true")
         for model, color in colors.items():
-            for other in found:
-                slopes.plot(one.forces, 1e-3 * other.slopes[model], color=color, linewidth=0.5, alpha=0.5)
+            every = 1e-3 * np.array([other.slopes[model] for other in found]).T
+            slopes.plot(one.forces, every, color=color, linewidth=0.5, alpha=0.5)
             slopes.plot(one.forces, 1e-3 * one.slopes[model], color=color, linewidth=1.2, label=model)
             for (level, y), line in zip(one.responses[model].items(), ("-", ":"), strict=True):
                 label = f"{model}, {level}"
                 answers.plot(np.arange(len(y)), y, line, color=color, linewidth=1.3, label=label)
-            values = [100 * o.apart(model) for o in found]
-            row = [f"{name}, {model}"] * len(values)
-            apart.plot(values, row, "o", color=color, markersize=4, alpha=0.7)
+            row = [f"{name}, {model}"] * len(found)
+            apart.plot([100 * o.apart(model) for o in found], row, "o", color=color, markersize=4, alpha=0.7)
         slopes.set(xlabel="force [N]", ylabel=f"{name}: stiffness [kN/m]")
         answers.set(xlabel="time since a step [ms]", ylabel="share of the step", xlim=(0.0, 1e3 * SEEN))
         answers.axhline(1.0, color=style.INK, linewidth=0.7)

@@ -1,36 +1,27 @@
 """Figure 2.1: Raibert and Craig's hybrid controller, without dynamics, beside the one with dynamics."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate._vector import Vec3
 from palpate.arrays import Array, Mask
-from palpate.bench import load, with_values
+from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import losses
 from palpate.controllers import RaibertCraig
 from palpate.controllers.raibert_craig import growth_rate
 from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    friction_and_pose,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, stops_holding
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "2.1"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
 DYNAMIC = {"controller": {"kind": "proportional-integral", "kp": 400.0, "kv": 80.0, "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam; the original: the same for the force, 400 and 80 inertias for its joints."""
@@ -43,8 +34,7 @@ XS, YS = np.linspace(0.10, 0.53, 65), np.linspace(-0.35, 0.35, 51)
 LAWS = ("without dynamics", "with dynamics")
 
 
-@dataclass(frozen=True)
-class StepResponse:
+class StepResponse(NamedTuple):
     """How a run answered its steps of force."""
 
     overshoot: float  # over the size of the step, mean over the steps
@@ -52,8 +42,7 @@ class StepResponse:
     lost: int
 
 
-@dataclass(frozen=True)
-class BothLaws:
+class BothLaws(NamedTuple):
     """Both laws in the same world."""
 
     original: StepResponse
@@ -71,8 +60,7 @@ class BothLaws:
         return self.original.lost > 0 or (more and self.phi >= WORSE)
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
@@ -83,13 +71,13 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Both laws in each world; the original's growth at each posture."""
-    surfaces = {"foam": {}, "rubber": RUBBER_SURFACE, "relaxing\nfoam": RELAXING_FOAM}
+    surfaces = SURFACES
     worlds = {n: with_values(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
-    original = by_condition(runs, worlds, lambda e, s: _measure(runs.one(e, s)), {"foam"})
-    dynamic = by_condition(
-        runs, worlds, lambda e, s: _measure(runs.one(with_values(e, DYNAMIC), s)), {"foam"}
-    )
-    varied = {n: [BothLaws(a, b) for a, b in zip(original[n], dynamic[n], strict=True)] for n in worlds}
+
+    def both(e: Experiment, seed: int) -> BothLaws:
+        return BothLaws(*(_measure(runs.one(law, seed)) for law in (e, with_values(e, DYNAMIC))))
+
+    varied = by_condition(runs, worlds, both, {"foam"})
     traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(with_values(PARAMETERS, DYNAMIC)))}
     growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
@@ -98,50 +86,42 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Problems of the original, and what leaving out the dynamics does."""
-    return [_problems(data), _dynamics(data)]
-
-
-def _problems(data: Data) -> ThesisClaim:
     reach = np.isfinite(data.growth)
     share = float((data.growth[reach] > GROWS).mean())
     always = float((data.any_gain[reach] > GROWS).mean())
     line = data.growth[np.argmin(np.abs(YS))]
-    return claim(
-        "original-hybrid.problems",
-        always > 0.0,
-        share=share,
-        postures=reach.sum(),
-        always=always,
-        fastest=np.nanmax(data.growth),
-        grows=GROWS,
-        occurs="it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too",
-    )
+    foam = data.varied["foam"]
+    return [
+        claim(
+            "original-hybrid.problems",
+            always > 0.0,
+            share=share,
+            postures=reach.sum(),
+            always=always,
+            fastest=np.nanmax(data.growth),
+            grows=GROWS,
+            occurs="it does not occur" if not (line[np.isfinite(line)] > GROWS).any() else "it occurs, too",
+        ),
+        claim(
+            "original-hybrid.dynamics",
+            often(p.worse for p in foam),
+            foam=foam,
+            worse=WORSE,
+            lost=_losses_in_words(data),
+            where=stops_holding(data.varied, lambda p: p.worse),
+        ),
+    ]
 
 
 def _losses_in_words(data: Data) -> str:
     """Where contact was lost, in words."""
     told = [
-        f"{name} ({sum(p.original.lost > 0 for p in v)} of {len(v)} runs of the original, "
+        f"{on_one_line(name)} ({sum(p.original.lost > 0 for p in v)} of {len(v)} runs of the original, "
         f"{sum(p.dynamic.lost > 0 for p in v)} of (4.13))"
-        for name, v in ((n.replace(chr(10), " "), v) for n, v in data.varied.items())
+        for name, v in data.varied.items()
         if any(p.original.lost or p.dynamic.lost for p in v)
     ]
     return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
-
-
-def _dynamics(data: Data) -> ThesisClaim:
-    foam = data.varied["foam"]
-    return claim(
-        "original-hybrid.dynamics",
-        often(p.worse for p in foam),
-        original_overshoot=[100 * p.original.overshoot for p in foam],
-        dynamic_overshoot=[100 * p.dynamic.overshoot for p in foam],
-        original_phi=[p.original.phi for p in foam],
-        dynamic_phi=[p.dynamic.phi for p in foam],
-        worse=WORSE,
-        lost=_losses_in_words(data),
-        where=stops_holding(data.varied, lambda p: p.worse),
-    )
 
 
 def plot(data: Data) -> Figure:
@@ -150,22 +130,15 @@ def plot(data: Data) -> Figure:
     for row, name in zip(grid[:2], ("force", "phi"), strict=True):
         _over_time(across(row), data, name)
     _map_panel(drawing, grid[2][0], data)
-    dots_panel(
-        grid[2][1],
-        data.varied,
-        lambda p: 100 * p.phi,
-        lambda p: p.worse,
-        limit=100 * WORSE,
-        label="ratio [%]",
-        title="stray of the angle; a dot: worse in this and in overshoot",
-    )
+    dots_panel(grid[2][1], data.varied, lambda p: 100 * p.phi, lambda p: p.worse, 100 * WORSE)
+    grid[2][1].set(ylabel="ratio [%]", title="stray of the angle; a dot: worse in this and in overshoot")
     return drawing
 
 
 def _over_time(axis: Axes, data: Data, name: str) -> None:
-    for (law, trace), color in zip(data.traces.items(), style.SERIES[:2], strict=True):
+    for law, trace in data.traces.items():
         values = np.degrees(trace["phi"]) if name == "phi" else trace[name]
-        axis.plot(trace["t"], values, color=color, linewidth=1.1, label=law)
+        axis.plot(trace["t"], values, linewidth=1.1, label=law)
     axis.set_xlim(0.0, PARAMETERS.run.press)
     if name == "force":
         first = next(iter(data.traces.values()))
@@ -181,16 +154,9 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
     mesh = axis.pcolormesh(XS, YS, shown, cmap="OrRd", vmin=0.0, vmax=20.0, shading="nearest")
     drawing.colorbar(mesh, ax=axis, pad=0.02, label="[1/s], up to 20 and more")
     axis.plot([0.40, 0.49], [0.0, 0.0], color=style.SERIES[0], linewidth=2.5)
-    axis.annotate(
-        "experiments",
-        (0.40, 0.0),
-        (-22, -14),
-        textcoords="offset points",
-        fontsize=8.5,
-        color=style.SERIES[0],
-    )
-    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    axis.set_title("growth of the original")
+    words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8.5, "color": style.SERIES[0]}
+    axis.annotate("experiments", (0.40, 0.0), (-22, -14), **words)
+    axis.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title="growth of the original")
 
 
 def growth_over(gain: float, where: Mask) -> Array:
@@ -198,9 +164,7 @@ def growth_over(gain: float, where: Mask) -> Array:
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)
     table: Any = PARAMETERS.controller
-    stiffness, damping = (
-        k * Vec3(*map(float, v)) for k, v in ((gain, table.stiffness), (np.sqrt(gain), table.damping))
-    )
+    stiffness, damping = gain * Vec3(*table.stiffness), np.sqrt(gain) * Vec3(*table.damping)
     law = RaibertCraig(stiffness, damping, 0.0 * damping, table.kf, table.ki, table.feed_forward, 1e-3)
     found = np.full((len(YS), len(XS)), np.nan)
     for i, y in enumerate(YS):

@@ -1,8 +1,7 @@
 """Figure 2.2: impedance control; the arm's estimated mass, damper and spring against the target."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,16 +13,8 @@ from palpate.controllers import Impedance
 from palpate.controllers.any_controller import AnyController
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    friction_and_pose,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Change, Disturbance, run_with
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
@@ -31,7 +22,6 @@ from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "2.2"
-TITLE, CAPTION = texts(NUMBER)
 DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
 """Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
 PARAMETERS = with_values(
@@ -44,8 +34,7 @@ TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 """In x; the same numbers as in PARAMETERS [N/m, N s/m, kg]."""
 
 
-@dataclass(frozen=True)
-class ArmImpedance:
+class ArmImpedance(NamedTuple):
     """Estimated impedance of the arm over its target."""
 
     K: float  # slope of force over displacement at the ends of the intervals
@@ -58,8 +47,7 @@ class ArmImpedance:
         return self.lost == 0 and abs(getattr(self, name) - 1.0) <= TOLERANCES[name]
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: dict[str, Record]
@@ -70,7 +58,7 @@ def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under varied conditions."""
     worlds = _worlds()
     varied = by_condition(runs, worlds, lambda e, s: found_in(record_jumps(e, s)), _ALL)
-    rough, free = (record_jumps(worlds[name], runs.seeds[0]) for name in ("foam", "hardly any\nfriction"))
+    rough, free = (record_jumps(worlds[name], runs.seeds[0]) for name in ("foam", _FREE))
     traces = {
         "with friction": slot(rough),
         "hardly any friction": slot(free),
@@ -85,13 +73,11 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def _claim(data: Data, name: str) -> ThesisClaim:
-    foam, rubber = (data.varied[surface] for surface in _ALL)
+    found = {surface: [getattr(f, name) for f in data.varied[surface]] for surface in (*_ALL, _FREE)}
     return claim(
         f"impedance-holds.{name}",
-        all(often(f.within(name) for f in found) for found in (foam, rubber)),
-        foam=[100 * getattr(f, name) for f in foam],
-        rubber=[100 * getattr(f, name) for f in rubber],
-        free=[100 * getattr(f, name) for f in data.varied["hardly any\nfriction"]],
+        all(often(f.within(name) for f in data.varied[surface]) for surface in _ALL),
+        **{surface.split(" ")[0]: [100 * f for f in some] for surface, some in found.items()},
         tolerance=TOLERANCES[name],
         where=stops_holding(data.varied, lambda f: f.within(name)),
     )
@@ -100,9 +86,8 @@ def _claim(data: Data, name: str) -> ThesisClaim:
 def plot(data: Data) -> Figure:
     """The force over time, and the estimates under each condition."""
     drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
-    colors = style.SERIES[:3]
-    for (name, one), color in zip(data.traces.items(), colors, strict=True):
-        grid[0][0].plot(one["t"], one["force"], color=color, linewidth=1.2, label=name)
+    for name, one in data.traces.items():
+        grid[0][0].plot(one["t"], one["force"], linewidth=1.2, label=name)
     grid[0][0].set(xlabel="time since contact [s]", ylabel="force [N]", xlim=(0.0, len(DEPTHS)))
     style.legend(grid[0][0])
     for name, (axis,) in zip(("K", "B", "M"), grid[1:], strict=True):
@@ -111,32 +96,27 @@ def plot(data: Data) -> Figure:
 
 
 def _share_panel(axis: Axes, data: Data, name: str) -> None:
-    dots_panel(
-        axis,
-        data.varied,
-        lambda f: 100 * getattr(f, name),
-        lambda f: f.within(name),
-        limit=100.0,
-        label=f"{name} [%]",
-        title=(
-            f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
-            "target"
-        ),
+    dots_panel(axis, data.varied, lambda f: 100 * getattr(f, name), lambda f: f.within(name), 100.0)
+    axis.set(
+        ylabel=f"{name} [%]",
+        title=f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
+        "target",
     )
     values = [100 * getattr(f, name) for runs in data.varied.values() for f in runs]
     axis.set_ylim(min(0.0, 1.1 * min(values)), 1.1 * max(120.0, *values))
 
 
 _ALL = ("foam", "rubber")
+_FREE = "hardly any\nfriction"
 
 
 def _worlds() -> dict[str, Experiment]:
     return {
         "foam": PARAMETERS,
-        "rubber": with_values(PARAMETERS, RUBBER_SURFACE),
-        "hardly any\nfriction": with_values(PARAMETERS, FREE),
+        "rubber": with_values(PARAMETERS, SURFACES["rubber"]),
+        _FREE: with_values(PARAMETERS, FREE),
         **{name: with_values(PARAMETERS, by) for name, by in friction_and_pose(PARAMETERS).items()},
-        "relaxing\nfoam": with_values(PARAMETERS, RELAXING_FOAM),
+        "relaxing\nfoam": with_values(PARAMETERS, SURFACES["relaxing\nfoam"]),
     }
 
 

@@ -1,9 +1,8 @@
 """Figures 2.3 and 2.4: one joint under a neural network alone, the direct scheme."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,26 +14,23 @@ from palpate.references import ForceSchedule
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT, SHARE
 from palpate_studies.metrics.window import SETTLE, rms
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
-from palpate_thesis.conditions import VARIED_SEEDS, stops_holding
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.conditions import by_condition, stops_holding
 from palpate_thesis.force_control.panels import across, dots_panel, panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 from palpate_thesis.one_joint import (
     JOINT_FRICTION,
     DirectIntegral,
-    DirectNeural,
     Link,
     direct_neural,
     one_joint,
 )
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 NUMBER = "2.4"
-TITLE, CAPTION = texts(NUMBER)
 
 
-@dataclass(frozen=True)
-class JointWorld:
+class JointWorld(NamedTuple):
     """The joint's surface and friction."""
 
     surface: KelvinVoigt | StandardLinearSolid
@@ -47,19 +43,15 @@ class JointWorld:
 FOAM, RUBBER = JointWorld(KelvinVoigt(5200.0, 200.0, 0.10)), JointWorld(KelvinVoigt(34500.0, 480.0, 0.05))
 RATE = 5e-5
 _RUBS: Any = JOINT_FRICTION
-PARAMETERS = {
-    "rate": RATE,
-    "hidden": 6,
-    "schedule": ForceSchedule(20.0, 10.0, 2.5, 0.0, 0.5, 0.0),
-    "worlds": {
-        "foam": FOAM,
-        "rubber": RUBBER,
-        "relaxing\nfoam": JointWorld(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
-        "friction\nhalf": JointWorld(FOAM.surface, _RUBS.scaled_by(0.5)),
-        "friction\ndouble": JointWorld(FOAM.surface, _RUBS.scaled_by(2.0)),
-        "noise\ndouble": JointWorld(FOAM.surface, noise=1.2),
-        "inputs\nin N": JointWorld(FOAM.surface, force=1.0),
-    },
+SCHEDULE = ForceSchedule(20.0, 10.0, 2.5, 0.0, 0.5, 0.0)
+WORLDS = {
+    "foam": FOAM,
+    "rubber": RUBBER,
+    "relaxing\nfoam": JointWorld(StandardLinearSolid(5600.0, 13.0, 0.02, 6900.0, 0.23)),
+    "friction\nhalf": JointWorld(FOAM.surface, _RUBS.scaled_by(0.5)),
+    "friction\ndouble": JointWorld(FOAM.surface, _RUBS.scaled_by(2.0)),
+    "noise\ndouble": JointWorld(FOAM.surface, noise=1.2),
+    "inputs\nin N": JointWorld(FOAM.surface, force=1.0),
 }
 """Other noise and other weights in each run; lever, inertia and motor are joint 2's, see `one_joint`."""
 RATES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3)
@@ -73,8 +65,7 @@ FOLLOWS = (
 )
 
 
-@dataclass(frozen=True)
-class RunAfterStart:
+class RunAfterStart(NamedTuple):
     """How a run went from `FROM` on."""
 
     settled: float  # RMS error outside the steps [N]
@@ -88,8 +79,7 @@ class RunAfterStart:
         return self.settled <= LIMIT and self.off <= SHARE
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     record: dict[str, Array]
@@ -100,11 +90,8 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """All worlds at one rate, all rates on two surfaces, and the plain integral of the same gain."""
-    worlds: dict[str, JointWorld] = PARAMETERS["worlds"]  # type: ignore[assignment]
     two = {"foam": FOAM, "rubber": RUBBER}
-    pressed = {
-        name: runs.map(partial(by_network, world, RATE), _seeds(runs, name)) for name, world in worlds.items()
-    }
+    pressed = by_condition(runs, WORLDS, lambda world, seed: by_network(world, RATE, seed), two)
     integral = {
         name: runs.map(partial(_integral, world), list(zip(pressed[name], runs.seeds, strict=True)))
         for name, world in two.items()
@@ -113,7 +100,7 @@ def run(runs: Runs) -> Data:
         name: [runs.map(partial(by_network, world, rate), runs.seeds[:VARIED_SEEDS]) for rate in RATES]
         for name, world in two.items()
     }
-    record = one_joint(FOAM.surface, _network(FOAM, RATE, runs.seeds[0]), _schedule()).run(
+    record = one_joint(FOAM.surface, direct_neural(RATE, seed=runs.seeds[0]), SCHEDULE).run(
         DURATION, runs.seeds[0]
     )
     return Data(dict(record.columns), pressed, integral, rates)
@@ -121,10 +108,6 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """That it follows; and that it is an integral."""
-    return [_follows(data), _is_integral(data)]
-
-
-def _follows(data: Data) -> ThesisClaim:
     both = {n: data.worlds[n] for n in ("foam", "rubber")}
     told = "; ".join(
         f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by "
@@ -132,33 +115,35 @@ def _follows(data: Data) -> ThesisClaim:
         for n, v in both.items()
     )
     slow = _span(data)
-    return claim(
-        "network-alone",
-        all(often(p.follows for p in v) for v in both.values()),
-        surfaces=told,
-        follows=FOLLOWS,
-        foam_slow=slow[0],
-        rubber_slow=slow[1],
-        where=stops_holding(data.worlds, lambda p: p.follows),
-    )
-
-
-def _is_integral(data: Data) -> ThesisClaim:
     shares = {
         n: [b.rms / a.rms for a, b in zip(data.worlds[n], data.integral[n], strict=True)]
         for n in data.integral
     }
     gains = [p.gain for n in data.integral for p in data.worlds[n]]
-    return claim(
-        "network-alone.integrator",
-        all(often(abs(s - 1) <= SAME for s in v) for v in shares.values()),
-        surfaces="; ".join(
-            (f"{n}: {spread([100 * s for s in v], '%', 3)} of the network's RMS" for n, v in shares.items())
+    return [
+        claim(
+            "network-alone",
+            all(often(p.follows for p in v) for v in both.values()),
+            surfaces=told,
+            follows=FOLLOWS,
+            foam_slow=slow[0],
+            rubber_slow=slow[1],
+            where=stops_holding(data.worlds, lambda p: p.follows),
         ),
-        gains=gains,
-        start=FROM,
-        same=SAME,
-    )
+        claim(
+            "network-alone.integrator",
+            all(often(abs(s - 1) <= SAME for s in v) for v in shares.values()),
+            surfaces="; ".join(
+                (
+                    f"{n}: {spread([100 * s for s in v], '%', 3)} of the network's RMS"
+                    for n, v in shares.items()
+                )
+            ),
+            gains=gains,
+            start=FROM,
+            same=SAME,
+        ),
+    ]
 
 
 def plot(data: Data) -> Figure:
@@ -174,26 +159,17 @@ def plot(data: Data) -> Figure:
     force.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, DURATION), ylim=(0.0, 27.0))
     style.legend(force)
     _rate_panel(grid[1][0], data)
-    dots_panel(
-        grid[1][1],
-        data.worlds,
-        lambda p: p.settled,
-        lambda p: p.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title="at the chosen rate; a dot follows, a cross does not",
-    )
+    dots_panel(grid[1][1], data.worlds, lambda p: p.settled, lambda p: p.follows, LIMIT)
+    grid[1][1].set(ylabel="RMS error [N]", title="at the chosen rate; a dot follows, a cross does not")
     return drawing
 
 
 def _rate_panel(axis: Axes, data: Data) -> None:
-    for (name, found), color in zip(data.rates.items(), style.SERIES[:2], strict=True):
-        axis.loglog(
-            RATES, [np.median([p.settled for p in v]) for v in found], color=color, linewidth=1.2, label=name
-        )
-        for rate, v in zip(RATES, found, strict=True):
-            axis.plot([rate] * len(v), [p.settled for p in v], "o", color=color, markersize=3)
-    axis.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
+    for (name, found), color in zip(data.rates.items(), style.SERIES, strict=False):
+        settled = np.array([[p.settled for p in v] for v in found])
+        axis.loglog(RATES, np.median(settled, axis=1), color=color, linewidth=1.2, label=name)
+        axis.plot(np.repeat(RATES, VARIED_SEEDS), settled.ravel(), "o", color=color, markersize=3)
+    axis.axhline(LIMIT, **LIMIT_LINE)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle=":")
     axis.set(xlabel="learning rate", ylabel="RMS error [N]")
     axis.legend()
@@ -210,29 +186,23 @@ def _span(data: Data) -> tuple[float, float]:
     return (min(good), max(good)) if good else (float("nan"), float("nan"))
 
 
-def _seeds(runs: Runs, name: str) -> list[int]:
-    return list(runs.seeds if name in ("foam", "rubber") else runs.seeds[:VARIED_SEEDS])
-
-
-def _schedule() -> ForceSchedule:
-    return PARAMETERS["schedule"]  # type: ignore[return-value]
-
-
-def _network(world: JointWorld, rate: float, seed: int) -> DirectNeural:
-    return direct_neural(rate, hidden=6, force=world.force, seed=seed)
-
-
 def by_network(world: JointWorld, rate: float, seed: int) -> RunAfterStart:
     """The network alone on one joint, at a learning rate."""
     link = Link(world.friction)
-    bench = one_joint(world.surface, _network(world, rate, seed), _schedule(), link=link, noise=world.noise)
+    bench = one_joint(
+        world.surface,
+        direct_neural(rate, force=world.force, seed=seed),
+        SCHEDULE,
+        link=link,
+        noise=world.noise,
+    )
     return _measure(bench.run(DURATION, seed), bench.loop.joint.lever)
 
 
 def _integral(world: JointWorld, case: tuple[RunAfterStart, int]) -> RunAfterStart:
     (network, seed), link = case, Link(world.friction)
     controller = DirectIntegral(network.gain * 1e-3 * link.lever)
-    bench = one_joint(world.surface, controller, _schedule(), link=link, noise=world.noise)
+    bench = one_joint(world.surface, controller, SCHEDULE, link=link, noise=world.noise)
     return _measure(bench.run(DURATION, seed), link.lever)
 
 
@@ -242,9 +212,9 @@ def _measure(record: Record, lever: float) -> RunAfterStart:
     t, desired = record["t"], record["force_desired"]
     late = t >= FROM - 5e-7
     error = record["force"] - desired
-    since = np.mod(t + 5e-7, _schedule().period)
-    interval = np.floor((t + 5e-7) / _schedule().period)
-    ends = [late & (interval == i) & (since >= _schedule().period - 1.0) for i in np.unique(interval[late])]
+    since = np.mod(t + 5e-7, SCHEDULE.period)
+    interval = np.floor((t + 5e-7) / SCHEDULE.period)
+    ends = [late & (interval == i) & (since >= SCHEDULE.period - 1.0) for i in np.unique(interval[late])]
     off = max(abs(float(error[e].mean())) / float(desired[e].mean()) for e in ends)
     gain = float(record["gain"][late].mean()) / 1e-3 / lever
     return RunAfterStart(rms(error[late & (since >= SETTLE)]), rms(error[late]), off, gain)

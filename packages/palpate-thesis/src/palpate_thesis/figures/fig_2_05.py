@@ -1,8 +1,7 @@
 """Figure 2.5: the indirect scheme, a network that tunes the gains of a PID on the force."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,16 +10,8 @@ from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    by_condition,
-    move_wall,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line, spread
+from palpate_thesis.conditions import SHORT, SURFACES, by_condition, move_wall, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Disturbance, other_surface, run_with
 from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, following, slot, tracking
@@ -28,7 +19,6 @@ from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "2.5"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(
     load("foam-self-tuning"),
     {**SHORT, "run.press": 12.5, "force.first": 20.0, "force.second": 10.0, "force.period": 2.5},
@@ -41,11 +31,8 @@ FIXED = {"controller.learning_rate": 1e-12}
 BETTER = 0.9
 """Largest share of the untaught loop's error that counts as better."""
 
-Case = tuple[Experiment, int]
 
-
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     shown: Record
@@ -67,45 +54,42 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Surfaces, poses, a surface that changes, and whether it is the network that does it."""
-    return [_environment(data), _configuration(data), _network(data)]
-
-
-def _environment(data: Data) -> ThesisClaim:
     found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
-    return claim(
-        "self-tuning-robust.environment",
-        all(following(f) for f in found.values()),
-        described=describe(data.turned),
-        others=_how_many_follow(found),
-        follows=FOLLOWS,
-        fixed_kept=_count_following(data.fixed),
-        surfaces=len(data.fixed),
-        tuned_kept=_count_following(data.tuned),
-        where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
-    )
+    shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
+    return [
+        claim(
+            "self-tuning-robust.environment",
+            all(following(f) for f in found.values()),
+            described=describe(data.turned),
+            others=_how_many_follow(found),
+            follows=FOLLOWS,
+            fixed_kept=_count_following(data.fixed),
+            surfaces=len(data.fixed),
+            tuned_kept=_count_following(data.tuned),
+            where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
+        ),
+        _configuration(data),
+        claim(
+            "self-tuning-robust.tuning",
+            all(often(s <= BETTER for s in v) for v in shares.values()),
+            surfaces="; ".join(
+                f"{on_one_line(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items()
+            ),
+            better=BETTER,
+            where=stops_holding({n: _shares(data, n) for n in data.tuned}, lambda s: s <= BETTER),
+        ),
+    ]
 
 
 def _configuration(data: Data) -> ThesisClaim:
     found = {n: data.tuned[n] for n in _POSES}
-    reach = spread([100 * f.saturated for f in data.tuned["wall at\n0.40 m"]], "%", 2)
     return claim(
         "self-tuning-robust.configuration",
         all(following(f) for f in found.values()),
         poses=_how_many_follow(found),
         follows=FOLLOWS,
-        reach=reach,
+        near=data.tuned["wall at\n0.40 m"],
         where=stops_holding(found, lambda f: f.follows),
-    )
-
-
-def _network(data: Data) -> ThesisClaim:
-    shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
-    return claim(
-        "self-tuning-robust.tuning",
-        all(often(s <= BETTER for s in v) for v in shares.values()),
-        surfaces="; ".join((f"{_name(n)} {spread([100 * s for s in v], '%', 2)}" for n, v in shares.items())),
-        better=BETTER,
-        where=stops_holding({n: [*_shares(data, n)] for n in data.tuned}, lambda s: s <= BETTER),
     )
 
 
@@ -114,11 +98,10 @@ def plot(data: Data) -> Figure:
     drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
     force_panel(force, data.shown)
     c = PARAMETERS.controller
-    names, colors = ("K_fp", "K_fi", "K_fd"), (*style.SERIES[:2], style.OK)
-    for i, (name, middle, color) in enumerate(zip(names, (c.kf, c.ki, c.kd), colors, strict=True), start=1):
-        gains.plot(
-            data.shown["t"], data.shown[f"adapted{i}"] / middle, color=color, linewidth=1.2, label=name
-        )
+    kinds = (("K_fp", c.kf, style.SERIES[0]), ("K_fi", c.ki, style.SERIES[1]), ("K_fd", c.kd, style.OK))
+    for i, (name, middle, color) in enumerate(kinds, start=1):
+        gain = data.shown[f"adapted{i}"] / middle
+        gains.plot(data.shown["t"], gain, color=color, linewidth=1.2, label=name)
     gains.set(xlabel="time since contact [s]", ylabel="gain over middle", xlim=SHOWN, ylim=(0.0, 2.0))
     style.legend(gains)
     for axis in (force, gains):
@@ -128,17 +111,18 @@ def plot(data: Data) -> Figure:
         {"foam into\nrubber": data.turned, **data.tuned},
         lambda f: f.settled,
         lambda f: f.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title=(
-            "outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
-            "dashed: the limit"
-        ),
+        LIMIT,
+    )
+    dots.set(
+        ylabel="RMS error [N]",
+        title="outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
+        "dashed: the limit",
     )
     for at, runs in enumerate(data.fixed.values(), start=1):
         spot = at + np.linspace(-0.22, 0.22, len(runs))
         dots.plot(spot, [f.settled for f in runs], "o", color=style.MEASURED, markersize=2.5, zorder=1)
-    dots.set_ylim(0.0, max(4.0, 1.1 * _largest(data)))
+    every = [f.settled for runs in (*data.tuned.values(), data.turned) for f in runs]
+    dots.set_ylim(0.0, max(4.0, 1.1 * float(np.nanmax(every))))
     return drawing
 
 
@@ -149,10 +133,10 @@ _POSES = ("foam", "wall at\n0.40 m", "wall at\n0.49 m")
 def _worlds() -> dict[str, Experiment]:
     by: dict[str, Mapping[str, Any]] = {
         "foam": {},
-        "rubber": RUBBER_SURFACE,
+        "rubber": SURFACES["rubber"],
         "wall at\n0.40 m": move_wall(PARAMETERS, 0.40),
         "wall at\n0.49 m": move_wall(PARAMETERS, 0.49),
-        "relaxing\nfoam": RELAXING_FOAM,
+        "relaxing\nfoam": SURFACES["relaxing\nfoam"],
         "friction\nhalf": rougher(PARAMETERS, 0.5),
         "friction\ndouble": rougher(PARAMETERS, 2.0),
         "other\nweights": {"controller.weights_seed": 1},
@@ -174,14 +158,7 @@ def _count_following(found: Mapping[str, Sequence[Tracking]]) -> int:
     return sum(map(following, found.values()))
 
 
-def _name(name: str) -> str:
-    return name.replace("\n", " ")
-
-
 def _how_many_follow(found: Mapping[str, Sequence[Tracking]]) -> str:
-    return "; ".join(f"{_name(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items())
-
-
-def _largest(data: Data) -> float:
-    every = [f.settled for runs in (*data.tuned.values(), data.turned) for f in runs]
-    return float(np.nanmax(every))
+    return "; ".join(
+        f"{on_one_line(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items()
+    )

@@ -1,24 +1,23 @@
 """Figure 3.5: spectra of the force signal with and without the 190 Hz analog filter before the sampling."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.instruments import analog_filter_190
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.least_squares.press_runs import conditions, nearer
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "3.5"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(nearer(load("foam-hybrid")), {"run.press": 14.0})
 STEADY = 12.0
 """Seconds at the end of the press that are looked at [s]."""
@@ -32,8 +31,7 @@ AMPLITUDE = 0.5
 PHYSICS = 20000.0
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Spectra, their differences, and tones."""
 
     frequency: Array  # [Hz]
@@ -47,30 +45,29 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Two runs a seed, alike but for the filter."""
-    spectra = _pairs(runs, [(PARAMETERS, seed) for seed in runs.seeds])
-    cases = conditions(PARAMETERS)
-    others = _pairs(runs, [(e, runs.seeds[0]) for e in cases.values()])
+    spectra = _pairs(runs, {"": PARAMETERS}, None)[""]
+    others = _pairs(runs, conditions(PARAMETERS), 1)
     bins, lines = tones_sampled()
     return Data(
         frequency=_frequency(),
         plain=spectra[0][0],
         filtered=spectra[0][1],
         apart=[_apart(*pair) for pair in spectra],
-        varied={name: _apart(*pair) for name, pair in zip(cases, others, strict=True)},
+        varied={name: _apart(*pairs[0]) for name, pairs in others.items()},
         lines=lines,
         bins=bins,
     )
 
 
-def _pairs(runs: Runs, cases: list[tuple[Experiment, int]]) -> list[tuple[Array, Array]]:
-    """Spectra without and with the filter of each case."""
-    both = [
-        (with_values(e, {"force_sensor.analog_filter": on}), seed)
-        for e, seed in cases
+def _pairs(runs: Runs, cases: Mapping[str, Experiment], seeds: int | None) -> dict[str, list[Any]]:
+    """Spectra without and with the filter of each case, a pair a seed."""
+    both = {
+        (name, on): with_values(e, {"force_sensor.analog_filter": on})
+        for name, e in cases.items()
         for on in (False, True)
-    ]
-    spectra = runs.over(both, _spectrum)
-    return list(zip(spectra[::2], spectra[1::2], strict=True))
+    }
+    spectra = runs.by_name(both, _spectrum, seeds)
+    return {name: list(zip(spectra[name, False], spectra[name, True], strict=True)) for name in cases}
 
 
 def _spectrum(record: Record) -> Array:
@@ -116,19 +113,18 @@ def _amplitudes(line: Array) -> Array:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Agreement below 120 Hz; where 480 Hz goes."""
-    return [_agreement(data), _folding(data)]
-
-
-def _agreement(data: Data) -> ThesisClaim:
     worst = max(data.varied, key=lambda name: data.varied[name])
-    return claim(
-        "anti-alias-spectra",
-        float(np.median(data.apart)) <= ALMOST,
-        apart=data.apart,
-        almost=ALMOST,
-        varied=data.varied[worst],
-        worst=worst,
-    )
+    return [
+        claim(
+            "anti-alias-spectra",
+            float(np.median(data.apart)) <= ALMOST,
+            apart=data.apart,
+            almost=ALMOST,
+            varied=data.varied[worst],
+            worst=worst,
+        ),
+        _folding(data),
+    ]
 
 
 def _folding(data: Data) -> ThesisClaim:
@@ -157,9 +153,8 @@ def _spectra(axis: Axes, data: Data) -> None:
         (data.plain, style.MEASURED, "without filter"),
         (data.filtered, style.SERIES[0], "with the 190 Hz filter"),
     ):
-        axis.plot(
-            data.frequency[shown], 10.0 * np.log10(power[shown]), color=color, linewidth=1.2, label=label
-        )
+        decibels = 10.0 * np.log10(power[shown])
+        axis.plot(data.frequency[shown], decibels, color=color, linewidth=1.2, label=label)
     axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
     axis.text(5.0, -53.0, "below 120 Hz", color=style.OK)
     axis.set(xlabel="frequency [Hz]", ylabel="power density [dB re 1 N²/Hz]", xlim=(0.0, 500.0))
@@ -167,15 +162,12 @@ def _spectra(axis: Axes, data: Data) -> None:
 
 
 def _draw_folding(axis: Axes, data: Data) -> None:
-    colors = {"480": style.SERIES[1], "960": style.FAIL}
     for line in data.lines:
         frequency, amplitude = _peak(data, line)
-        weak = "filtered" in line
-        where = frequency + (8.0 if weak else 0.0)
-        color = colors[line[:3]]
-        axis.vlines(
-            where, 0.0, amplitude, color=color, linewidth=3.5, alpha=0.45 if weak else 1.0, label=line
-        )
+        aside, alpha = (8.0, 0.45) if "filtered" in line else (0.0, 1.0)
+        color = style.SERIES[1] if line.startswith("480") else style.FAIL
+        bar: dict[str, Any] = {"color": color, "linewidth": 3.5, "alpha": alpha, "label": line}
+        axis.vlines(frequency + aside, 0.0, amplitude, **bar)
     axis.axvspan(0.0, BAND, color=style.OK, alpha=0.08, linewidth=0.0)
     axis.set(xlabel="read at [Hz]", ylabel="amplitude [N]", xlim=(0.0, 500.0), ylim=(0.0, 0.6))
     axis.legend(loc="upper center")

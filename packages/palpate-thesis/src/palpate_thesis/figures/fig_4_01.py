@@ -1,7 +1,6 @@
 """Figure 4.1: the end-effector kept perpendicular to the surface, by its angle alone and by all six axes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -10,13 +9,12 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.report import style
 from palpate.robots import SerialArm
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "4.1"
-TITLE, CAPTION = texts(NUMBER)
 
 
 def _facets(rings: int = 4) -> Array:
@@ -106,8 +104,7 @@ def command(reading: Array, scheme: str) -> Array:
     return np.concatenate([velocity, -GAINS[1] * moment * [1.0, 1.0, 0.0]])
 
 
-@dataclass(frozen=True)
-class TiltedPress:
+class TiltedPress(NamedTuple):
     """A press of the surface."""
 
     angle: Array  # between tool and normal, tick by tick [degrees]
@@ -161,8 +158,7 @@ def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> TiltedP
     return TiltedPress(np.array(angles), abs(float(np.mean(forces[-RATE:])) - FORCE))
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     found: dict[str, dict[str, list[TiltedPress]]]  # by surface and scheme
@@ -170,11 +166,9 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """Each surface under each scheme, over all seeds."""
-    cases = list(product(PARAMETERS, SCHEMES, runs.seeds))
-    done = dict(zip(cases, runs.map(lambda c: press(PARAMETERS[c[0]], *c[1:]), cases), strict=True))
-    return Data(
-        {name: {s: [done[name, s, seed] for seed in runs.seeds] for s in SCHEMES} for name in PARAMETERS}
-    )
+    cases = {key: [(*key, seed) for seed in runs.seeds] for key in product(PARAMETERS, SCHEMES)}
+    done = runs.map_each(lambda case: press(PARAMETERS[case[0]], *case[1:]), cases)
+    return Data({name: {scheme: done[name, scheme] for scheme in SCHEMES} for name in PARAMETERS})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -187,10 +181,8 @@ def _claim(data: Data, name: str, scheme: str) -> ThesisClaim:
     return claim(
         name,
         all(often(one.perpendicular for one in found[scheme]) for found in data.found.values()),
-        foam=[one.rms_angle for one in data.found["foam"][scheme]],
-        rubber=[one.rms_angle for one in data.found["rubber"][scheme]],
+        **{surface: found[scheme] for surface, found in data.found.items()},
         away=sum(one.rms_angle > GONE for one in data.found["foam"]["moments alone"]),
-        force=[one.force for one in data.found["foam"][scheme]],
         within=WITHIN,
         tilt=np.degrees(TILT),
         crosstalk=CROSSTALK,
@@ -205,20 +197,16 @@ def plot(data: Data) -> Figure:
     """The angle over time on foam, and in the last second of all presses."""
     drawing, ((angle,), (dots,)) = panels([2.6, 2.2])
     time = np.arange(round(SECONDS * RATE)) / RATE
-    for scheme, color in zip(SCHEMES, style.SERIES[:3], strict=True):
-        angle.plot(time, data.found["foam"][scheme][0].angle, color=color, linewidth=1.1, label=scheme)
+    for scheme in SCHEMES:
+        angle.plot(time, data.found["foam"][scheme][0].angle, linewidth=1.1, label=scheme)
     angle.set(
         xlabel="time [s]", ylabel="angle off the normal [degrees]", xlim=(0.0, SECONDS), ylim=(0.0, 8.0)
     )
     style.legend(angle)
     shown = {f"{name}\n{s}": presses for name, found in data.found.items() for s, presses in found.items()}
-    dots_panel(
-        dots,
-        shown,
-        lambda one: min(one.rms_angle, GONE),
-        lambda one: one.perpendicular,
-        limit=WITHIN,
-        label="angle [degrees]",
+    dots_panel(dots, shown, lambda one: min(one.rms_angle, GONE), lambda one: one.perpendicular, WITHIN)
+    dots.set(
+        ylabel="angle [degrees]",
         title="in the last second, a mark each press; dashed: the limit; at 20 it has turned away",
     )
     return drawing

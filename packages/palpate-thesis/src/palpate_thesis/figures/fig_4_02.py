@@ -1,23 +1,22 @@
 """Figure 4.2: the force through the switch from position to hybrid control."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import load, with_values
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.panels import set_title
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.look import STATED, Axes, Figure
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 NUMBER = "4.2"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = {
     "foam": press_runs.nearer(with_values(load("foam-hybrid"), {"run.press": 4.0})),
     "rubber": press_runs.nearer(with_values(load("rubber-hybrid"), {"run.press": 4.0})),
@@ -28,8 +27,7 @@ DESIRED, NEAR, OVERSHOOT = 20.0, 1.0, 0.25
 BEFORE, AFTER = 0.6, 1.5
 
 
-@dataclass(frozen=True)
-class Switch:
+class Switch(NamedTuple):
     """The switch of one run."""
 
     true_force: float  # at the change-over [N]
@@ -44,8 +42,7 @@ class Switch:
         return self.true_force > 0.0 and not self.lost and reached
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """The force around the switch, and what became of each run."""
 
     shown: dict[str, tuple[Array, Array]]  # time from the switch [s], measured force [N]
@@ -56,18 +53,14 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One run a seed on each surface; thresholds and conditions varied on foam."""
-    few = list(runs.seeds)[: press_runs.SWEPT_SEEDS]
     foam = PARAMETERS["foam"]
-    thresholds = {
-        f: with_values(foam, {"approach.switch": f, "run.press": 0.5, "run.duration": 20.0})
-        for f in THRESHOLDS
-    }
-    varied = {name: [(e, s) for s in few] for name, e in press_runs.conditions(foam).items()}
+    short = {"run.press": 0.5, "run.duration": 20.0}
+    thresholds = {f: with_values(foam, {"approach.switch": f, **short}) for f in THRESHOLDS}
     return Data(
         shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
-        switches={name: runs.over_seeds(e, switch_of) for name, e in PARAMETERS.items()},
-        by_threshold={f: runs.over_seeds(e, switch_of) for f, e in thresholds.items()},
-        varied={name: runs.over(cases, switch_of) for name, cases in varied.items()},
+        switches=runs.by_name(PARAMETERS, switch_of),
+        by_threshold=runs.by_name(thresholds, switch_of),
+        varied=runs.by_name(press_runs.conditions(foam), switch_of, VARIED_SEEDS),
     )
 
 
@@ -84,52 +77,38 @@ def _around(record: Record) -> tuple[Array, Array]:
 def switch_of(record: Record) -> Switch:
     """The change-over of a run."""
     force = record["force_measured"]
-    return Switch(
-        true_force=float(record["force"][_start(record)]),
-        lost=bool((record["phase"] == LOST).any()),
-        last=float(force[-1000:].mean()),
-        most=float(force.max()),
-    )
+    lost = bool((record["phase"] == LOST).any())
+    return Switch(record["force"][_start(record)], lost, float(force[-1000:].mean()), float(force.max()))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The switch is clean, and 5 N is a threshold that noise does not reach."""
-    return [_clean(data), _threshold(data)]
-
-
-def _clean(data: Data) -> ThesisClaim:
-    good = {name: sum(s.clean for s in some) for name, some in data.switches.items()}
-    fails = [name for name, some in data.varied.items() if 2 * sum(s.clean for s in some) <= len(some)]
-    foam, rubber = data.switches["foam"], data.switches["rubber"]
-    return claim(
-        "switch-at-5N",
-        all((2 * count > len(data.switches[name]) for name, count in good.items())),
-        last=[s.last for s in foam],
-        most=[s.most for s in foam],
-        last_rubber=[s.last for s in rubber],
-        most_rubber=[s.most for s in rubber],
-        where=press_runs.where_it_fails(fails, len(data.varied)),
-        nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
-    )
+    fails = press_runs.failing(data.varied, lambda s: s.clean)
+    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
+    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
+    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
+    return [
+        claim(
+            "switch-at-5N",
+            not press_runs.failing(data.switches, lambda s: s.clean),
+            **data.switches,
+            where=press_runs.where_it_fails(fails, len(data.varied)),
+            nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
+        ),
+        claim(
+            "switch-at-5N.threshold",
+            _false(chosen) == 0.0,
+            chosen=100 * _false(chosen),
+            listing=100 * _false(listing),
+            early=early,
+            enough=enough,
+        ),
+    ]
 
 
 def _false(some: Sequence[Switch]) -> float:
     """Share of the runs that were switched before anything was touched."""
     return sum(s.true_force <= 0.0 for s in some) / len(some)
-
-
-def _threshold(data: Data) -> ThesisClaim:
-    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
-    enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
-    chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
-    return claim(
-        "switch-at-5N.threshold",
-        _false(chosen) == 0.0,
-        chosen=100 * _false(chosen),
-        listing=100 * _false(listing),
-        early=early,
-        enough=enough,
-    )
 
 
 def plot(data: Data) -> Figure:
@@ -142,13 +121,13 @@ def plot(data: Data) -> Figure:
 
 def _force(axis: Axes, data: Data) -> None:
     set_title(axis, "a", "Force through the switch")
-    for (name, (t, force)), color in zip(data.shown.items(), style.SERIES[:2], strict=True):
-        axis.plot(t, force, color=color, linewidth=1.0, label=name)
+    for name, (t, force) in data.shown.items():
+        axis.plot(t, force, linewidth=1.0, label=name)
     axis.plot([0.0, AFTER], [DESIRED, DESIRED], **style.KNOWN, label="desired")
     axis.axvspan(-BEFORE, 0.0, color=style.MEASURED, alpha=0.10, linewidth=0.0)
     axis.text(-0.98 * BEFORE, 21.0, "position control", color=style.INK)
     axis.text(0.02, 23.2, "hybrid control", color=style.INK)
-    axis.axhline(CHOSEN, color=style.FAIL, linewidth=0.9, linestyle=":")
+    axis.axhline(CHOSEN, **STATED)
     axis.set(xlabel="time since 5 N [s]", ylabel="force [N]", xlim=(-BEFORE, AFTER), ylim=(-2.5, 25.0))
     style.legend(axis)
 

@@ -1,8 +1,8 @@
 """Figure 4.3: the loop of the hybrid controller's block diagram, and how stiff a surface it bears."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,19 +12,18 @@ from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import SHORT, VARIED_SEEDS, rougher
+from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.conditions import SHORT, rougher
 from palpate_thesis.force_control.panels import across, panels
 from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 TICK = 1e-3
 """[s]"""
 
 
-@dataclass(frozen=True)
-class LoopParameters:
+class LoopParameters(NamedTuple):
     """Parameters that decide the stability, besides the surface's stiffness.
 
     Args:
@@ -125,7 +124,6 @@ def _exponential(A: Array) -> Array:
 
 
 NUMBER = "4.3"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
 """Effective mass of the arm along x at the wall, rotors included [kg]."""
@@ -149,8 +147,7 @@ SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
 Case = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
@@ -181,51 +178,43 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
-    return [_linear(data), _whole(data), _slow(data)]
-
-
-def _linear(data: Data) -> ThesisClaim:
     told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
-    return claim(
-        "force-loop-stable",
-        all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
-        limits=told,
-        near=NEAR,
-        tip=TIP,
-        needed=_least_damping(data),
-    )
-
-
-def _whole(data: Data) -> ThesisClaim:
+    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
     kept = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
     holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
-    return claim(
-        "force-loop-stable.whole-arm",
-        holds,
-        below=BELOW,
-        stable=", ".join(map(str, kept.values())),
-        runs=n,
-        above=ABOVE,
-        lost=", ".join(map(str, lost.values())),
-        shakes=SHAKES,
-        friction=friction,
-        stiffer=STIFFER[-1],
-    )
-
-
-def _slow(data: Data) -> ThesisClaim:
-    slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
-    return claim(
-        "low-pass-destabilises",
-        all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
-        foam_slow=_text(slow[0]),
-        foam_fast=_text(fast[0]),
-        rubber_slow=_text(slow[1]),
-        rubber_fast=_text(fast[1]),
-    )
+    return [
+        claim(
+            "force-loop-stable",
+            all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
+            limits=told,
+            near=NEAR,
+            tip=TIP,
+            needed=_least_damping(data),
+        ),
+        claim(
+            "force-loop-stable.whole-arm",
+            holds,
+            below=BELOW,
+            stable=", ".join(map(str, kept.values())),
+            runs=n,
+            above=ABOVE,
+            lost=", ".join(map(str, lost.values())),
+            shakes=SHAKES,
+            friction=friction,
+            stiffer=STIFFER[-1],
+        ),
+        claim(
+            "low-pass-destabilises",
+            all((s <= 0.5 * f for s, f in zip(slow, fast, strict=True))),
+            foam_slow=_text(slow[0]),
+            foam_fast=_text(fast[0]),
+            rubber_slow=_text(slow[1]),
+            rubber_fast=_text(fast[1]),
+        ),
+    ]
 
 
 def plot(data: Data) -> Figure:
@@ -270,9 +259,9 @@ def _damping_panel(axis: Axes, data: Data) -> None:
 
 
 def _cutoff_panel(axis: Axes, data: Data) -> None:
-    for name, color in zip(GAINS, style.SERIES[:2], strict=True):
-        axis.loglog(CUTOFFS, data.filtered[name] / 1e3, color=color)
-    axis.axvline(PARAMETERS.filters.force, color=style.INK, linewidth=1, linestyle="--")
+    for limits in data.filtered.values():
+        axis.loglog(CUTOFFS, limits / 1e3)
+    axis.axvline(PARAMETERS.filters.force, **LIMIT_LINE)
     axis.set(xlabel="cut-off of the controller's force filter [Hz]")
     axis.set_title("against the force filter, damping 200 N s/m; dashed: as used")
 
@@ -319,20 +308,13 @@ def stays_quiet(record: Record) -> bool:
 
 
 def _stable(runs: Runs, limits: dict[Case, float], share: float) -> dict[Case, list[bool]]:
-    found = {}
-    for case in _cases():
-        experiment = with_values(press_of(case, share * limits[case[:2]], FREE), FREE_SIDE)
-        found[case[:2]] = runs.over_seeds(experiment, stays_quiet)
-    return found
+    presses = {c[:2]: with_values(press_of(c, share * limits[c[:2]], FREE), FREE_SIDE) for c in _cases()}
+    return runs.by_name(presses, stays_quiet)
 
 
 def _rough(runs: Runs, limits: dict[Case, float]) -> dict[Case, list[float]]:
     """Largest of STIFFER, seed by seed, up to which the arm with its own friction stays quiet; 0 if at none."""
-    seeds = runs.seeds[:VARIED_SEEDS]
-    found: dict[Case, list[float]] = {}
-    for case in _cases():
-        tried = [(press_of(case, k * limits[case[:2]], 1.0), seed) for seed in seeds for k in STIFFER]
-        quiet = np.array(runs.over(tried, stays_quiet)).reshape(len(seeds), len(STIFFER))
-        borne = [int(np.argmin(row)) if not row.all() else len(row) for row in quiet]
-        found[case[:2]] = [STIFFER[n - 1] if n else 0.0 for n in borne]
-    return found
+    tried = {(c[:2], k): press_of(c, k * limits[c[:2]], 1.0) for c in _cases() for k in STIFFER}
+    quiet = runs.by_name(tried, stays_quiet, VARIED_SEEDS)
+    rows = {c: np.transpose([quiet[c, k] for k in STIFFER]) for c in limits}
+    return {c: [max([0.0, *np.array(STIFFER)[np.cumprod(row) > 0]]) for row in rows[c]] for c in limits}

@@ -1,28 +1,26 @@
 """Figure 4.4: the noise of the force signal."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.look import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "4.4"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-hybrid"), {"run.press": 8.0})
 STEADY = 2.0
 """Seconds at the end of the press that are looked at [s]."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Steady force, and its noise over the seeds."""
 
     t: Array

@@ -1,8 +1,7 @@
 """Equations 4.19-4.21: decoupled hybrid control with the identified stiffness, as printed and corrected."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,21 +12,14 @@ from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import SHARE
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import (
-    RELAXING_FOAM,
-    RUBBER_SURFACE,
-    SHORT,
-    VARIED_SEEDS,
-    friction_and_pose,
-    rougher,
-    stops_holding,
-)
+from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.conditions import SHORT, SURFACES, friction_and_pose, rougher, stops_holding
 from palpate_thesis.force_control.disturbances import Disturbance, desired_pose, run_with
 from palpate_thesis.force_control.panels import across, dots_panel, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
+from palpate_thesis.least_squares.panels import calm_limits
 from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""
@@ -38,8 +30,7 @@ JUMP = 0.005
 PRINTED = {"controller.form": "printed", "controller.kf": 1.0}
 
 
-@dataclass(frozen=True)
-class Stray:
+class Stray(NamedTuple):
     """How far one loop's steps carry the other; means over the steps of the largest within a second."""
 
     y: float  # after a step of force [mm]
@@ -48,8 +39,7 @@ class Stray:
     lost: int  # losses of contact
 
 
-@dataclass(frozen=True)
-class CoupledAndDecoupled:
+class CoupledAndDecoupled(NamedTuple):
     """The coupled law and the decoupled one, in the same world."""
 
     coupled: Stray
@@ -83,7 +73,7 @@ def as_printed(case: tuple[CoupledAndDecoupled, Experiment, int]) -> CoupledAndD
     """A pair with the law as printed in place of the corrected one."""
     pair, world, seed = case
     law = {"controller.stiffness": pair.stiffness, **PRINTED}
-    return replace(pair, decoupled=stray(press_with_jumps(with_values(world, law), seed)))
+    return pair._replace(decoupled=stray(press_with_jumps(with_values(world, law), seed)))
 
 
 def identify_stiffness(world: Experiment, seed: int) -> float:
@@ -120,7 +110,6 @@ def furthest(t: Array, signal: Array, at: float) -> float:
 
 
 NUMBER = "4.19"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(
     load("foam-decoupled"), {**SHORT, "run.press": 7.5, "force.first": 10.0, "force.second": 20.0}
 )
@@ -133,8 +122,7 @@ SIGNALS = {"force": 1.0, "y": 1e3, "phi": float(np.degrees(1.0))}
 LAWS = ("(4.13), coupled", "(4.19) corrected", "(4.19) as printed")
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     traces: list[dict[str, Record]]  # as chosen, and with hardly any friction
@@ -149,14 +137,9 @@ def run(runs: Runs) -> Data:
     printed = runs.map(
         as_printed, [(pair, PARAMETERS, seed) for pair, seed in zip(nominal, runs.seeds, strict=True)]
     )
-    named = [
-        (name, (e, seed, law))
-        for seed in runs.seeds[:VARIED_SEEDS]
-        for name, (e, law) in _variations().items()
-    ]
-    varied: dict[str, list[CoupledAndDecoupled]] = {"as\nchosen": nominal}
-    for (name, _), pair in zip(named, runs.map(pair_of, [case for _, case in named]), strict=True):
-        varied.setdefault(name, []).append(pair)
+    seeds = runs.seeds[:VARIED_SEEDS]
+    cases = {name: [(e, seed, law) for seed in seeds] for name, (e, law) in _variations().items()}
+    varied = {"as\nchosen": nominal, **runs.map_each(pair_of, cases)}
     k = nominal[0].stiffness
     traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(with_values(PARAMETERS, FREE), runs.seeds[0], k)]
     return Data(traces, nominal, printed, varied)
@@ -182,8 +165,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     printed = claim(
         "decoupled-control",
         often(map(_all, data.printed)),
-        decoupled_lost=[p.decoupled.lost for p in data.printed],
-        decoupled_phi=[p.decoupled.phi for p in data.printed],
+        printed=data.printed,
         **limits,
     )
     parts = {"angle": angle_kept, "y": _side_kept, "force": force_kept}
@@ -207,24 +189,17 @@ def plot(data: Data) -> Figure:
     drawing, grid = panels([2.3, 1.6, 1.9, 2.0], 2, 11.0)
     for column, traces in enumerate(data.traces):
         _column([row[column] for row in grid[:3]], traces)
-    grid[0][0].set_title("friction as chosen")
-    grid[0][1].set_title("hardly any friction")
-    grid[0][0].set_ylabel("true force [N]")
-    grid[1][0].set_ylabel("y [mm]")
-    grid[2][0].set_ylabel("angle [°]")
+    for axis, title in zip(grid[0], ("friction as chosen", "hardly any friction"), strict=True):
+        axis.set_title(title)
+    for (axis, _), label in zip(grid, ("true force [N]", "y [mm]", "angle [°]"), strict=False):
+        axis.set_ylabel(label)
     handles, labels = grid[0][0].get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside upper right", ncols=4)
     dots = across(grid[3])
-    dots_panel(
-        dots,
-        data.varied,
-        lambda p: 100 * p.angle,
-        angle_kept,
-        limit=100 * HALF,
-        label="share [%]",
-        title=(
-            "the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half"
-        ),
+    dots_panel(dots, data.varied, lambda p: 100 * p.angle, angle_kept, 100 * HALF)
+    dots.set(
+        ylabel="share [%]",
+        title="the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half",
     )
     return drawing
 
@@ -243,19 +218,13 @@ def _column(axes: Sequence[Axes], traces: Mapping[str, Record]) -> None:
     shown = traces[LAWS[0]]
     axes[0].plot(shown["t"], shown["force_desired"], **style.KNOWN, label="desired")
     for axis, signal in zip(axes[1:], ("y", "phi"), strict=True):
-        axis.set_ylim(*_limits([SIGNALS[signal] * traces[name][signal] for name in LAWS[:2]]))
+        calm_limits(axis, *(SIGNALS[signal] * traces[name][signal] for name in LAWS[:2]), margin=0.12)
     axes[0].set_ylim(0.0, 32.0)
     for axis in axes:
         axis.set_xlim(0.0, PARAMETERS.run.press)
         for at in JUMPS:
             axis.axvline(at, color=style.INK, linewidth=0.7, linestyle=":")
     axes[-1].set_xlabel("time since contact [s]")
-
-
-def _limits(signals: Sequence[Array]) -> tuple[float, float]:
-    low, high = min(float(s.min()) for s in signals), max(float(s.max()) for s in signals)
-    margin = 0.12 * (high - low)
-    return low - margin, high + margin
 
 
 def angle_kept(pair: CoupledAndDecoupled) -> bool:
@@ -281,22 +250,16 @@ def _variations() -> dict[str, tuple[Experiment, Mapping[str, Any]]]:
     worlds: dict[str, Mapping[str, Any]] = {
         "hardly any\nfriction": FREE,
         **friction_and_pose(PARAMETERS),
-        "rubber": RUBBER_SURFACE,
-        "relaxing\nfoam": RELAXING_FOAM,
+        **{name: changes for name, changes in SURFACES.items() if changes},
     }
-    found: dict[str, tuple[Experiment, Mapping[str, Any]]] = {
-        name: (with_values(PARAMETERS, changes), {}) for name, changes in worlds.items()
+    return {
+        **{name: (with_values(PARAMETERS, changes), {}) for name, changes in worlds.items()},
+        "K_e half\nas large": (PARAMETERS, {"wrong": 0.5}),
+        "K_e twice\nas large": (PARAMETERS, {"wrong": 2.0}),
     }
-    for name, factor in (("K_e half\nas large", 0.5), ("K_e twice\nas large", 2.0)):
-        found[name] = (PARAMETERS, {"wrong": factor})
-    return found
 
 
 def _traces(world: Experiment, seed: int, stiffness: float) -> dict[str, Record]:
-    known = {"controller.stiffness": stiffness}
-    experiments = (
-        with_values(world, COUPLED),
-        with_values(world, known),
-        with_values(world, {**known, **PRINTED}),
-    )
-    return {name: slot(press_with_jumps(e, seed)) for name, e in zip(LAWS, experiments, strict=True)}
+    known: dict[str, Any] = {"controller.stiffness": stiffness}
+    laws = zip(LAWS, (COUPLED, known, {**known, **PRINTED}), strict=True)
+    return {name: slot(press_with_jumps(with_values(world, law), seed)) for name, law in laws}

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,11 +11,11 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.look import STATED, Axes, Figure
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 COVARIANCES = 10.0 ** np.arange(2, 13)
 """P(0) that are tried; the thesis does not give it."""
@@ -26,15 +27,12 @@ BAND = 0.10
 RELAXING = "On {} the estimate follows the relaxation for seconds and the claim fails. "
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data and criteria of a figure of the first seconds."""
 
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[PressEstimates]]  # over the seeds
-    started: dict[
-        str, dict[tuple[str, str], Array]
-    ]  # time to settle of M, B, K by P(0), by K(0) and its shape
+    started: dict[str, dict[tuple[str, str], Array]]  # time to settle by K(0) and shape; of M, B, K by P(0)
     varied: dict[str, list[PressEstimates]]  # of the first surface
 
 
@@ -43,7 +41,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
     first = next(iter(surfaces.values()))
     return Data(
         shown={name: press_runs.contact(runs.one(e)) for name, e in surfaces.items()},
-        found={name: runs.over_seeds(e, press_runs.numbers_of) for name, e in surfaces.items()},
+        found=runs.by_name(surfaces, press_runs.numbers_of),
         started={name: _settle_by_start(runs, e) for name, e in surfaces.items()},
         varied=press_runs.sweep(runs, press_runs.conditions(first)),
     )
@@ -51,8 +49,9 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
 
 def _settle_by_start(runs: Runs, experiment: Experiment) -> dict[tuple[str, str], Array]:
     """Time to settle, shape (number of P(0), 3), the middle of a few seeds."""
-    cases = [(experiment, seed) for seed in list(runs.seeds)[: press_runs.SWEPT_SEEDS]]
-    each = runs.over(cases, lambda record: _by_start(press_runs.contact(record)))
+    (each,) = runs.by_name(
+        {"": experiment}, lambda record: _by_start(press_runs.contact(record)), VARIED_SEEDS
+    ).values()
     return {key: np.median([one[key] for one in each], axis=0) for key in each[0]}
 
 
@@ -137,7 +136,7 @@ def plot(data: Data, limit: float) -> Figure:
     panels.six(axes, data.shown, "thesis", (0.0, press_runs.FIRST))
     _scales(axes, data.shown)
     for axis in axes[:6]:
-        axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.axvline(limit, **STATED)
     _starts(axes[6], data, limit)
     _conditions(axes[7], data, limit)
     return drawing
@@ -145,7 +144,7 @@ def plot(data: Data, limit: float) -> Figure:
 
 def _scales(axes: list[Axes], presses: Mapping[str, Record]) -> None:
     some = list(presses.values())
-    panels.calm_limits(axes[4], *(1e-3 * _ratio(p) for p in some))
+    panels.calm_limits(axes[4], *map(panels.calm_ratio, some))
     for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
         curves = [scale * panels.calm(p, f"{key}_thesis", press_runs.FIRST) for p in some]
         panels.calm_limits(axis, *curves)
@@ -160,31 +159,23 @@ def _scales(axes: list[Axes], presses: Mapping[str, Record]) -> None:
         inset.set_xlim(0.0, 0.3)
 
 
-def _ratio(press: Record) -> Array:
-    x, force = (panels.calm(press, c, press_runs.FIRST) for c in ("displacement", "force_measured"))
-    return force / x
-
-
 def _starts(axis: Axes, data: Data, limit: float) -> None:
     panels.set_title(axis, "g", "Time until $K_e$ stays within 10 %, by P(0) and $K_e(0)$")
-    styles = {"2e5": "-", "2e4": "--"}
     for name, by_start in data.started.items():
         for (start, shape), times in by_start.items():
-            plain = shape == next(iter(SHAPES))
+            mark, alpha, kind = ("o", 1.0, "") if shape == next(iter(SHAPES)) else ("s", 0.4, ", scaled")
             axis.plot(
                 COVARIANCES,
                 np.where(np.isfinite(times[:, 2]), times[:, 2], np.nan),
-                styles[start],
-                marker="o" if plain else "s",
+                {"2e5": "-", "2e4": "--"}[start],
+                marker=mark,
                 markersize=3.5,
                 color=panels.COLORS[name],
-                alpha=1.0 if plain else 0.4,
+                alpha=alpha,
                 linewidth=1.1,
-                label=f"K(0) {start}{'' if plain else ', scaled'}"
-                if name == next(iter(data.started))
-                else None,
+                label=f"K(0) {start}{kind}" if name == next(iter(data.started)) else None,
             )
-    axis.axhline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
+    axis.axhline(limit, **STATED)
     axis.set(xscale="log", yscale="log", xlabel="p in P(0); no dot: $K_e$ never right", ylabel="time [s]")
     axis.legend()
 
@@ -201,15 +192,16 @@ def _conditions(axis: Axes, data: Data, limit: float) -> None:
         for key in "KBM"
     }
     panels.dots(axis, groups, colors)
-    axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
+    axis.axvline(limit, **STATED)
     axis.set(xscale="log", xlabel="time [s]")
     axis.legend()
 
 
 @dataclass(frozen=True, eq=False)
-class LeastSquaresFirstSeconds(Numbered):
+class LeastSquaresFirstSeconds:
     """The figure of one surface."""
 
+    NUMBER: str
     PARAMETERS: Mapping[str, Experiment]
     surface: str  # of the parameters, the one that is judged
     claim: str  # the beginning of its claims' names

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -11,10 +11,10 @@ from palpate.arrays import Array
 from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Numbered, ThesisClaim, claim, spread
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, ZERO, Axes, Figure
 from palpate_thesis.runs import Runs
 
 MOVING = 0.5
@@ -28,16 +28,13 @@ LEVEL, PLAUSIBLE = 0.10, 0.25
 """By what share K may differ from the thesis' level, and B from the surface's own."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data and criteria of a figure of the later slot."""
 
     shown: dict[str, Record]  # one press of each surface
     found: dict[str, list[PressEstimates]]  # over the seeds
     varied: dict[str, dict[str, list[PressEstimates]]]  # of the first surface, or of each
-    ratios: dict[
-        str, Array
-    ]  # of the first surface: quantiles of K, B, M from single samples, shape (seeds, 3)
+    ratios: dict[str, Array]  # of the first surface: quantiles of K, B, M, each shape (seeds, 3)
     truth: dict[str, float]  # M, B, K of the first surface
 
 
@@ -48,7 +45,7 @@ def run(runs: Runs, surfaces: Mapping[str, Experiment], *, vary: int) -> Data:
     surface = msgspec.to_builtins(runs.laboratory.of(first).surface)
     return Data(
         shown={name: press_runs.contact(runs.one(e)) for name, e in surfaces.items()},
-        found={name: runs.over_seeds(e, press_runs.numbers_of) for name, e in surfaces.items()},
+        found=runs.by_name(surfaces, press_runs.numbers_of),
         varied={
             name: press_runs.sweep(runs, press_runs.conditions(e))
             for name, e in list(surfaces.items())[:vary]
@@ -119,21 +116,13 @@ def found_claim(
 
 def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
     """The ratios of sec. 5.1: is it difficult to obtain B and M with them?"""
-    low, high = (data.ratios["B"][:, i] / data.truth["B"] for i in (0, 2))
-    m_low, _, m_high = (data.ratios["M"][:, i] for i in range(3))
-    f_low, f_middle, f_high = (median(list(1e-3 * data.ratios["K"][:, i])) for i in range(3))
+    scaled = {"K": 1e-3 * data.ratios["K"], "B": data.ratios["B"] / data.truth["B"], "M": data.ratios["M"]}
     return claim(
         id_,
-        median(list(high - low)) > 1.0,
-        B_low=median(list(low)),
-        B_high=median(list(high)),
-        M_low=median(list(m_low)),
-        M_high=median(list(m_high)),
+        median(scaled["B"][:, 2] - scaled["B"][:, 0]) > 1.0,
         true_M=data.truth["M"],
         true_K=1e-3 * data.truth["K"],
-        K_low=f_low,
-        K=f_middle,
-        K_high=f_high,
+        **{key: [median(values[:, i]) for i in range(3)] for key, values in scaled.items()},
     )
 
 
@@ -149,15 +138,13 @@ def plot(data: Data, near: float) -> Figure:
     axes[5].set_ylim(*axes[4].get_ylim())
     for name, press in data.shown.items():
         level = 1e-3 * press_runs.ratio(press)
-        axes[4].axhline(level, color=panels.COLORS[name], linewidth=0.9, linestyle="--")
-        axes[5].axhline(level, color=panels.COLORS[name], linewidth=0.9, linestyle="--")
+        for axis in axes[4:6]:
+            axis.axhline(level, color=panels.COLORS[name], linewidth=0.9, linestyle="--")
+    presses = data.shown.values()
     for axis, key in ((axes[1], "M"), (axes[3], "B")):
-        curves = [
-            press[f"{key}_thesis"][press_runs.between(press, *press_runs.SLOT)]
-            for press in data.shown.values()
-        ]
-        panels.calm_limits(axis, np.zeros(1), *curves)
-        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+        slots = (press[f"{key}_thesis"][press_runs.between(press, *press_runs.SLOT)] for press in presses)
+        panels.calm_limits(axis, np.zeros(1), *slots)
+        axis.axhline(0.0, **ZERO)
     _gaps(axes[6], data, near)
     _ratios(axes[7], data)
     return drawing
@@ -174,7 +161,7 @@ def _gaps(axis: Axes, data: Data, near: float) -> None:
     }
     panels.dots(axis, groups, panels.COLORS)
     for limit in (-100.0 * near, 100.0 * near):
-        axis.axvline(limit, color=style.FAIL, linewidth=0.9, linestyle=":")
+        axis.axvline(limit, **STATED)
     axis.set_xlabel(f"difference [%]; dotted: {100.0 * near:g} %")
 
 
@@ -184,9 +171,10 @@ def _ratios(axis: Axes, data: Data) -> None:
     for i, key in enumerate("KBM"):
         low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
         axis.plot([low, high], [i, i], color=style.MEASURED, linewidth=6, solid_capstyle="butt")
-        axis.plot(middle, i, "|", color=style.INK, markersize=13, label="ratios, middle" if i == 0 else None)
+        labels = (None, None) if i else ("ratios, middle", "least squares")
+        axis.plot(middle, i, "|", color=style.INK, markersize=13, label=labels[0])
         fit = median([getattr(f, key) for f in data.found[surface]]) / data.truth[key]
-        axis.plot(fit, i, "o", color=style.SERIES[0], label="least squares" if i == 0 else None)
+        axis.plot(fit, i, "o", color=style.SERIES[0], label=labels[1])
     axis.axvline(1.0, **style.KNOWN, label="true")
     axis.set_xscale("symlog", linthresh=2.0)
     axis.set_yticks(range(3), ["K", "B", "M"])
@@ -201,9 +189,10 @@ def plausible(found: PressEstimates) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Later(Numbered):
+class Later:
     """The figure of one surface; `judged` is the last of its parameters, and the others are shown beside it."""
 
+    NUMBER: str
     PARAMETERS: Mapping[str, Experiment]
     judged: str  # of the parameters
     claim: str  # the beginning of its claims' names
@@ -238,22 +227,8 @@ class Later(Numbered):
         return plot(data, self.apart)
 
 
-FOAM = Later(
-    "6.2",
-    press_runs.FOAMS,
-    judged="relaxing foam",
-    claim="least-squares-foam-level",
-    ratio="single-sample-ratios.foam",
-    apart=0.06,
-    level=7.2,
-)
-RUBBER = Later(
-    "6.5",
-    {"rubber": press_runs.RUBBER},
-    judged="rubber",
-    claim="least-squares-rubber-level",
-    ratio="single-sample-ratios.rubber",
-    apart=0.02,
-    level=44.0,
-)
+_NAMES = ("least-squares-foam-level", "single-sample-ratios.foam")
+FOAM = Later("6.2", press_runs.FOAMS, "relaxing foam", *_NAMES, apart=0.06, level=7.2)
+_NAMES = ("least-squares-rubber-level", "single-sample-ratios.rubber")
+RUBBER = Later("6.5", {"rubber": press_runs.RUBBER}, "rubber", *_NAMES, apart=0.02, level=44.0)
 STUDIES = (FOAM, RUBBER)

@@ -1,22 +1,21 @@
 """Figure 6.3: least squares on styrofoam from raw signals; and whether any one foam shows figures 6.1 to 6.3."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.bench import Experiment, with_values
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, texts
+from palpate_thesis.claims import ThesisClaim, claim
 from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import ZERO, Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.3"
-TITLE, CAPTION = texts(NUMBER)
 PLAIN_DAMPINGS = (5.0, 15.0, 30.0, 60.0, 100.0, 200.0, 300.0, 400.0)
 BRANCHES = tuple(product((3000.0, 7000.0, 20000.0, 40000.0), (0.02, 0.1, 0.23, 0.6), (5.0, 60.0)))
 NEAR = 0.06
@@ -51,8 +50,7 @@ SHOWS: dict[str, Callable[[PressEstimates], bool]] = {
 """Sentences of figures 6.1 to 6.3 about a foam."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """The press of figure 6.2 from raw signals, and what each foam shows."""
 
     later: later.Data
@@ -66,16 +64,31 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """One press a seed on both foams; one on each of the others."""
-    cases = [(e, runs.seeds[0]) for e in PARAMETERS.values()]
-    return Data(
-        later=later.run(runs, press_runs.FOAMS, vary=1),
-        foams=dict(zip(PARAMETERS, runs.over(cases, press_runs.numbers_of), strict=True)),
-    )
+    foams = runs.by_name(PARAMETERS, press_runs.numbers_of, 1)
+    return Data(later.run(runs, press_runs.FOAMS, vary=1), {name: found[0] for name, found in foams.items()})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Signs of M and B, K, and all at once."""
-    return [*_raw_signs(data), _together(data)]
+    counts = {name: sum(row) for name, row in data.table.items()}
+    most = max(counts.values())
+    best = next(name for name, count in counts.items() if count == most)
+    lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
+    lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
+    return [
+        *_raw_signs(data),
+        claim(
+            "least-squares-one-foam",
+            most == len(SHOWS),
+            most=most,
+            sentences=len(SHOWS),
+            best=best,
+            lack=lack,
+            such=sum(c == most for c in counts.values()),
+            foams=len(counts),
+            names=", ".join(SHOWS),
+        ),
+    ]
 
 
 def _count(data: Data, *what: str) -> str:
@@ -102,43 +115,18 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
     ]
 
 
-def _together(data: Data) -> ThesisClaim:
-    counts = {name: sum(row) for name, row in data.table.items()}
-    most = max(counts.values())
-    best = next(name for name, count in counts.items() if count == most)
-    lacking = [what for what, shown in zip(SHOWS, data.table[best], strict=True) if not shown]
-    lack = f"; the best lacks {', '.join(lacking)}" if lacking else ""
-    return claim(
-        "least-squares-one-foam",
-        most == len(SHOWS),
-        most=most,
-        sentences=len(SHOWS),
-        best=best,
-        lack=lack,
-        such=sum(c == most for c in counts.values()),
-        foams=len(counts),
-        names=", ".join(SHOWS),
-    )
-
-
 def plot(data: Data) -> Figure:
     """The six panels from raw signals; the signs over all foams, and what each foam shows."""
     drawing, axes = panels.grid(5)
     shown = data.later.shown
     panels.six(axes, shown, "raw", (0.0, press_runs.FIRST))
-    ratios = [
-        1e-3
-        * panels.calm(p, "force_sampled", press_runs.FIRST)
-        / panels.calm(p, "displacement", press_runs.FIRST)
-        for p in shown.values()
-    ]
-    panels.calm_limits(axes[4], *ratios)
+    panels.calm_limits(axes[4], *(panels.calm_ratio(p, "force_sampled") for p in shown.values()))
     for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
         curves = [
             scale * p[f"{key}_raw"][press_runs.between(p, 0.1, press_runs.FIRST)] for p in shown.values()
         ]
         panels.calm_limits(axis, np.zeros(1), *curves)
-        axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
+        axis.axhline(0.0, **ZERO)
     for axis in axes[6:]:
         axis.remove()
     _signs(drawing.add_subplot(5, 2, (7, 9)), data)
@@ -152,11 +140,10 @@ def _signs(axis: Axes, data: Data) -> None:
         ("without memory", [n for n in data.foams if n.startswith("B ")], style.SERIES[0]),
         ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.SERIES[1]),
     ):
-        B = [data.foams[n].B_raw for n in names]
-        M = [data.foams[n].M_raw for n in names]
+        B, M = ([getattr(data.foams[n], key) for n in names] for key in ("B_raw", "M_raw"))
         axis.plot(B, M, "o", color=color, markersize=4, label=label)
-    axis.axhline(0.0, color=style.MEASURED, linewidth=0.9)
-    axis.axvline(0.0, color=style.MEASURED, linewidth=0.9)
+    axis.axhline(0.0, **ZERO)
+    axis.axvline(0.0, **ZERO)
     axis.set_xscale("symlog", linthresh=50.0)
     axis.set_xticks([-100.0, 0.0, 100.0, 1000.0], ["-100", "0", "100", "1000"])
     (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()

@@ -1,13 +1,13 @@
 """Figure 6.6: the learning rate of the neural identifier."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate_thesis.claims import ThesisClaim, claim, often, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
 from palpate_thesis.least_squares import panels
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import network
@@ -15,7 +15,6 @@ from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkPress
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.6"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = network.FOAM
 RATES = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
 SHOWN = {1e-6: style.SERIES[0], 1e-5: style.SERIES[1], 1e-4: style.SERIES[2], 1e-2: style.SERIES[3]}
@@ -27,15 +26,12 @@ OTHERS = (25.0, 100.0)
 """Output amplitudes besides the chosen one, since the rate's meaning hangs on them [N]."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data of the figure: one press learned at several rates, and the times over seeds and conditions."""
 
     press: NetworkPress
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start
-    found: dict[
-        float, dict[float, list[NetworkAnswer]]
-    ]  # by amplitude and rate, a press and a start for each seed
+    found: dict[float, dict[float, list[NetworkAnswer]]]  # by amplitude and rate, a press and start a seed
     varied: dict[str, dict[float, list[NetworkAnswer]]]  # by condition and rate
     amplitude: float  # of the network as chosen [N]
 
@@ -45,21 +41,17 @@ def run(runs: Runs) -> Data:
     some = network.presses(runs, PARAMETERS, "foam")
     own = network.network_of(runs)
     starts = network.starts(runs)
-    curves = {rate: network.learn(some[0], replace(own, rate=rate), starts[0])[1] for rate in SHOWN}
-    found = {a: _by_rate(runs, some, a, RATES) for a in (own.amplitude, *OTHERS)}
+    curves = {rate: network.learn(some[0], own._replace(rate=rate), starts[0])[1] for rate in SHOWN}
+    choices = [own._replace(amplitude=a, rate=rate) for a in (own.amplitude, *OTHERS) for rate in RATES]
+    found: dict[float, dict[float, list[NetworkAnswer]]] = {}
+    for choice, answers in network.sweep(runs, some, choices).items():
+        found.setdefault(choice.amplitude, {})[choice.rate] = answers
     conditions = network.varied_presses(runs, PARAMETERS, "foam")
     varied = {
-        name: {rate: network.answers(runs, few, replace(own, rate=rate), starts[:FEW]) for rate in SMALLER}
+        name: {rate: network.answers(runs, few, own._replace(rate=rate), starts[:FEW]) for rate in SMALLER}
         for name, few in conditions.items()
     }
     return Data(some[0], curves, found, varied, own.amplitude)
-
-
-def _by_rate(
-    runs: Runs, some: Sequence[NetworkPress], amplitude: float, rates: Sequence[float]
-) -> dict[float, list[NetworkAnswer]]:
-    choices = [replace(network.network_of(runs), amplitude=amplitude, rate=rate) for rate in rates]
-    return {choice.rate: found for choice, found in network.sweep(runs, some, choices).items()}
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -70,12 +62,9 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 def _slower(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
     times = [f"{rate:g}: {spread([a.error_gone for a in found[rate]], 's', 2)}" for rate in SMALLER]
-    bad = [name for name, by_rate in data.varied.items() if not often(slower_throughout(by_rate))]
-    other = [f"{a:g} N" for a in OTHERS if not often(slower_throughout(data.found[a]))]
-    exceptions = [*bad, *(f"output amplitude {a}" for a in other)]
-    limits = (
-        f"It does not hold with: {', '.join(exceptions)}." if exceptions else "It holds under all of them."
-    )
+    tried = data.varied | {f"output amplitude {a:g} N": data.found[a] for a in OTHERS}
+    bad = [name for name, by_rate in tried.items() if not often(slower_throughout(by_rate))]
+    limits = f"It does not hold with: {', '.join(bad)}." if bad else "It holds under all of them."
     nearest = min(found, key=lambda rate: abs(float(np.median([a.error_gone for a in found[rate]])) - 0.6))
     return claim(
         "network-learning-rate.slower",
@@ -91,15 +80,12 @@ def _slower(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> Thesi
 
 def _too_large(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
     first = {a: stuck_from(by_rate) for a, by_rate in data.found.items()}
-    told = (
-        ", ".join(f"{rate:g} at {a:g} N" for a, rate in first.items() if np.isfinite(rate))
-        or "none that was tried"
-    )
+    told = ", ".join(f"{rate:g} at {a:g} N" for a, rate in first.items() if np.isfinite(rate))
     largest = found[RATES[-1]]
     return claim(
         "network-learning-rate.too-large",
         bool(np.isfinite(first[data.amplitude])),
-        stuck=told,
+        stuck=told or "none that was tried",
         largest=RATES[-1],
         runs=sum(map(stuck, largest)),
         of=len(largest),
@@ -143,8 +129,7 @@ def plot(data: Data) -> Figure:
     for axis, (letter, (title, label)) in zip(axes, PANELS.items(), strict=True):
         panels.set_title(axis, letter, title)
         axis.set_ylabel(label)
-    colors = style.SERIES[:3]
-    for (amplitude, by_rate), color in zip(data.found.items(), colors, strict=True):
+    for (amplitude, by_rate), color in zip(data.found.items(), style.SERIES, strict=False):
         _times(axes[3], by_rate, f"{amplitude:g} N", color)
     axes[3].axhline(network.PRESS, color=style.INK, linewidth=0.6)
     axes[3].set(xscale="log", yscale="log", xlabel="learning rate; cross: not within the 4 s")
@@ -172,7 +157,6 @@ def _times(axis: Axes, by_rate: Mapping[float, Sequence[NetworkAnswer]], label: 
     done = np.isfinite(times)
     axis.plot(rates[done], times[done], ".", color=color, markersize=4, alpha=0.5)
     middle = np.median(times, axis=1)
-    axis.plot(
-        rates[:, 0], np.where(np.isfinite(middle), middle, np.nan), color=color, linewidth=1.1, label=label
-    )
+    middle[~np.isfinite(middle)] = np.nan
+    axis.plot(rates[:, 0], middle, color=color, linewidth=1.1, label=label)
     axis.plot(rates[~done], np.full(int((~done).sum()), 1.4 * network.PRESS), "x", color=color, markersize=4)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,19 +11,12 @@ from palpate.bench import Experiment
 from palpate.identifiers.neural_probe import SETTINGS
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.claims import Numbered, ThesisClaim
+from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.least_squares import panels
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import STATED, ZERO, Axes, Figure
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.claims import SMALL, ClaimPart, Grounds, share
-from palpate_thesis.neural_identifier.network import (
-    AMPLITUDES,
-    STARTS,
-    WEIGHTS,
-    NetworkAnswer,
-    NetworkChoice,
-    NetworkPress,
-)
+from palpate_thesis.neural_identifier.network import AMPLITUDES, WEIGHTS, NetworkAnswer, NetworkChoice
 from palpate_thesis.runs import Runs
 
 SHOWN_STARTS = 5
@@ -33,11 +27,10 @@ CALM = 60
 NAMES = {"foam": "plain foam", "rubber": "rubber"}
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Data of such a figure: a press, the answers of a few networks on it, and the grounds of the claims."""
 
-    press: NetworkPress  # that of the first noise seed
+    press: network.NetworkPress  # that of the first noise seed
     curves: list[Array]  # K, B, M and error of a few starts on it
     grounds: Grounds
 
@@ -47,12 +40,17 @@ def run(runs: Runs, experiment: Experiment, surface: str) -> Data:
     some = network.presses(runs, experiment, surface)
     return Data(
         some[0],
-        [network.learn(some[0], network.network_of(runs), start)[1] for start in STARTS[:SHOWN_STARTS]],
+        [
+            network.learn(some[0], network.network_of(runs), start)[1]
+            for start in network.STARTS[:SHOWN_STARTS]
+        ],
         grounds(runs, experiment, surface, some),
     )
 
 
-def grounds(runs: Runs, experiment: Experiment, surface: str, some: Sequence[NetworkPress]) -> Grounds:
+def grounds(
+    runs: Runs, experiment: Experiment, surface: str, some: Sequence[network.NetworkPress]
+) -> Grounds:
     """Grounds of the claims about a surface."""
     x = SETTINGS[surface].values[0]
     at_probe = experiment.approach.switch + runs.laboratory.of(experiment).surface.stiffness * x
@@ -91,18 +89,14 @@ def plot(data: Data, parts: Sequence[ClaimPart], band: float) -> Figure:
 
 
 def _record(data: Data) -> Record:
-    K, B, M, _ = data.curves[0].T
-    press = data.press
-    columns = {
-        "t": np.arange(len(press.force)) * network.TICK,
+    press, t = data.press, np.arange(len(data.press.force)) * network.TICK
+    columns: dict[str, Any] = {
         "displacement": press.inputs[:, 0].copy(),
         "force_measured": press.force,
-        "M_probe": M.copy(),
-        "B_probe": B.copy(),
-        "K_probe": K.copy(),
+        "t": t,
     }
-    units = {"t": "s", "displacement": "m", "force_measured": "N"}
-    return Record(columns, {**units, "M_probe": "kg", "B_probe": "N s/m", "K_probe": "N/m"}, {})
+    columns |= {f"{key}_probe": data.curves[0][:, i].copy() for i, key in enumerate("KBM")}
+    return Record(columns, dict.fromkeys(columns, ""), {})
 
 
 def _others(axes: list[Axes], data: Data, color: str) -> None:
@@ -116,12 +110,10 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
         squares = scale * data.press.squares[:, "MBK".index(key)]
         axis.plot(t, squares, color=style.MEASURED, linewidth=1.0, linestyle="--")
         panels.calm_limits(axis, *(c[CALM:] for c in curves), squares[200:], margin=0.1)
-    axes[2].plot(
-        t, 1e-3 * np.full(len(t), data.press.ratio), color=style.SERIES[1], linewidth=1.0, linestyle=":"
-    )
-    lines = ("network, five starts", "", "", "", "", "least squares", "f/x at the end")
-    handles = [line for line, label in zip(axes[2].lines, lines, strict=True) if label]
-    labels = [label for label in lines if label]
+    ratio = 1e-3 * np.full(len(t), data.press.ratio)
+    axes[2].plot(t, ratio, color=style.SERIES[1], linewidth=1.0, linestyle=":")
+    handles = [axes[2].lines[i] for i in (0, -2, -1)]
+    labels = ("network, five starts", "least squares", "f/x at the end")
     axes[2].legend(handles, labels, ncols=3, loc="lower right")
 
 
@@ -132,12 +124,8 @@ def _map(
     *,
     thresholds: bool,
 ) -> None:
-    shares = np.array(
-        [
-            [share(swept[NetworkChoice(a, w, thresholds)], part) for a in AMPLITUDES for w in WEIGHTS]
-            for part in parts
-        ]
-    )
+    found = [swept[NetworkChoice(a, w, thresholds)] for a in AMPLITUDES for w in WEIGHTS]
+    shares = np.array([[share(some, part) for some in found] for part in parts])
     _shares(axis, shares, [part.suffix for part in parts])
     n = len(WEIGHTS)
     for i in range(1, len(AMPLITUDES)):
@@ -167,35 +155,30 @@ def _shares(axis: Axes, shares: Array, rows: Sequence[str]) -> None:
 def _cloud(axis: Axes, grounds: Grounds, band: float) -> None:
     from matplotlib.patches import Rectangle
 
-    fixed = [a for choice, some in grounds.swept.items() if not choice.thresholds for a in some]
-    learning = [a for choice, some in grounds.swept.items() if choice.thresholds for a in some]
+    swept = {
+        learns: [a for choice, some in grounds.swept.items() if choice.thresholds is learns for a in some]
+        for learns in (True, False)
+    }
     for some, color, label in (
-        (learning, style.SERIES[0], "swept, thresholds learn"),
-        (fixed, style.SERIES[1], "swept, thresholds at zero"),
+        (swept[True], style.SERIES[0], "swept, thresholds learn"),
+        (swept[False], style.SERIES[1], "swept, thresholds at zero"),
         (grounds.nominal, style.INK, "as chosen"),
     ):
-        axis.plot(
-            [a.over for a in some],
-            [a.M for a in some],
-            ".",
-            color=color,
-            markersize=3,
-            label=label,
-            alpha=0.7,
-        )
-    axis.axvline(grounds.perfect, color=style.MEASURED, linewidth=0.9, linestyle="--")
-    axis.add_patch(
-        Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, fill=False, edgecolor=style.FAIL, zorder=3)
-    )
+        at, masses = np.array([(a.over, a.M) for a in some]).T
+        axis.plot(at, masses, ".", color=color, markersize=3, label=label, alpha=0.7)
+    axis.axvline(grounds.perfect, **ZERO, linestyle="--")
+    frame: Any = {"fill": False, "edgecolor": style.FAIL, "zorder": 3}
+    axis.add_patch(Rectangle((1.0 - band, 0.0), 2.0 * band, SMALL, **frame))
     axis.set(xlim=(0.5, 2.5), xlabel="$K_e$ over f/x (dashed: a network without error)", ylabel="$M_e$ [kg]")
     axis.set_yscale("symlog", linthresh=0.1)
     axis.legend(loc="center right", markerscale=3)
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkFirstSeconds(Numbered):
+class NetworkFirstSeconds:
     """The figure of one surface."""
 
+    NUMBER: str
     PARAMETERS: Experiment
     surface: str
     parts: Sequence[ClaimPart]  # of the thesis' claims
@@ -221,33 +204,29 @@ class NetworkError(NetworkFirstSeconds):
     def plot(self, data: Data) -> Figure:
         """The error along a press, and when it is gone."""
         drawing, axes = panels.grid(2)
+        slow = f"Error with amplitude {SLOW.amplitude:g} N, weights to {SLOW.weights:g}"
         for axis, error, letter, title in (
             (axes[0], data.curves[0][:, 3], "a", "Error as chosen: amplitude 40 N, weights to 0.5"),
-            (
-                axes[2],
-                network.learn(data.press, SLOW, 0)[1][:, 3],
-                "b",
-                f"Error with amplitude {SLOW.amplitude:g} N, weights to {SLOW.weights:g}",
-            ),
+            (axes[2], network.learn(data.press, SLOW, 0)[1][:, 3], "b", slow),
         ):
             axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
             axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
-            axis.axvline(0.6, color=style.FAIL, linewidth=0.9, linestyle=":")
+            axis.axvline(0.6, **STATED)
             axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
             panels.set_title(axis, letter, title)
         for axis, learns, letter in ((axes[1], True, "c"), (axes[3], False, "d")):
             _times(axis, data.grounds.swept, thresholds=learns)
-            panels.set_title(
-                axis, letter, f"Time until gone; thresholds {'learn' if learns else 'stay at zero'}"
-            )
+            kind = "learn" if learns else "stay at zero"
+            panels.set_title(axis, letter, f"Time until gone; thresholds {kind}")
         return drawing
 
 
 def _times(axis: Axes, swept: Mapping[NetworkChoice, Sequence[NetworkAnswer]], *, thresholds: bool) -> None:
-    for weights, color in zip(WEIGHTS, style.SERIES[:5], strict=True):
+    for weights in WEIGHTS:
         found = [[a.error_gone for a in swept[NetworkChoice(a, weights, thresholds)]] for a in AMPLITUDES]
-        middle = np.median(found, axis=1)
-        axis.plot(AMPLITUDES, middle, "o-", color=color, markersize=3.5, linewidth=1.0, label=f"{weights:g}")
+        axis.plot(
+            AMPLITUDES, np.median(found, axis=1), "o-", markersize=3.5, linewidth=1.0, label=f"{weights:g}"
+        )
     axis.axhspan(*claims.TIME, color=style.FAIL, alpha=0.12, linewidth=0)
     axis.set(xscale="log", yscale="log", xlabel="output amplitude [N]", ylabel="time [s]")
     axis.set_xticks(AMPLITUDES, [f"{a:g}" for a in AMPLITUDES])

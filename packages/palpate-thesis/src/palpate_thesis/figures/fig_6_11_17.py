@@ -2,20 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
-from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
-from palpate_thesis.claims import Numbered, ThesisClaim, claim, often
+from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.conditions import stops_holding
 from palpate_thesis.force_control import tracking
 from palpate_thesis.force_control.panels import following_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracked, Tracking, describe, since_contact, track
-from palpate_thesis.look import Figure
+from palpate_thesis.look import LIMIT_LINE, Figure
 from palpate_thesis.runs import Runs
 
 JUDGED = (10.0, 15.0)
@@ -28,9 +28,10 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Steps(Numbered):
+class Steps:
     """The figure of one surface and one desired force."""
 
+    NUMBER: str
     id: str  # of its claim
     PARAMETERS: Experiment
     shown: Window = (9.5, 13.5)  # from when to when after contact [s]
@@ -66,8 +67,7 @@ class Steps(Numbered):
         return one.follows is self.follows
 
 
-@dataclass(frozen=True)
-class Adapting:
+class Adapting(NamedTuple):
     """Data of figure 6.17."""
 
     tracked: Tracked
@@ -100,7 +100,7 @@ class FromTheStart(Steps):
         following_panel(dots, data.tracked.varied)
         shown = data.t < self.shown[1]
         away.plot(data.t[shown], data.away[shown])
-        away.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--")
+        away.axhline(LIMIT, **LIMIT_LINE)
         away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=self.shown, ylim=(0.0, None))
         away.set_title("from the settled cycles, mean over 0.25 s; dashed: limit of adapted")
         return drawing

@@ -1,19 +1,18 @@
 """Figure 6.14: the neural controller with a small learning rate, minutes later."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import with_values
-from palpate.bench.force_input import CONTACT, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
 from palpate_studies.metrics.window import SETTLE, rms
-from palpate_thesis.claims import ThesisClaim, claim, spread, texts
+from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.conditions import RELAXING_FOAM
 from palpate_thesis.figures.fig_6_11_17 import CYCLE, SLOW_RATE
 from palpate_thesis.force_control.panels import force_panel, panels
@@ -27,11 +26,10 @@ from palpate_thesis.force_control.tracking import (
     slot,
     tracking,
 )
-from palpate_thesis.look import Figure
+from palpate_thesis.look import LIMIT_LINE, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.14"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
 SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
 OTHERS: Mapping[str, Mapping[str, Any]] = {
@@ -40,16 +38,14 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class CycleErrors:
+class CycleErrors(NamedTuple):
     """The error of each cycle outside the steps [N], up to the first loss of contact."""
 
     error: Array  # (cycles,)
     lost: float | None  # when [s]
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     shown: Record
@@ -60,11 +56,9 @@ class Data:
 def run(runs: Runs) -> Data:
     """190 s of contact; on the other foam and with the plain integral controller as well."""
     both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), course_of(record)))
-    courses = {"foam": [course for _, course in both]}
-    seeds = runs.seeds[:2]
-    for name, changes in OTHERS.items():
-        courses[name] = runs.over([(with_values(PARAMETERS, changes), seed) for seed in seeds], course_of)
-    return Data(slot(runs.one(PARAMETERS), *SHOWN), [found for found, _ in both], courses)
+    nominal, courses = zip(*both, strict=True)
+    others = runs.by_name({n: with_values(PARAMETERS, by) for n, by in OTHERS.items()}, course_of, 2)
+    return Data(slot(runs.one(PARAMETERS), *SHOWN), [*nominal], {"foam": [*courses], **others})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -98,13 +92,9 @@ def plot(data: Data) -> Figure:
             course.plot(t, one.error, color=color, linewidth=1, alpha=0.7, label=name if i == 0 else None)
             if one.lost is not None and len(t):
                 course.plot(t[-1], one.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
-    course.axhline(LIMIT, color=style.INK, linewidth=1, linestyle="--", label="limit of following")
-    course.set(
-        xlabel="time since contact [s]",
-        ylabel="RMS error outside steps [N]",
-        ylim=(0.0, None),
-        xlim=(0.0, None),
-    )
+    course.axhline(LIMIT, **LIMIT_LINE, label="limit of following")
+    course.set(xlabel="time since contact [s]", ylabel="RMS error outside steps [N]")
+    course.set(xlim=(0.0, None), ylim=(0.0, None))
     style.legend(course)
     return drawing
 

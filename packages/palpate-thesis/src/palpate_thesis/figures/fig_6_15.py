@@ -1,8 +1,7 @@
 """Figure 6.15: position along the surface and angle under the neural controller."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,21 +9,21 @@ from palpate.bench import load, with_values
 from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.window import rms
-from palpate_thesis.claims import ThesisClaim, claim, often, texts
-from palpate_thesis.conditions import VARIED_SEEDS, rougher
+from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.conditions import by_condition, rougher
 from palpate_thesis.force_control.panels import dots_panel, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
 from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.15"
-TITLE, CAPTION = texts(NUMBER)
 PARAMETERS = with_values(load("foam-neural"), {"run.press": 15.0})
 SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
 VISIBLE = (0.5e-3, np.radians(0.2))
 """From where errors of y [m] and of the angle [rad] are not zero: some hundred times what an encoder resolves."""
 SHARE = 0.25
 """A cause whose removal takes this share off the error matters."""
+STIFF = {"kp": 1600.0, "kv": 160.0}
 CAUSES: Mapping[str, Mapping[str, Any]] = {
     "no sticking\nto the foam": {"wall.side_friction": 0.0},
     "friction\nhalf": rougher(FOAM, 0.5),
@@ -32,19 +31,13 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "friction\ncompensated": {"compensation.level": FOAM.friction.coulomb},
     "rubber": {"surface": RUBBER.surface},
     "kp 1600\nkv 160": {
-        "controller.kp": 1600.0,
-        "controller.kv": 160.0,
-        "approach.kp": 1600.0,
-        "approach.kv": 160.0,
+        f"{who}.{gain}": v for who in ("controller", "approach") for gain, v in STIFF.items()
     },
     "hybrid control\nalone": {"controller": {"kind": "hybrid", "kf": 0.25, "ki": 0.0}},
 }
 
-SOURCE = "fig. 6.15, sec. 6.3"
 
-
-@dataclass(frozen=True)
-class Errors:
+class Errors(NamedTuple):
     """True errors: at the switch to force control, and RMS over the window in contact, where they may change sign."""
 
     y_switch: float  # [m]
@@ -52,8 +45,7 @@ class Errors:
     phi: float  # [rad]
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Measured values for `check` and `plot`."""
 
     shown: Record
@@ -62,47 +54,31 @@ class Data:
 
 def run(runs: Runs) -> Data:
     """The whole approach and fifteen seconds of contact; then with one cause changed at a time."""
-    varied = {"as\nchosen": runs.over_seeds(PARAMETERS, errors_of)}
-    for name, changes in CAUSES.items():
-        e = with_values(PARAMETERS, changes)
-        varied[name] = runs.over([(e, seed) for seed in runs.seeds[:VARIED_SEEDS]], errors_of)
+    worlds = {name: with_values(PARAMETERS, by) for name, by in {"as\nchosen": {}, **CAUSES}.items()}
+    varied = by_condition(runs, worlds, lambda e, seed: errors_of(runs.one(e, seed)), {"as\nchosen"})
     return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Whether the errors are there, and whether the thesis' two reasons are."""
-    return [_not_zero(data), _there_before(data), _sticks(data)]
-
-
-def _not_zero(data: Data) -> ThesisClaim:
-    nominal = data.varied["as\nchosen"]
-    y, phi = _y(nominal), [float(np.degrees(e.phi)) for e in nominal]
-    half = np.median(_y(data.varied["friction\nhalf"])) / np.median(y)
-    return claim(
-        "neural-free-directions",
-        often(map(visible, nominal)),
-        y=y,
-        phi=phi,
-        visible_y=1e3 * VISIBLE[0],
-        visible_phi=np.degrees(VISIBLE[1]),
-        gone=1 - half,
-    )
-
-
-def _there_before(data: Data) -> ThesisClaim:
-    before = [1e3 * e.y_switch for e in data.varied["as\nchosen"]]
-    return claim(
-        "neural-free-directions.before",
-        often(abs(b) > 1e3 * VISIBLE[0] for b in before),
-        before=before,
-        visible=1e3 * VISIBLE[0],
-    )
-
-
-def _sticks(data: Data) -> ThesisClaim:
-    free = _y(data.varied["no sticking\nto the foam"])
-    taken = 1.0 - np.median(free) / np.median(_y(data.varied["as\nchosen"]))
-    return claim("neural-free-directions.sticks", bool(taken >= SHARE), free=free, taken=taken, share=SHARE)
+    nominal, free = data.varied["as\nchosen"], data.varied["no sticking\nto the foam"]
+    middle = {name: np.median([e.y for e in found]) for name, found in data.varied.items()}
+    taken = 1.0 - middle["no sticking\nto the foam"] / middle["as\nchosen"]
+    numbers = {"nominal": nominal, "visible": 1e3 * VISIBLE[0]}
+    return [
+        claim(
+            "neural-free-directions",
+            often(map(visible, nominal)),
+            phi=[float(np.degrees(e.phi)) for e in nominal],
+            visible_phi=np.degrees(VISIBLE[1]),
+            gone=1 - middle["friction\nhalf"] / middle["as\nchosen"],
+            **numbers,
+        ),
+        claim(
+            "neural-free-directions.before", often(abs(e.y_switch) > VISIBLE[0] for e in nominal), **numbers
+        ),
+        claim("neural-free-directions.sticks", bool(taken >= SHARE), free=free, taken=taken, share=SHARE),
+    ]
 
 
 def plot(data: Data) -> Figure:
@@ -118,13 +94,9 @@ def plot(data: Data) -> Figure:
     for axis in (y, phi):
         axis.axhline(0.0, **style.KNOWN)
     phi.set_xlabel("time since contact [s]")
-    dots_panel(
-        dots,
-        data.varied,
-        lambda e: 1e3 * e.y,
-        visible,
-        limit=1e3 * VISIBLE[0],
-        label="RMS of y [mm]",
+    dots_panel(dots, data.varied, lambda e: 1e3 * e.y, visible, 1e3 * VISIBLE[0])
+    dots.set(
+        ylabel="RMS of y [mm]",
         title="10 to 15 s after contact, a dot: y and angle are visibly not zero; a cross: not; dashed: visible",
     )
     return drawing
@@ -138,10 +110,6 @@ def _signal(axis: Axes, t: Any, values: Any, label: str, color: str) -> None:
 def visible(e: Errors) -> bool:
     """Whether both errors are."""
     return e.y > VISIBLE[0] and e.phi > VISIBLE[1]
-
-
-def _y(errors: Sequence[Errors]) -> list[float]:
-    return [1e3 * e.y for e in errors]
 
 
 def errors_of(record: Record) -> Errors:

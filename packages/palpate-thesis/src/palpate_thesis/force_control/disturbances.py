@@ -1,15 +1,15 @@
 """Runs with a change in the middle: of the surface, its position, or the desired pose."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, build
-from palpate.bench.force_input import COLUMNS, DIVERGED, DONE
+from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, LoopState
+from palpate.bench.summary import DIVERGED, DONE
 from palpate.environments import KelvinVoigt, join
 from palpate.records import Record
 
@@ -19,8 +19,7 @@ LOOK = 100
 Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
 
 
-@dataclass(frozen=True)
-class Disturbance:
+class Disturbance(NamedTuple):
     """Something that changes between two ticks.
 
     Args:

@@ -9,7 +9,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.force_control.tracking import Tracking
-from palpate_thesis.look import Axes, Figure
+from palpate_thesis.look import LIMIT_LINE, Axes, Figure
 
 T = TypeVar("T")
 HELD: dict[str, Any] = {"color": style.OK, "s": 16, "linewidths": 0}
@@ -60,10 +60,7 @@ def dots_panel(
     found: Mapping[str, Sequence[T]],
     value: Callable[[T], float],
     holds: Callable[[T], bool],
-    *,
     limit: float | None,
-    label: str,
-    title: str = "",
 ) -> None:
     """One mark per run, by variation: a dot if the claim is true, a cross if not."""
     for at, runs in enumerate(found.values()):
@@ -72,26 +69,17 @@ def dots_panel(
             places = [i for i, one in enumerate(runs) if holds(one) == good]
             axis.scatter(spot[places], [value(runs[i]) for i in places], **mark)
     if limit is not None:
-        axis.axhline(limit, color=style.INK, linewidth=1, linestyle="--")
+        axis.axhline(limit, **LIMIT_LINE)
     axis.set_xticks(range(len(found)), list(found))
-    axis.set_xlim(-0.6, len(found) - 0.4)
-    axis.set_ylim(bottom=0.0)
-    axis.set_ylabel(label)
+    axis.set(xlim=(-0.6, len(found) - 0.4), ylim=(0.0, None))
     axis.grid(visible=False, axis="x")
-    axis.set_title(title)
 
 
 def following_panel(axis: Axes, found: Mapping[str, Sequence[Tracking]]) -> None:
     """RMS error outside the steps, by variation."""
-    dots_panel(
-        axis,
-        found,
-        lambda one: one.settled,
-        lambda one: one.follows,
-        limit=LIMIT,
-        label="RMS error [N]",
-        title="outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit",
-    )
+    dots_panel(axis, found, lambda one: one.settled, lambda one: one.follows, LIMIT)
+    title = "outside the steps, a mark each run: a dot follows, a cross does not; dashed: the limit"
+    axis.set(ylabel="RMS error [N]", title=title)
 
 
 def legend_inside(axis: Axes, **options: object) -> None:

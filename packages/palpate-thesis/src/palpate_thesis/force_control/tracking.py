@@ -1,22 +1,20 @@
 """Common parts of the force-control figures: experiments, criterion of following, varied conditions."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT
-from palpate.bench.summary import losses
+from palpate.bench.summary import CONTACT, losses
 from palpate.records import Record
 from palpate_studies.metrics import Window
 from palpate_studies.metrics.following import LIMIT, SHARE, interval_error
 from palpate_studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import often, spread
-from palpate_thesis.conditions import RELAXING_FOAM, SHORT, VARIED_SEEDS, friction_and_pose
-from palpate_thesis.runs import Runs
+from palpate_thesis.conditions import RELAXING_FOAM, SHORT, friction_and_pose
+from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 T = TypeVar("T")
 
@@ -32,8 +30,7 @@ FOAM = with_values(load("foam-neural"), SHORT)
 RUBBER = with_values(load("rubber-neural"), SHORT)
 
 
-@dataclass(frozen=True)
-class Tracking:
+class Tracking(NamedTuple):
     """How the true force kept to the desired one within a window."""
 
     rms: float  # of the error, steps included [N]
@@ -71,14 +68,9 @@ def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
             return NEVER
         if not len(look.error):
             return Tracking(np.nan, np.nan, np.nan, np.nan, losses(record))
-        off = interval_error(look)
-        return Tracking(
-            rms(look.error),
-            rms(look.after_steps),
-            np.nan if off is None else off,
-            float(look["saturated2"].mean()),
-            losses(record),
-        )
+        off, saturated = interval_error(look), float(look["saturated2"].mean())
+        off = np.nan if off is None else off
+        return Tracking(rms(look.error), rms(look.after_steps), off, saturated, losses(record))
 
     return measure
 
@@ -125,17 +117,14 @@ def robustness(
     runs: Runs, experiment: Experiment, nominal: Sequence[T], measure: Callable[[Record], T]
 ) -> dict[str, list[T]]:
     """`measure` of each variation, the nominal case first."""
-    seeds = runs.seeds[:VARIED_SEEDS]
-    cases = [(name, e, seed) for seed in seeds for name, e in variations(experiment, seed).items()]
-    measured = runs.over([(e, seed) for _, e, seed in cases], measure)
-    found: dict[str, list[T]] = {"as\nchosen": list(nominal)}
-    for (name, _, _), one in zip(cases, measured, strict=True):
-        found.setdefault(name, []).append(one)
-    return found
+    cases: dict[str, list[tuple[Experiment, int]]] = {}
+    for seed in runs.seeds[:VARIED_SEEDS]:
+        for name, e in variations(experiment, seed).items():
+            cases.setdefault(name, []).append((e, seed))
+    return {"as\nchosen": list(nominal), **runs.map_each(lambda case: measure(runs.one(*case)), cases)}
 
 
-@dataclass(frozen=True)
-class Tracked:
+class Tracked(NamedTuple):
     """Data of a figure of force tracking."""
 
     shown: Record

@@ -1,13 +1,14 @@
 """A long run of the neural controller, with its network's weights looked at now and then."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import Bench, Experiment, build
-from palpate.bench.force_input import COLUMNS, CONTACT, LOST
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.summary import CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
 
@@ -16,8 +17,7 @@ LOOK = 1000
 COLUMN = {name: i for i, name in enumerate(COLUMNS)}
 
 
-@dataclass(frozen=True)
-class WeightsAtMoment:
+class WeightsAtMoment(NamedTuple):
     """The controller at a moment, and what went on since the look before."""
 
     t: float  # since contact [s]
@@ -66,8 +66,8 @@ def watch(
     return None if march.contact is not None else float("nan")
 
 
-POSES, TORQUE1, TORQUES = slice(1, 7), slice(7, 8), slice(7, 10)
-"""Columns of the hidden weights of the 9-12-3 network: from both poses, from motor 1's torque, from all torques."""
+HELD = {"poses": slice(1, 7), "motor 1's torque": slice(7, 8), "all torques": slice(7, 10)}
+"""Columns of the hidden weights of the 9-12-3 network, by where they come from."""
 HOLD = 20
 """Ticks after which weights that are held are set back."""
 

@@ -1,17 +1,28 @@
 """The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.records import Record
 from palpate.report import style
+from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.press_runs import between
 from palpate_thesis.look import Axes, Figure
 
 COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
 PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
+NAMES = {
+    "Force": "f [N]",
+    "Displacement": "x [mm]",
+    "Force / displacement": "f/x [kN/m]",
+    **dict(
+        zip(("Inertia", "Damping", "Stiffness"), (label for label, _ in PARAMETERS.values()), strict=True)
+    ),
+}
+"""Of the six panels, (a) to (f), and their y axes."""
 CALM = 0.03
 """Seconds after the change-over from which values set the scale of a panel; before, they go anywhere."""
 
@@ -32,23 +43,13 @@ def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple
     The thesis' letters, in its order read down the columns: (a)-(c) left, (d)-(f) right.
     """
     left, right = axes[0:6:2], axes[1:6:2]
-    for axis, letter, name in zip(
-        left, "abc", ("Force", "Displacement", "Force / displacement"), strict=True
-    ):
+    for axis, letter, (name, label) in zip((*left, *right), "abcdef", NAMES.items(), strict=True):
         set_title(axis, letter, name)
-    for axis, letter, name in zip(right, "def", ("Inertia", "Damping", "Stiffness"), strict=True):
-        set_title(axis, letter, name)
+        axis.set(ylabel=label, xlim=slot)
     for name, press in presses.items():
         _lines(left, right, press, front, slot, name)
-    left[0].set_ylabel("f [N]")
-    left[1].set_ylabel("x [mm]")
-    left[2].set_ylabel("f/x [kN/m]")
-    for axis, (label, _) in zip(right, PARAMETERS.values(), strict=True):
-        axis.set_ylabel(label)
-    for axis in (*left, *right):
-        axis.set_xlim(*slot)
-    left[2].set_xlabel("time since 5 N [s]")
-    right[2].set_xlabel("time since 5 N [s]")
+    for axis in (left[2], right[2]):
+        axis.set_xlabel("time since 5 N [s]")
     if len(presses) > 1:
         style.legend(left[0])
 
@@ -79,6 +80,11 @@ def calm_limits(axis: Axes, *curves: Array, margin: float = 0.25) -> None:
     axis.set_ylim(low - room, high + room)
 
 
+def calm_ratio(press: Record, force: str = "force_measured") -> Array:
+    """f/x of the first slot without its first moments [kN/m]."""
+    return 1e-3 * calm(press, force, press_runs.FIRST) / calm(press, "displacement", press_runs.FIRST)
+
+
 def calm(press: Record, column: str, stop: float) -> Array:
     """A column between its first moments and `stop`."""
     return press[column][between(press, CALM, stop)]
@@ -91,13 +97,7 @@ def dots(axis: Axes, groups: Mapping[str, Mapping[str, list[float]]], colors: Ma
         offset = 0.22 * (shift - (len(groups) - 1) / 2)
         for i, name in enumerate(rows):
             values = group.get(name, [])
-            axis.plot(
-                values,
-                np.full(len(values), i + offset),
-                "o",
-                color=colors[label],
-                markersize=3.5,
-                label=label if i == 0 else None,
-            )
+            mark: Any = {"color": colors[label], "markersize": 3.5, "label": None if i else label}
+            axis.plot(values, np.full(len(values), i + offset), "o", **mark)
     axis.set_yticks(range(len(rows)), rows)
     axis.invert_yaxis()

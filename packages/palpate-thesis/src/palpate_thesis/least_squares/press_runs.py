@@ -1,17 +1,18 @@
 """Common parts of the least-squares figures: presses, their measures, varied conditions."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.force_input import CONTACT
+from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.conditions import move_wall
-from palpate_thesis.runs import Runs
+from palpate_thesis.conditions import move_wall, rougher
+from palpate_thesis.runs import VARIED_SEEDS, Runs
+
+T = TypeVar("T")
 
 PRESS = 8.0
 """Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
@@ -46,7 +47,6 @@ COLUMNS = (
     *("vx_raw", "ax_raw", "ax_measured", "penetration"),
     *(f"{key}_{front}" for front in ("thesis", "raw", "matched") for key in "MBK"),
 )
-SWEPT_SEEDS = 3
 
 
 def contact(record: Record) -> Record:
@@ -112,35 +112,23 @@ def thesis_signals(press: Record) -> tuple[Array, Array]:
     return phi, press["force_measured"]
 
 
-def rubbing(experiment: Experiment, factor: float) -> Experiment:
-    """Coulomb and static friction of all joints times a factor."""
-    friction = experiment.friction
-    return with_values(
-        experiment,
-        {
-            "friction.coulomb": tuple(factor * v for v in friction.coulomb),
-            "friction.static": tuple(factor * v for v in friction.static),
-        },
-    )
-
-
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
     """Variations of one unstated parameter at a time: friction, pose, the surface's B and M."""
     surface = experiment.surface
-    return {
-        "friction halved": rubbing(experiment, 0.5),
-        "friction doubled": rubbing(experiment, 2.0),
-        "wall at 0.40 m": with_values(experiment, move_wall(experiment, 0.40)),
-        "wall at 0.49 m": with_values(experiment, move_wall(experiment, 0.49)),
-        "B halved": with_values(experiment, {"surface.damping": 0.5 * surface.damping}),
-        "B doubled": with_values(experiment, {"surface.damping": 2.0 * surface.damping}),
-        "M = 0": with_values(experiment, {"surface.mass": 0.0}),
-        "M = 0.5 kg": with_values(experiment, {"surface.mass": 0.5}),
+    by: dict[str, Mapping[str, Any]] = {
+        "friction halved": rougher(experiment, 0.5, "coulomb", "static"),
+        "friction doubled": rougher(experiment, 2.0, "coulomb", "static"),
+        "wall at 0.40 m": move_wall(experiment, 0.40),
+        "wall at 0.49 m": move_wall(experiment, 0.49),
+        "B halved": {"surface.damping": 0.5 * surface.damping},
+        "B doubled": {"surface.damping": 2.0 * surface.damping},
+        "M = 0": {"surface.mass": 0.0},
+        "M = 0.5 kg": {"surface.mass": 0.5},
     }
+    return {name: with_values(experiment, changes) for name, changes in by.items()}
 
 
-@dataclass(frozen=True)
-class PressEstimates:
+class PressEstimates(NamedTuple):
     """Results of one press."""
 
     ratio: float  # f/x in the later slot [N/m]
@@ -181,20 +169,15 @@ def numbers_of(record: Record) -> PressEstimates:
 
 def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[PressEstimates]]:
     """Results of the presses of each experiment, over the first few seeds."""
-    seeds = list(runs.seeds)[:SWEPT_SEEDS]
-    cases = [(e, seed) for e in experiments.values() for seed in seeds]
-    answers = iter(runs.over(cases, numbers_of))
-    return {name: [next(answers) for _ in seeds] for name in experiments}
+    return runs.by_name(experiments, numbers_of, VARIED_SEEDS)
 
 
-def median(values: Sequence[float]) -> float:
+def median(values: Sequence[float] | Array) -> float:
     """The middle one, without those that have no value."""
     return float(np.nanmedian(np.asarray(values, dtype=float)))
 
 
-def failing(
-    answers: Mapping[str, Sequence[PressEstimates]], holds: Callable[[PressEstimates], bool]
-) -> list[str]:
+def failing(answers: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> list[str]:
     """The names of the varied conditions under which a claim does not hold for most of the seeds."""
     return [name for name, some in answers.items() if 2 * sum(map(holds, some)) <= len(some)]
 

@@ -1,8 +1,8 @@
 """Claims of the thesis about its neural identifier, part by part, each with its threshold and its numbers."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ FOAM_BAND, RUBBER_BAND = 0.06, 0.15
 thesis' own are 10 % apart."""
 
 
-@dataclass(frozen=True)
-class Grounds:
+class Grounds(NamedTuple):
     """Data of a claim's verdict and note.
 
     Args:
@@ -41,8 +40,7 @@ class Grounds:
     starts: int
 
 
-@dataclass(frozen=True)
-class ClaimPart:
+class ClaimPart(NamedTuple):
     """One statement about one coefficient, or about the error: its number in one run, and whether it is true there."""
 
     suffix: str
@@ -55,11 +53,7 @@ def _time(suffix: str, value: Callable[[NetworkAnswer], float]) -> ClaimPart:
     return ClaimPart(suffix, value, "s", lambda a: TIME[0] <= value(a) <= TIME[1])
 
 
-TIMES = (
-    _time("time-K", lambda a: a.settled_K),
-    _time("time-B", lambda a: a.settled_B),
-    _time("time-M", lambda a: a.settled_M),
-)
+TIMES = tuple(_time(f"time-{key}", attrgetter(f"settled_{key}")) for key in "KBM")
 MASS = ClaimPart("M", lambda a: a.M, "kg", lambda a: 0.0 < a.M < SMALL)
 ERROR = _time("error", lambda a: a.error_gone)
 
@@ -81,7 +75,6 @@ def claims(grounds: Grounds, parts: Sequence[ClaimPart]) -> list[ThesisClaim]:
 
 def _claim(grounds: Grounds, part: ClaimPart, parts: Sequence[ClaimPart]) -> ThesisClaim:
     values = [part.value(a) for a in grounds.nominal]
-    numbers = {"K": _stiffness, "B": _damping, "M": _mass, "error": _error}.get(part.suffix, _times)
     return claim(
         f"network-{grounds.surface}.{part.suffix}",
         enough(grounds.nominal, part),
@@ -94,55 +87,46 @@ def _claim(grounds: Grounds, part: ClaimPart, parts: Sequence[ClaimPart]) -> The
         where=where(grounds, part),
         under=under(grounds, part),
         jointly=_jointly(grounds, parts),
-        **numbers(grounds, values),
+        **_numbers(grounds, values),
     )
 
 
-def _times(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
-    gone = float(np.median([a.error_gone for a in grounds.nominal]))
-    early, late = sum(t < TIME[0] for t in values), sum(t > TIME[1] for t in values)
-    return {"amplitude": NetworkChoice().amplitude, "gone": gone, "early": early, "late": late}
-
-
-def _stiffness(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
+def _numbers(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
+    """Further numbers of the claims, of which each names some; `values` are those of its part."""
+    nominal, dampings = grounds.nominal, [a.B for a in grounds.nominal]
     fixed = [float(np.median([a.over for a in s])) for c, s in grounds.swept.items() if not c.thresholds]
     laws = [
         f"{np.median([a.over for a in grounds.varied[law]]):.2f} on a {law} one"
         for law in ("stiffening", "relaxing")
         if law in grounds.varied
     ]
+    by_start = np.reshape(values, (-1, grounds.starts))
+    times = {c.amplitude: some for c, some in grounds.swept.items() if c == NetworkChoice(c.amplitude)}
+    gone = (f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
+    middle = {
+        k: float(np.median([getattr(a, k) for a in nominal])) for k in ("error_gone", "at_zero", "K", "ratio")
+    }
     return {
-        "stiffness": 1e-3 * np.median([a.K for a in grounds.nominal]),
-        "ratio": 1e-3 * np.median([a.ratio for a in grounds.nominal]),
+        "middle": middle,
+        "stiffness": 1e-3 * middle["K"],
+        "ratio": 1e-3 * middle["ratio"],
+        "amplitude": NetworkChoice().amplitude,
+        "early": sum(t < TIME[0] for t in values),
+        "late": sum(t > TIME[1] for t in values),
         "perfect": grounds.perfect,
         "probe": 1e3 * SETTINGS[grounds.surface].values[0],
-        "at_zero": float(np.median([a.at_zero for a in grounds.nominal])),
-        "least": min(fixed),
-        "largest": max(fixed),
+        "fixed": [min(fixed), max(fixed)],
         "laws": f"The median is {' and '.join(laws)}. " if laws else "",
-    }
-
-
-def _damping(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
-    values = [a.B for a in grounds.nominal]
-    return {"least": min(values), "largest": max(values), "by_start": _by_start(values, grounds)}
-
-
-def _mass(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
-    by_start = np.reshape(values, (-1, grounds.starts))
-    return {
+        "dampings": [min(dampings), max(dampings)],
+        "B_by_start": _by_start(dampings, grounds),
         "positive": int(np.sum(by_start > 0)),
         "firm": int(np.sum(np.all(by_start > 0, axis=0) | np.all(by_start < 0, axis=0))),
         "starts": grounds.starts,
         "by_start": _by_start(values, grounds),
         "small": SMALL,
+        "limit": GONE,
+        "amplitudes": ", ".join(gone),
     }
-
-
-def _error(grounds: Grounds, _: Sequence[float]) -> dict[str, Any]:
-    times = {c.amplitude: some for c, some in grounds.swept.items() if c == NetworkChoice(c.amplitude)}
-    parts = (f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
-    return {"limit": GONE, "amplitudes": ", ".join(parts)}
 
 
 def _by_start(values: Sequence[float], grounds: Grounds) -> str:

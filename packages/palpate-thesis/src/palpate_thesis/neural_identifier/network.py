@@ -1,8 +1,8 @@
 """Common parts of the neural-identifier figures: presses, the networks that learn from them, their answers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,8 +41,7 @@ GONE = 1.0
 TICK = 1e-3
 
 
-@dataclass(frozen=True)
-class NetworkPress:
+class NetworkPress(NamedTuple):
     """One contact, as the thesis' identifiers are given it.
 
     Args:
@@ -91,8 +90,7 @@ def presses(
     return runs.over(cases, lambda record: press_of(record, surface))
 
 
-@dataclass(frozen=True)
-class NetworkChoice:
+class NetworkChoice(NamedTuple):
     """Unstated parameters of the thesis' network, and its stated learning rate (1e-4).
 
     As chosen here: an output of up to twice the desired force, weights from -0.5 to 0.5, thresholds that learn (which
@@ -129,8 +127,7 @@ WEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0)
 SWEEP = [NetworkChoice(a, w, t) for t, a, w in product((True, False), AMPLITUDES, WEIGHTS)]
 
 
-@dataclass(frozen=True)
-class NetworkAnswer:
+class NetworkAnswer(NamedTuple):
     """Answer of one network after one press: averages over the last half second."""
 
     K: float
@@ -156,24 +153,11 @@ def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAns
     """Lets one network learn from one press."""
     probe, answers = learn(press, choice, start)
     K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    settled_K, settled_B, settled_M = (
-        press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T
-    )
+    k, b, m = (press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
     asked = probe.probe()
-    return NetworkAnswer(
-        K,
-        B,
-        M,
-        press.ratio,
-        float(press.squares[-1, 1]),
-        settled_K,
-        settled_B,
-        settled_M,
-        error_gone(answers[:, 3]),
-        asked.force_at_zero,
-        tangent(probe, press.rest),
-        bool(asked.warnings),
-    )
+    last = asked.force_at_zero, tangent(probe, press.rest), bool(asked.warnings)
+    squares_B, gone = float(press.squares[-1, 1]), error_gone(answers[:, 3])
+    return NetworkAnswer(K, B, M, press.ratio, squares_B, k, b, m, gone, *last)
 
 
 def tangent(probe: NeuralProbe, x: float) -> float:
@@ -212,24 +196,17 @@ def sweep(
 ) -> dict[NetworkChoice, list[NetworkAnswer]]:
     """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
     own = starts(runs)
-    cases = [
-        (press, choice, i if len(own) > 1 else own[0]) for choice in choices for i, press in enumerate(some)
-    ]
-    found = iter(runs.map(lambda case: answer(*case), cases))
-    return {choice: [next(found) for _ in some] for choice in choices}
+    first = [(press, i if len(own) > 1 else own[0]) for i, press in enumerate(some)]
+    cases = {choice: [(press, choice, start) for press, start in first] for choice in choices}
+    return runs.map_each(lambda case: answer(*case), cases)
 
 
 def conditions(experiment: Experiment) -> dict[str, Experiment]:
     """Variations of one other unstated parameter at a time: friction, pose, and the surface's B, M and law."""
-    cases = dict(press_runs.conditions(experiment))
-    cases["stiffening"] = with_values(experiment, {"surface": STIFFENING[_kind(experiment)]})
-    if _kind(experiment) == "foam":
-        cases["relaxing"] = RELAXING
-    return cases
-
-
-def _kind(experiment: Experiment) -> str:
-    return "foam" if experiment.surface == FOAM.surface else "rubber"
+    kind = "foam" if experiment.surface == FOAM.surface else "rubber"
+    cases = press_runs.conditions(experiment)
+    cases["stiffening"] = with_values(experiment, {"surface": STIFFENING[kind]})
+    return cases | ({"relaxing": RELAXING} if kind == "foam" else {})
 
 
 def answers_under_conditions(
@@ -243,7 +220,4 @@ def answers_under_conditions(
 
 def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[NetworkPress]]:
     """The presses of each condition, for a few noise seeds."""
-    seeds = list(runs.seeds)[:VARIED_NOISE]
-    cases = conditions(experiment)
-    made = iter(runs.over([(e, s) for e in cases.values() for s in seeds], lambda r: press_of(r, surface)))
-    return {name: [next(made) for _ in seeds] for name in cases}
+    return runs.by_name(conditions(experiment), lambda record: press_of(record, surface), VARIED_NOISE)
