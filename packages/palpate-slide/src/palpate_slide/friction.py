@@ -33,7 +33,8 @@ PAYLOAD = 20.0
 BY_CHANCE = 1e-3
 """How probable a dependence on speed may be by chance."""
 LACKS = 0.5
-"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain."""
+"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain: the column of mu in
+`benchmarks/force/sliding_logs.py` measures it."""
 CONTRARY = 0.05
 """Share of the windows in which friction may seem to push, against its noise."""
 ASKEW = np.radians(30.0)
@@ -168,7 +169,7 @@ def advantage(
     free = np.interp(s.time, course.turns[0], freed.free.astype(float)) > 0.999
     rows = np.flatnonzero(course.slides | free)[:: max(s.rows // 2, 1)]
     slides = course.slides[rows]
-    F, angle = (values[rows] for values in course.friction_angle(found, length))
+    F, angle, _ = (values[rows] for values in course.friction_angle(found, length))
     size = np.linalg.norm(F, axis=1)
     usual = size[slides].mean() if course.known else size
     R = course.turns[1][nearest(course.turns[0], s.time[rows])]
@@ -399,8 +400,7 @@ def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
     s = course.smooth
     speed = np.linalg.norm(s.velocity, axis=1)
     mu = float(found.mu[0])
-    _, slips = course.shares(length)
-    F, left = course.friction_angle(found, length)
+    F, left, slips = course.friction_angle(found, length)
     size = np.linalg.norm(F, axis=1)
     u = np.linspace(-1.0, 1.0, s.longer + 2)[1:-1]
     kernel = (1.0 - u**2) / np.sum(1.0 - u**2)  # least squares' slope is the rate seen through it

@@ -30,7 +30,8 @@ BLOCKS = 24
 LENGTHS = 3e-5 * 2.2 ** np.arange(9)
 """Of relaxation, that are tried first [m]."""
 SHAPE = 1.5
-"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's."""
+"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's. The column of K of slides
+in `benchmarks/force/sliding_logs.py` measures it."""
 CHORD, GRAINS = 3e-4, 40.0
 """Path in a window: at least so long [m], and so many deviations of the position's noise."""
 MOVES = 0.1
@@ -38,7 +39,7 @@ MOVES = 0.1
 RATE = 0.15
 """Window of the force's rate [s]: a dither is a hertz or two."""
 SLIDES = 0.6
-"""Sine of the angle between force and motion: above it the tip slides, below it presses."""
+"""Sine of the angle between force and motion, above which the tip may slide: the friction of 4/3 leans so far."""
 SHORTEST = 2e-3
 """Slide that is one [m]."""
 MOST = 1500
@@ -121,7 +122,8 @@ def nearest(time: Array, at: Array) -> NDArray[np.intp]:
 
 
 QUIET = 0.1
-"""Share of the contact's force within which a force in free motion stays."""
+"""Share of the contact's force within which a force in free motion stays; `benchmarks/force/sliding_logs.py` measures it
+by its rows with and without free motion."""
 ALONG = np.sqrt(0.5)
 """Cosine of the angle between the approach and the force after it, at least: rather along it than across."""
 
@@ -245,8 +247,8 @@ class SlideWindows:
         found, slips = self.shares(length)
         return found[self.rows], slips[self.rows]
 
-    def friction_angle(self, found: SlideFit, length: float) -> tuple[Array, Array]:
-        """On the grid, force on the surface [N], shape (n, 3), and the residual of psi but for the spring [rad]."""
+    def friction_angle(self, found: SlideFit, length: float) -> tuple[Array, Array, Mask]:
+        """On the grid: force on the surface [N], shape (n, 3); residual of psi but for the spring [rad]; slip."""
         s, b = self.smooth, found.load
         turned = self.turns[1][nearest(self.turns[0], s.time)]
         F = self.sign * s.force - np.einsum("nij,j->ni", turned, b[:3])
@@ -254,9 +256,9 @@ class SlideWindows:
             F -= b[3:] - turned @ self.rest.T @ b[3:]
         along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(np.linalg.norm(s.velocity, axis=1), 1e-12)
         psi = np.arctan2(along, np.sqrt(np.maximum(np.einsum("ij,ij->i", F, F) - along**2, 1e-12)))
-        share, _ = self.shares(length)
+        share, slips = self.shares(length)
         mu = float(found.mu[0])
-        return F, psi - np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
+        return F, psi - np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1])), slips
 
 
 def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> SlideWindows | None:
