@@ -34,7 +34,7 @@ LARGEST = {
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2507, tokens=19629),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1305, tokens=9043),
-    "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2823, tokens=24667),
+    "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2899, tokens=25540),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3168, tokens=18712),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6317, tokens=42541),
 }

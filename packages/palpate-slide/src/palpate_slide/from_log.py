@@ -122,7 +122,7 @@ def nearest(time: Array, at: Array) -> NDArray[np.intp]:
 
 
 QUIET = 0.1
-"""Share of the contact's force within which a force in free motion stays; `benchmarks/force/sliding_logs.py` measures it
+"""Share of the contact's force within which free motion stays; `benchmarks/force/sliding_logs.py` measures it
 by its rows with and without free motion."""
 ALONG = np.sqrt(0.5)
 """Cosine of the angle between the approach and the force after it, at least: rather along it than across."""
