@@ -98,7 +98,8 @@ class Code(Enum):
     )
     LAG_DAMPING_CONFOUNDED = (
         "A lag of the force lowers the damping by K times the lag, and this log does not separate the two."
-        " Calibrate the lag and give it with --lag, or excite the contact over a wider band."
+        " Calibrate the lag and give it with --lag, or excite the contact over a wider band. Of two channels that one"
+        " converter samples without a low-pass, give --lag 0:STD with one row of the log as STD."
     )
     SERIES_COMPLIANCE = (
         "The contact is not much softer than what lies between the position sensor and the surface,"
