@@ -89,7 +89,7 @@ _DEEPEST = 0.5
 _SHOWN = 50_000
 """Samples of each trace: what is more is thinned, and averaged where it was fitted."""
 _NARROWER = 0.5
-"""Share of the prior's half-width at which a lag is measured: the log tells 1/.5^2 - 1, three times what the prior does."""
+"""Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
 # More than seven arguments: it gathers what every stage has found.
