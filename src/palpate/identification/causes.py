@@ -89,6 +89,10 @@ def cause_of(name: str | None, source: str = "") -> Cause:
     return _CAUSES.get(name, Cause(name, NOISE.remedy))
 
 
+BRIEF = "the longest contact has"
+"""How the reason begins where the probe touches, and each contact is too short."""
+
+
 class Code(Enum):
     """The warnings. The value is what a user should know about it; the word is `code.word`."""
 

@@ -189,7 +189,8 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
         seen: the press by the filtered contact, if that shows one.
         origin: position of the surface [m].
     """
-    tangents = [Tangent(own.force, own.stiffness) for own in (*steady.others, steady.headline)]
+    known = [own for own in (*steady.others, steady.headline) if own.stiffness.known_to(1.0)]
+    tangents = [Tangent(own.force, own.stiffness) for own in known]
     surface = np.array([[origin], [0.0]])
     ordered = tuple(sorted(tangents, key=lambda own: own.force))
     curves = steady.loading - surface, steady.unloading - surface

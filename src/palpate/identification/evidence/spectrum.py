@@ -285,9 +285,11 @@ def point_of(found: Slopes, source: str, problem: Problem, options: Options, uni
     """
     value, again = found.stiffness.value, found.again
     interval = None if again is None else (value - again, value + again)
+    own, each = _judge(found.stiffness, options, unit), found.each if source == "press" else ()
+    apart = len(each) > 1 and float(np.ptp(each)) > 2 * options.tolerance * abs(value)
     return WorkingPoint(
-        _judge(found.stiffness, options, unit), found.force, found.depth, 0.25 / found.rise, source, interval,
-        not problem.contacts.bonded,
+        own, found.force, found.depth, 0.25 / found.rise, source, interval, not problem.contacts.bonded, each,
+        apart and own.verdict is not Verdict.IDENTIFIED,
     )  # fmt: skip
 
 
