@@ -83,14 +83,9 @@ def test_skin_has_a_stiffness_at_its_working_point_and_no_damping_or_mass(
 
 
 @pytest.mark.parametrize("load", [pytest.param(20, marks=pytest.mark.long), 40])
-def test_light_presses_on_skin_claim_no_more_than_the_log_shows_without_a_model(measured, capsys, load):
+def test_light_presses_on_skin_claim_nothing(measured, capsys, load):
     _, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
-    point = found["working_point"]["stiffness"]
-    parameters = found["parameters"]
-    assert all(p["verdict"] != "identified" for name, p in parameters.items() if name != "K")
-    if parameters["K"]["verdict"] == "identified":
-        assert point["verdict"] == "identified"
-        assert point["ci95"][0] < parameters["K"]["value"] < point["ci95"][1]
+    assert all(p["verdict"] != "identified" for p in found["parameters"].values())
 
 
 @pytest.mark.long

@@ -163,11 +163,6 @@ class Linearisation:
         prior = ((self.lag - self.problem.lag.value) / std) ** 2 if std > 0 else 0.0
         return float(self.system.lines[seen] @ np.log(solution.noise[seen])) + prior
 
-    @property
-    def dt(self) -> float:
-        """From row to row [s]."""
-        return float(np.median(np.diff(self.problem.time)))
-
     def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         sensor, told = sensor_lines(

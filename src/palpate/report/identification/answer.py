@@ -60,6 +60,7 @@ _REMEDIES = {
     "lag": "--lag SECONDS",
     "noise": "press deeper or more often",
     "other forces": "begin and end in free motion",
+    "touch": "approach more slowly",
     "octaves": "excite a wider band",
     "blocks": "press longer, at one depth",
     "repetition": "press more often",
@@ -76,6 +77,7 @@ _CAUSES = {
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
     "octaves": "frequencies differ",
+    "touch": "the touch",
     "unseen way": "the first reading",
 }
 """Causes whose names in a budget need an explanation."""
