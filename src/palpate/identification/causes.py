@@ -30,7 +30,6 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
-    "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause(
         "differences between parts of the log", "press longer, or more often, about one depth", "A"
@@ -39,9 +38,6 @@ _CAUSES = {
     "dynamic stiffness": Cause(
         "the difference between the model and the dynamic stiffness",
         "keep the motion near one frequency and depth",
-    ),
-    "recovery": Cause(
-        "a surface that has not recovered from the contact before", "wait longer between contacts"
     ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
     "curvature": Cause("the change of the slope over the press", "press about the force that you need"),
@@ -91,6 +87,10 @@ def cause_of(name: str | None, source: str = "") -> Cause:
     if name is None:
         return _CAUSES[_UNKNOWN[source]] if source in _UNKNOWN else NOISE
     return _CAUSES.get(name, Cause(name, NOISE.remedy))
+
+
+BRIEF = "the longest contact has"
+"""How the reason begins where the probe touches, and each contact is too short."""
 
 
 class Code(Enum):

@@ -23,7 +23,6 @@ from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
 from palpate.identification.uncertainty import Contribution
 from palpate.signals.samples import detrend, quadrature
-from palpate.signals.types import NORMAL
 
 HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
@@ -170,39 +169,6 @@ def _scaling(normal: Array, cov: Array) -> Array:
     scale = turn * np.where(less > _ALONE, 1 / np.sqrt(np.maximum(less, _ALONE)), 0.0) @ turn.T
     found: Array = (half @ scale @ (vector / root).T) * np.outer(1 / size, size)
     return found
-
-
-def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
-    """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
-
-    The less precise of the two errs by the difference beside what both err by (Hausman, 1978).
-
-    Args:
-        theta: of the answer, shape (p,).
-        budget: of the answer.
-        other: parameters of the other, shape (p,).
-        others: its budget.
-    """
-    own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
-    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.abs(less - own))
-    return Spread(np.maximum(apart, 0.0) ** 2)
-
-
-def stiffness_left(stiffness: float, branch: float, tau: float, gap: float) -> float:
-    """Stiffness that a relaxing branch still has of the contact before [N/m].
-
-    A model's branch follows the probe into free motion. The surface does not: left alone it recovers with
-    tau (1 + K1/K), the creep time of a standard linear solid.
-
-    Args:
-        stiffness: K of the model [N/m].
-        branch: its K1 [N/m].
-        tau: of its relaxation [s].
-        gap: between two contacts [s].
-    """
-    if stiffness <= 0 or branch <= 0:
-        return 0.0
-    return branch * float(np.exp(-gap / (tau * (1 + branch / stiffness))))
 
 
 def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:
