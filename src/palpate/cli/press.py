@@ -13,8 +13,7 @@ from palpate.cli._program import command, option_of, print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
 from palpate.cli.options import values
-from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.kept import CellOptions, options_given
+from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
@@ -188,8 +187,10 @@ def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, o
     Raises:
         InputError: one was given; it is named.
     """
-    given = next(iter(options_given((part,))), None)
-    if given is not None:
+    if part != type(part)():
+        from palpate.cli.options.kept import options_given
+
+        given = next(iter(options_given((part,))))
         raise InputError(f"--{given} is for {of}, or leave out --{given}")
 
 
