@@ -64,7 +64,7 @@ def test_the_road_of_a_command_grows_no_longer(root, tmp_path, command):
 
 
 def test_what_identifies_a_log_imports_no_more(root):
-    code = "import palpate.cli.identify, palpate.from_log, json, sys; print(json.dumps([*sys.modules]), file=sys.stderr)"
+    code = "import palpate.cli.identify, palpate.from_log, json, sys; sys.stderr.write(json.dumps([*sys.modules]))"
     loads = [name for name in of_process(root, "-c", code) if name.startswith("palpate")]
     assert len(loads) <= ROOM * IMPORTED, "\n".join(loads)
 
@@ -80,4 +80,4 @@ def test_a_function_is_counted_where_it_stands(root):
 
 
 if __name__ == "__main__":
-    print(json.dumps(road(sys.argv[1:])), file=sys.stderr)
+    sys.stderr.write(json.dumps(road(sys.argv[1:])))
