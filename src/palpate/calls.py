@@ -12,14 +12,13 @@ from palpate.from_log import identify_log as identify_log_file
 from palpate.identification import Identification, Pooled
 from palpate.identification import identify as identify_record
 from palpate.identification import pool as pool_found
+from palpate.identification.options import NAMED
 from palpate.logs import read_log as read
 from palpate.records import Record
 from palpate.text import in_python
 
 _READ = {name for name, own in signature(read).parameters.items() if own.kind is own.KEYWORD_ONLY}
-_OPTIONS = {
-    name for name, own in signature(identify_record).parameters.items() if own.kind is own.KEYWORD_ONLY
-}
+_OPTIONS = {*NAMED}
 _WORDS = {"model", "force_filter", "bonded"}
 _PAIRS = {"mass", "series_mass"}
 
@@ -31,7 +30,7 @@ def identify(source: Record | Any, **options: Any) -> Identification:
 
     Args:
         source: a `Record`; or a log that `palpate.read_log` reads: a path, a DataFrame, an Arrow table.
-        options: of `palpate.identification.identify` (lag, force_filter, mass, ...), and for a log those of
+        options: of `palpate.identification.options.Options` (lag, force_filter, mass, ...), and for a log those of
             `palpate.read_log`, its columns among them. A lag may be a pair, its value and its standard deviation [s].
 
     Raises:

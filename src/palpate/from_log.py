@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,9 @@ from palpate.contact_frame.arm import ArmDynamics, identify_contact, robot_stiff
 from palpate.contact_frame.load import Payload, load_payload
 from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
-from palpate.identification import Identification, identify
+from palpate.identification import Identification
 from palpate.identification.indenter import Indenter, with_modulus
+from palpate.identification.options import NAMED
 from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, measured_by
@@ -106,7 +106,6 @@ _OWN = {
     "indenter",
     "poisson",
     "preset",
-    "lag",
 }
 
 
@@ -127,9 +126,10 @@ def identify_log(path: str | Path, **options: Any) -> Identification:
         InputError: the log or an option is wrong, or something would have to be guessed, in one line.
     """
     known = {f.name for kind in (Signals, ContactFrame, ArmDynamics) for f in fields(kind)} - {"stiffness"}
+    known |= _OWN | {*NAMED}
     for name in options:
-        if name not in known | _OWN | {*signature(identify).parameters}:
-            raise unknown("option", name, known | _OWN | {*signature(identify).parameters})
+        if name not in known:
+            raise unknown("option", name, known)
     return log_identifier(options).identify(log_of(Path(path)))[0]
 
 

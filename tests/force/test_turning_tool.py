@@ -12,7 +12,7 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_law import slide_from
-from palpate.force.sliding.turning_tool import TurningTool
+from palpate.force.sliding.turning_tool import FASTEST, TurningTool
 
 RADIUS, STIFFNESS, TICK = 0.15, 5e3, 0.002
 CENTRE = np.array([0.0, 0.0, -0.02])
@@ -72,13 +72,41 @@ def test_turning_is_about_the_centre_of_the_tip() -> None:
         state = loop.state
         state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
         slide_from(loop.law, state, places.Vec3(0.0, 0.0, -1.0), 10.0, 2e4, 0.1, 0.12, 0.35, 0.3)
-    for k in range(5):
+    for k in range(20):
         tip = np.array([1e-5 * k, 0.0, 0.0])
         twist = turning.update([0.0, 0.0, -10.0], tip - R @ CENTRE, R, [1.0, 0.0, 0.0])
         v = fixed.update([0.0, 0.0, -10.0], tip, [1.0, 0.0, 0.0])
     assert np.linalg.norm(twist[3:]) > 0.05
     assert twist[:3] + np.cross(twist[3:], R @ CENTRE) == pytest.approx(v, abs=1e-12)
     assert twist[3:] @ np.cross(R[:, 2], turning.loop.normal) > 0.0
+
+
+def test_neither_turning_nor_the_tools_point_passes_its_limit() -> None:
+    """On tools long and short, readings and rotations at random, a limit lowered on the way."""
+    gains, rng = (
+        replace(gains_for(load_arm("ur5e"), 10.0, cap=2e4), slide=Slide(speed=0.03, mu_max=0.9)),
+        np.random.default_rng(1),
+    )
+    fastest = 0.0
+    for back in (0.0, 0.02, 0.5):
+        tool = TurningTool(SlidingLoop(gains), centre=(0.0, 0.0, -back))
+        state = tool.loop.state
+        for most in (gains.arm.limits.speed, 0.05):
+            tool.loop.limit_speed(most)
+            state[places.PHASE], state[places.BOUND], state[places.TICKS] = places.SLIDE, 2e4, 10.0
+            slide_from(tool.loop.law, state, places.Vec3(0.0, 0.0, -1.0), 10.0, 2e4, 0.1, 0.12, 0.35, 0.3)
+            for k in range(200):
+                R = turned(DOWN, np.array([400.0, 0.0, 0.0]) + rng.normal(0.0, 30.0, 3))
+                way = np.array([1e-5 * k, 0.0, 0.0]) - R @ np.array([0.0, 0.0, -back])
+                twist = tool.update(
+                    np.array([0.0, 0.0, -10.0]) + rng.normal(0.0, 0.02, 3), way, R, rng.normal(size=3)
+                )
+                assert np.linalg.norm(twist[:3]) <= most * (1.0 + 1e-9)
+                assert np.linalg.norm(twist[3:]) <= FASTEST * (1.0 + 1e-9)
+                tip = twist[:3] + np.cross(twist[3:], R @ np.array([0.0, 0.0, -back]))
+                assert np.linalg.norm(tip) <= most * (1.0 + 1e-9)
+                fastest = max(fastest, float(np.linalg.norm(twist[3:])))
+    assert fastest > 0.9 * FASTEST
 
 
 def test_a_tool_whose_loop_missed_ticks_stops_turning() -> None:

@@ -328,7 +328,7 @@ def test_the_json_of_all_of_it():
     """Contract 7's words."""
     said = identify(pressed(), lag=0.0).to_json()
     point = said["working_point"]
-    assert set(point) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source"}
+    assert set(point) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source", "each"}
     assert {"value", "std", "ci95", "unit", "verdict", "reason", "prediction95"} <= set(point["stiffness"])
     assert point["source"] in {"octave", "press"}
     for own in said["dynamic_stiffness"]:

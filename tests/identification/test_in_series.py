@@ -13,8 +13,9 @@ from scipy import signal
 from identification.problems import problem
 from identification.synthetic_contacts import pressed, record, shaken
 from palpate.errors import InputError
-from palpate.identification import Verdict, identify, in_series
+from palpate.identification import Verdict, identify
 from palpate.identification.estimators.budget import Spread
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 from palpate.identification.selection import answer
@@ -53,7 +54,7 @@ def test_parameters_of_the_surface_come_back(k, damping_time, mass_share, stiffe
     m = mass_share * b**2 / k
     series = stiffer * k
     log = answer(problem(shaken(n=600), bonded=True), KELVIN_VOIGT_MASS) if _KEPT is None else _KEPT
-    found = in_series.without_series(with_numbers(log, *expansion(k, b, m, series)), series, 0.0)
+    found = SeriesSpring(series).parameters(with_numbers(log, *expansion(k, b, m, series)))
     values = dict(zip(found.names, found.theta, strict=True))
     # The fit of the expansion leaves its fifth order: 1e-2 to the fourth power.
     assert values["K"] == pytest.approx(k, rel=1e-6)
@@ -77,27 +78,27 @@ def test_the_covariance_goes_through_the_derivatives(seen):
         i = at.names.index(name)
         theta = at.theta.copy()
         theta[i] += by
-        return in_series.without_series(replace(at, theta=theta), SERIES, 0.0).theta
+        return SeriesSpring(SERIES).parameters(replace(at, theta=theta)).theta
 
     columns = []
     for name, value in zip(at.names, at.theta, strict=True):
         step = 1e-4 * abs(value)
         columns.append((moved(name, step) - moved(name, -step)) / (2 * step))
     jacobian = np.column_stack(columns)
-    found = in_series.without_series(at, SERIES, 0.0)
+    found = SeriesSpring(SERIES).parameters(at)
     np.testing.assert_allclose(found.cov, jacobian @ at.cov @ jacobian.T, rtol=1e-4)
     for own in np.eye(len(at.names)):
-        part = in_series.without_series(replace(at, budget={"noise": Spread(own)}), SERIES, 0.0)
+        part = SeriesSpring(SERIES).parameters(replace(at, budget={"noise": Spread(own)}))
         np.testing.assert_allclose(part.budget["noise"].variance, jacobian**2 @ own, rtol=1e-4)
 
 
 def test_the_calibration_of_the_series_stiffness_is_a_cause_of_its_own(seen):
     """dK/dk = -(K/k)^2."""
     at = with_numbers(seen, *expansion(*TRUTH.values(), SERIES))
-    found = in_series.without_series(at, SERIES, 8.0)
+    found = SeriesSpring(SERIES, 8.0).parameters(at)
     part = found.budget["series stiffness"].variance[found.names.index("K")]
     assert np.sqrt(part) == pytest.approx(8.0 * (TRUTH["K"] / SERIES) ** 2, rel=0.01)
-    assert in_series.without_series(at, SERIES, 0.0).budget["series stiffness"].variance.max() == 0.0
+    assert SeriesSpring(SERIES).parameters(at).budget["series stiffness"].variance.max() == 0.0
 
 
 @given(st.floats(10, 7000), st.floats(-3000, 20000))
@@ -105,7 +106,7 @@ def test_dynamic_stiffness_of_two_in_series(storage, loss):
     z = complex(storage, loss)
     together = z * SERIES / (z + SERIES)
     octave = DynamicStiffness(2.0, *parts_of(together), 9, 0.5)
-    (found,) = in_series.spectrum_without_series((octave,), SERIES, 0.0)
+    (found,) = SeriesSpring(SERIES).spectrum((octave,))
     assert found.storage == pytest.approx(storage, rel=1e-6, abs=1e-6 * abs(z))
     assert found.loss == pytest.approx(loss, rel=1e-6, abs=1e-6 * abs(z))
     gain = abs((z + SERIES) / SERIES) ** 2
@@ -122,7 +123,7 @@ def test_a_slope_and_a_press_behind_a_spring():
         Tangent(9.0, Measurement.within(SERIES, 1.0)),
     )
     press = Press(tangent, np.stack([depth + force / SERIES, force]), np.empty((2, 0)))
-    found = in_series.press_without_series(press, SERIES, 0.0)
+    found = SeriesSpring(SERIES).press(press)
     np.testing.assert_allclose(found.loading, np.stack([depth, force]), atol=1e-12)
     assert found.unloading.shape == (2, 0)
     (one,) = found.tangent  # as stiff as what is in series says nothing
@@ -176,8 +177,9 @@ def test_a_mass_that_swings_on_the_spring_comes_off_to_the_second_order(seen):
     together = z * SERIES / (z + SERIES + SWINGING * s**2)
     at_rest = k * SERIES / (k + SERIES)
     b_a, m_a, *_ = np.polynomial.polynomial.polyfit(s, (together - at_rest) / s, 3)
-    stiff = in_series.without_series(with_numbers(seen, at_rest, b_a, m_a), SERIES, 0.0)
-    found = in_series.without_swing(stiff, SWINGING / SERIES, 0.1 / SERIES, 0.0)
+    seen = with_numbers(seen, at_rest, b_a, m_a)
+    stiff = SeriesSpring(SERIES).parameters(seen)
+    found = SeriesSpring(SERIES, 0.0, SWINGING / SERIES, 0.1 / SERIES).parameters(seen)
     values = dict(zip(found.names, found.theta, strict=True))
     # The expansion leaves its fifth order: 1e-3 to the fourth power.
     assert values["K"] == pytest.approx(k, rel=1e-6)
@@ -193,9 +195,7 @@ def test_dynamic_stiffness_behind_a_spring_and_a_mass(storage, loss, frequency):
     z, s = complex(storage, loss), 2j * np.pi * frequency
     together = z * SERIES / (z + SERIES + SWINGING * s**2)
     octave = DynamicStiffness(frequency, *parts_of(together), 9, 0.5)
-    (found,) = in_series.spectrum_without_swing(
-        in_series.spectrum_without_series((octave,), SERIES, 0.0), SWINGING / SERIES, 0.0
-    )
+    (found,) = SeriesSpring(SERIES, 0.0, SWINGING / SERIES).spectrum((octave,))
     assert found.storage == pytest.approx(storage, rel=1e-6, abs=1e-6 * abs(z))
     assert found.loss == pytest.approx(loss, rel=1e-6, abs=1e-6 * abs(z))
 

@@ -100,10 +100,16 @@ def test_octaves_follow_each_other_by_two():
     assert frequency[1] == pytest.approx(4 / (1000 * DT))
 
 
-def test_a_short_contact_has_its_say_from_the_octave_that_it_is_long_enough_for():
-    both, alone = sums(columns(1256), 1000, 256), sums(columns(1256)[:1000])
-    assert both.all_lines[1] == alone.all_lines[1]
-    assert both.all_lines[3] > alone.all_lines[3]
+def test_a_short_contact_has_its_say_in_the_octave_of_its_frequency():
+    """One of 108 rows beside one of 1000: an oscillation of it is in no block of 500 rows, but in its own."""
+    own = 1e-3 * columns(1108, p=1)
+    own[1000:, 0] += np.sin(2 * np.pi * 2 * np.arange(108) / 108)
+    found = sums(own, 1000, 108)
+    power = found.total[:, 0, 0]
+    assert found.frequency[int(np.argmax(power))] == pytest.approx(2 / (108 * DT), rel=0.5)
+    alone = sums(columns(1000))
+    assert found.all_lines[0] == alone.all_lines[0]
+    assert (found.all_lines[[2, 3]] > alone.all_lines[[2, 3]]).all()
 
 
 def test_groups_are_stretches_of_the_log_that_sum_to_all_of_it():

@@ -8,6 +8,7 @@ import pytest
 from identification.synthetic_contacts import pressed, record
 from palpate.errors import InputError
 from palpate.identification import identify
+from palpate.identification.sample_clock import past_end
 from palpate.identification.sampling import channels_of, last_digit
 from palpate.identification.steady_press import strokes_of
 
@@ -62,3 +63,27 @@ def test_a_stroke_begins_where_the_probe_last_rested():
     advance, retreat = strokes_of(channels_of(record(time, position, 3000 * position)))
     assert (advance.way, retreat.way) == (1, -1)
     assert 1.45 < advance.begin < 1.6
+
+
+def test_a_position_at_the_end_of_its_sensor_carries_no_stiffness():
+    rng = np.random.default_rng(0)
+    t = np.arange(8000) / 1000
+    depth = 1e-3 - 3e-3 * np.cos(2 * np.pi * 0.7 * t)
+    force = np.maximum(2000 * depth, 0) + rng.normal(0, 0.02, len(t))
+    seen = np.minimum(depth + rng.normal(0, 1e-6, len(t)), 2.6e-3)
+    found = identify(record(t, seen, force), lag=0.0)
+    assert "the position rests at its extreme value" in found.warnings[0].text
+    low, high = found.working_point.stiffness.ci95
+    assert 1900 < low < 2000 < high < 2100
+
+
+@pytest.mark.parametrize("late", [0, 30])
+def test_a_hold_is_no_end_of_the_position(late):
+    """Its force relaxes, and a late one rises a while after the position has come to rest."""
+    t = np.arange(4000) / 1000
+    depth = np.interp(t, [0.5, 0.8, 3.0, 3.3], [-1e-3, 3e-3, 3e-3, -1e-3])
+    relaxed = 1 + 0.5 * np.exp(-np.maximum(t - 0.8, 0) / 0.7)
+    force = np.roll(np.maximum(2000 * depth, 0) * relaxed, late) + np.random.default_rng(0).normal(
+        0, 0.02, len(t)
+    )
+    assert not past_end(depth, force).any()

@@ -20,6 +20,7 @@ from foreign.cases import outcome, wrong_payload
 
 UNITS = {"time": "s", "position": "m", "force": "N"}
 K, B = 4000.0, 5.0
+YIELD = 1.2e-3  # depth [m]
 
 
 def identified(t, x, f, **options):
@@ -160,3 +161,51 @@ def test_a_lag_that_was_told_is_said_again_with_the_filter_in_it():
     f = sosfilt(low_pass, K * x) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
     found = identified(t, x, f, lag=4e-3, lag_std=1e-4, force_filter="butterworth1:40", bonded=True)
     assert (found.lag.value, found.lag.kind) == (pytest.approx(4e-3), "told")
+
+
+def presses(*stiffness, back=2.0, soft=0.0):
+    """One press of 4 mm after another, each on a surface of its own, with 2 mm of free motion before."""
+    ends = np.cumsum([0.5, *(s for _ in stiffness for s in (3.0, back, 0.5))])
+    x = np.interp(t := np.arange(0, ends[-1], 0.004), ends, [-2e-3, *(4e-3, -2e-3, -2e-3) * len(stiffness)])
+    if soft:
+        window = np.ones(int(soft / 0.004)) / int(soft / 0.004)
+        x = np.convolve(np.pad(x, len(window), mode="edge"), window, "same")[len(window) : -len(window)]
+    which = np.minimum((t / (3.5 + back)).astype(int), len(stiffness) - 1)
+    f = np.array(stiffness)[which] * np.maximum(x, 0)
+    return t, x, f + 0.02 * np.random.default_rng(0).standard_normal(len(t))
+
+
+def test_presses_on_two_surfaces_are_not_one_stiffness():
+    """The softer press reaches less than half of the other's force, and was left out without a word."""
+    found = identified(*presses(4000.0, 1200.0))
+    assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
+    assert found.working_point.each == pytest.approx([4000, 1200], rel=0.03)
+    assert sentence(found).startswith("2 presses differ, 3981 N/m, 1201 N/m at ")
+    assert "--start" in sentence(found)
+    assert identified(*presses(4000.0, 4000.0)).parameters["K"].value == pytest.approx(4000, rel=0.01)
+
+
+def test_a_return_may_be_at_any_speed():
+    """A fast return that speeds up and slows down all the way took the press' own loading with it."""
+    found = identified(*presses(2500.0, back=0.8, soft=0.35))
+    assert found.working_point.source == "press"
+    assert in_range(found.working_point.stiffness, 2500, 2500)
+    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
+
+
+def test_a_tangent_beside_a_yield_is_that_of_its_own_side():
+    """A curve of degree eight over both sides rings beside the corner, by more than its own noise."""
+    t, x, f = presses(20e3)
+    top = int(np.argmax(x))
+    yielded = np.where(x > YIELD, 20e3 * YIELD + 3e3 * (x - YIELD), f)[:top]
+    found = identified(t[:top], x[:top], yielded + 0.02 * np.random.default_rng(1).standard_normal(top))
+    own = found.working_point
+    assert own.force_N > 20e3 * YIELD
+    assert in_range(own.stiffness, 3e3, 3e3)
+
+
+def test_touches_that_are_too_short_are_touches():
+    t = np.arange(0, 4, 0.02)
+    x = -2e-3 + 5e-3 * np.exp(-(((t - 2) / 0.15) ** 2))
+    f = 3000 * np.maximum(x, 0) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    assert sentence(identified(t, x, f)).startswith("The contacts in this log are too short: the longest")

@@ -70,14 +70,7 @@ def identify_contact(
     Raises:
         InputError: the record or an argument is wrong, in one line.
     """
-    arm = arm or ArmDynamics()
-    arm = replace(
-        arm,
-        position_from=arm.position_from or record.meta.get("position_from"),
-        tool_mass=arm.tool_mass or record.meta.get("tool_mass_kg"),
-        stiffness=arm.stiffness or record.meta.get("robot_stiffness_N_per_m"),
-        mass=arm.mass or record.meta.get("robot_mass_kg"),
-    )
+    arm = _complete(arm or ArmDynamics(), record.meta)
     spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
     in_space = FORCE[0] in record.columns
     if in_space:
@@ -109,6 +102,17 @@ def identify_contact(
         return found, record
     meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
     return slid, replace(record, meta=meta)
+
+
+def _complete(arm: ArmDynamics, said: Mapping[str, Any]) -> ArmDynamics:
+    """An arm with what its record says of it; what is given goes first."""
+    return replace(
+        arm,
+        position_from=arm.position_from or said.get("position_from"),
+        tool_mass=arm.tool_mass or said.get("tool_mass_kg"),
+        stiffness=arm.stiffness or said.get("robot_stiffness_N_per_m"),
+        mass=arm.mass or said.get("robot_mass_kg"),
+    )
 
 
 def _slide(

@@ -30,7 +30,6 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
-    "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause(
         "differences between parts of the log", "press longer, or more often, about one depth", "A"
@@ -39,9 +38,6 @@ _CAUSES = {
     "dynamic stiffness": Cause(
         "the difference between the model and the dynamic stiffness",
         "keep the motion near one frequency and depth",
-    ),
-    "recovery": Cause(
-        "a surface that has not recovered from the contact before", "wait longer between contacts"
     ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
     "curvature": Cause("the change of the slope over the press", "press about the force that you need"),
@@ -93,6 +89,10 @@ def cause_of(name: str | None, source: str = "") -> Cause:
     return _CAUSES.get(name, Cause(name, NOISE.remedy))
 
 
+BRIEF = "the longest contact has"
+"""How the reason begins where the probe touches, and each contact is too short."""
+
+
 class Code(Enum):
     """The warnings. The value is what a user should know about it; the word is `code.word`."""
 
@@ -120,7 +120,7 @@ class Code(Enum):
     )
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = (
-        "The force rests at its extreme value while the probe moves on: it is at the end of its range."
+        "A channel rests at its extreme value while the other moves on: it is at the end of its range."
     )
     UNIT_GUESS = "A unit was taken from a column's name or values."
     UNIT_STATED = "A unit was taken from the file's own statement."

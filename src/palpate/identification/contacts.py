@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
-from palpate.identification.causes import Code, Warn
+from palpate.identification.causes import BRIEF, Code, Warn
 from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
 from palpate.identification.free_motion import FLAT, Drift, FreeMotion, MovingMass, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
@@ -176,14 +176,17 @@ def find_contacts(
     top = sign * peak
     level = _resting(sign * force, sign * rest, top)
     threshold = _threshold(sign * force, level, top)
-    spans = _spans(sign * force, level, top, threshold, chain)
-    text = f"the force stays between {force.min():.4g} and {force.max():.4g}: no stretch in contact is long enough"
+    touches = _touches(sign * force, level, top, threshold)
+    spans = _long(touches, chain)
+    text, rows = "press longer, or log faster", ""
     if air is not None and payload is None and spans:
-        spans = _long(_between_losses(channels, sign, (level, top), air, spans, chain), chain)
-        text = (
-            "the probe leaves the surface again and again, and each contact is too short for the filter:"
-            " press deeper, move slower or log faster"
-        )
+        touches = _between_losses(channels, sign, (level, top), air, spans, chain)
+        spans = _long(touches, chain)
+        text, rows = "press deeper, move slower or log faster", " until the probe leaves the surface again"
+    longest = max((e - b for b, e in touches), default=0)
+    text = f"{BRIEF} {longest} rows{rows}, and {_least(chain)} are needed: {text}"
+    if not touches:
+        text = f"the force stays between {force.min():.4g} and {force.max():.4g}: there is no contact"
     if not spans:
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
@@ -340,8 +343,8 @@ def _threshold(force: Array, rest: float, peak: float) -> float:
     return rest + max(ONSET * (peak - rest), 5 * noise)
 
 
-def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chain) -> list[tuple[int, int]]:
-    """Stretches above the onset that reach well above it and last longer than the filter needs to settle.
+def _touches(force: Array, rest: float, peak: float, threshold: float) -> list[tuple[int, int]]:
+    """Stretches above the onset that reach well above it.
 
     Two are one if the force between them stays above half of the onset.
     """
@@ -351,13 +354,17 @@ def _spans(force: Array, rest: float, peak: float, threshold: float, chain: Chai
             spans[-1] = (spans[-1][0], end)
         else:
             spans.append((begin, end))
-    return [(b, e) for b, e in _long(spans, chain) if force[b:e].max() > rest + _REACHED * (peak - rest)]
+    return [(b, e) for b, e in spans if force[b:e].max() > rest + _REACHED * (peak - rest)]
 
 
 def _long(spans: list[tuple[int, int]], chain: Chain) -> list[tuple[int, int]]:
     """Those that last longer than the filter needs to settle."""
-    least = max(20, int(2 * chain.settling / chain.dt))
-    return [(b, e) for b, e in spans if e - b >= least]
+    return [(b, e) for b, e in spans if e - b >= _least(chain)]
+
+
+def _least(chain: Chain) -> int:
+    """Rows of a contact, at least."""
+    return max(_FEWEST, int(2 * chain.settling / chain.dt))
 
 
 def _between_losses(

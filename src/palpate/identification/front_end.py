@@ -12,7 +12,7 @@ from palpate.identification.filters.sensor_path import PositionNoise, SensorPath
 from palpate.identification.filters.state_variable import Chain, low_passed, white_noise
 from palpate.identification.models import Motion
 from palpate.identification.options import Options, lag_prior
-from palpate.identification.problem import FREE_ROWS, Memory, Problem, Rows, ends, numbered, touching
+from palpate.identification.problem import FREE_ROWS, Memory, Problem, Rows, ends, number_rows, touching
 from palpate.identification.sample_clock import SampleClock, sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass
@@ -44,7 +44,7 @@ def behind_filter(
         force = force - contacts.payload.mass * chain(position, 2, lag.value)
     memory = int(np.ceil(chain.settling / chain.dt))
     usable = _settle(channels.valid, memory)
-    rows, spans = numbered(_rows(channels, chain, contacts, usable), channels)
+    rows, spans = number_rows(_rows(channels, chain, contacts, usable), channels)
     origin = _origin(chain(position, 0, lag.value), rows, contacts)
     position = position - origin
     problem = Problem(
@@ -167,7 +167,7 @@ def behind_sensor(
     time = raw.start + clock.instants * dt
     between = _between(contacts, chain, channels)
     usable = _usable(clock, raw.position, raw.valid, path)
-    rows, spans = numbered(_sensor_rows(time, path, usable, contacts, between), channels)
+    rows, spans = number_rows(_sensor_rows(time, path, usable, contacts, between), channels)
     position = contacts.position_sign * raw.position
     whole = clock.rows[rows]
     origin = float(position[whole].mean() if contacts.bonded else position[whole].min())

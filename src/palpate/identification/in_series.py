@@ -7,7 +7,7 @@ found from what they say together: nothing is subtracted from a position that th
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.fit import Fit
+from palpate.identification.options import Options
 from palpate.identification.result import DynamicStiffness, Press, Tangent
 from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
@@ -23,167 +24,125 @@ from palpate.signals.types import NORMAL
 
 Linear = TypeVar("Linear", Answer, Fit)
 """Parameters with their covariance."""
+_SPRING, _TIP = "series stiffness", "tip's mass"
+"""The causes of an interval that these two are."""
 
 
-def check(apparent: float, series: float) -> None:
-    """Two springs in series are softer than either.
-
-    Raises:
-        InputError: the log is as stiff as what is said to be in series with the surface.
-    """
-    if abs(apparent) >= series:
-        raise InputError(
-            f"the series stiffness of {series:.4g} N/m is softer than the log's own {abs(apparent):.4g} N/m, but two"
-            " springs in series are softer than either: check its value and unit (N/m), or leave it out"
-        )
-
-
-def without_series(found: Linear, series: float, series_std: float) -> Linear:
-    """Parameters of the surface from those of both, to the second order of the frequency.
-
-    With Z = K + B s + M s^2 seen as K_a + B_a s + M_a s^2: K = K_a k/(k - K_a), B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k,
-    r = k/(k - K_a). The covariance goes through the derivatives of these.
-    """
-    place = _places(found.names)
-    check(found.theta[place["K"]], series)
-    new, jacobian = _linearise(found.theta, place, series)
-    moved = _seen_through(found.theta, place, series + series_std) - new
-    return found.through(jacobian, new).with_cause("series stiffness", moved)
-
-
-def without_swing(found: Linear, share: float, share_std: float, band: float) -> Linear:
-    """Parameters of the surface where a tip of mass m swings on the arm's k: its Z/(1 + m s^2/k) was identified.
-
-    To the second order of the frequency M is M_a + K m/k, K and B are as they were. The next orders make B_a and M_a
-    too large by m omega^2/k of each at most, which is their half-width by this cause.
+@dataclass(frozen=True)
+class SeriesSpring:
+    """A spring between position sensor and surface, and the mass that swings on it.
 
     Args:
-        found: with the stiffness in series taken out.
-        share: m/k [s^2].
-        share_std: standard deviation of that [s^2].
-        band: frequency below which the probe moved [Hz].
+        stiffness, std: of the spring, and its standard deviation [N/m].
+        share, share_std: the mass over the stiffness, and its standard deviation [s^2]; 0 without a mass.
     """
-    jacobian, missed = _swinging(found.names, share), _swinging(found.names, share_std)
-    moved = missed @ found.theta - found.theta
-    most = min(share * (2 * np.pi * band) ** 2, 1.0) / NORMAL
-    beyond = most * found.theta * np.isin(found.names, ("B", "M"))
-    return found.through(jacobian, jacobian @ found.theta).with_cause("tip's mass", np.hypot(moved, beyond))
 
+    stiffness: float
+    std: float = 0.0
+    share: float = 0.0
+    share_std: float = 0.0
 
-def _swinging(names: tuple[str, ...], share: float) -> Array:
-    """M + K share, and all else as it is, shape (p, p)."""
-    place, matrix = _places(names), np.eye(len(names))
-    if {"K", "M"} <= place.keys():
-        matrix[place["M"], place["K"]] = share
-    return matrix
+    @classmethod
+    def of(cls, options: Options) -> SeriesSpring | None:
+        """The spring of a log's options; None without one."""
+        k = options.series_stiffness
+        return None if k is None else cls(k, options.series_std, *options.swing)
 
+    def parameters(self, seen: Linear, band: float = 0.0) -> Linear:
+        """Parameters of the surface from those of all, to the second order of the frequency.
 
-def with_payload(found: Answer, std: float) -> Answer:
-    """An answer whose mass errs by as much as that of a payload, which was taken out of the force [kg]."""
-    return found.with_cause("tool's inertia", np.where(np.array(found.names) == "M", std, 0.0))
+        With what is seen as K_a + B_a s + M_a s^2: K = K_a r, B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k + K m/k,
+        r = k/(k - K_a). The covariance goes through the derivatives of these. The next orders make B and M too large by
+        m omega^2/k of each at most, which is their half-width by this cause.
 
+        Args:
+            seen: through the spring.
+            band: frequency below which the probe moved [Hz].
+        """
+        theta, names = seen.theta, seen.names
+        self._check(float(theta[names.index("K")]))
+        new, jacobian = self.surface_of(theta, names), np.eye(len(theta))
+        for i in (names.index(name) for name in ("K", "B", "M") if name in names):
+            step = 1e-6 * max(abs(theta[i]), 1e-9)
+            moved = theta.copy()
+            moved[i] += step
+            jacobian[:, i] = (self.surface_of(moved, names) - new) / step
+        stiffer = replace(self, stiffness=self.stiffness + self.std)
+        surface = seen.through(jacobian, new).with_cause(_SPRING, stiffer.surface_of(theta, names) - new)
+        if not (self.share or self.share_std):
+            return surface
+        heavier = replace(self, share=self.share + self.share_std)
+        most = min(self.share * (2 * np.pi * band) ** 2, 1.0) / NORMAL
+        beyond = most * replace(self, share=0.0).surface_of(theta, names) * np.isin(names, ("B", "M"))
+        return surface.with_cause(_TIP, np.hypot(heavier.surface_of(theta, names) - new, beyond))
 
-def _places(names: tuple[str, ...]) -> dict[str, int]:
-    return {name: names.index(name) for name in ("K", "B", "M") if name in names}
+    def surface_of(self, theta: Array, names: tuple[str, ...]) -> Array:
+        """The surface's parameters of those of all, shape (p,)."""
+        own, new = dict(zip(names, theta, strict=True)), theta.copy()
+        r = self.stiffness / (self.stiffness - own["K"])
+        new[names.index("K")] = own["K"] * r
+        if "B" in own:
+            new[names.index("B")] = own["B"] * r**2
+        if "M" in own:
+            by_damping = own.get("B", 0.0) ** 2 * r**3 / self.stiffness
+            new[names.index("M")] = own["M"] * r**2 + by_damping + self.share * own["K"] * r
+        return new
 
-
-def _linearise(theta: Array, place: dict[str, int], series: float) -> tuple[Array, Array]:
-    """The surface's parameters and their derivatives by those of both, shapes (p,) and (p, p)."""
-    new = _seen_through(theta, place, series)
-    jacobian = np.eye(len(theta))
-    for i in place.values():
-        step = 1e-6 * max(abs(theta[i]), 1e-9)
-        moved = theta.copy()
-        moved[i] += step
-        jacobian[:, i] = (_seen_through(moved, place, series) - new) / step
-    return new, jacobian
-
-
-def _seen_through(theta: Array, place: dict[str, int], series: float) -> Array:
-    new = theta.copy()
-    stiffness = theta[place["K"]]
-    r = series / (series - stiffness)
-    new[place["K"]] = stiffness * r
-    if "B" in place:
-        new[place["B"]] = theta[place["B"]] * r**2
-    if "M" in place:
-        damping = theta[place["B"]] if "B" in place else 0.0
-        new[place["M"]] = theta[place["M"]] * r**2 + damping**2 * r**3 / series
-    return new
-
-
-def spectrum_without_series(
-    spectrum: tuple[DynamicStiffness, ...], series: float, series_std: float
-) -> tuple[DynamicStiffness, ...]:
-    """Dynamic stiffness of the surface, Z k / (k - Z), with k's own deviation in the half-widths."""
-    found = []
-    for octave in spectrum:
-        seen = complex(octave.storage, octave.loss)
-        own = seen * series / (series - seen)
-        gain = abs(series / (series - seen)) ** 2
-        by_series = Contribution(series_std * abs(own / series) ** 2)
-        storage, loss = octave.in_phase.through(own.real, gain), octave.in_quadrature.through(own.imag, gain)
-        found.append(
-            replace(
-                octave,
-                in_phase=storage.with_cause("series stiffness", by_series),
-                in_quadrature=loss.with_cause("series stiffness", by_series),
+    def spectrum(self, spectrum: tuple[DynamicStiffness, ...]) -> tuple[DynamicStiffness, ...]:
+        """Dynamic stiffness of the surface, Z k / (k - Z) (1 + m s^2/k), with what is not known of k and m/k."""
+        found = []
+        for octave in spectrum:
+            seen = complex(octave.storage, octave.loss)
+            squared = (2.0 * np.pi * octave.frequency) ** 2
+            behind = seen * self.stiffness / (self.stiffness - seen)
+            swings = 1.0 - squared * self.share
+            gain = swings * abs(self.stiffness / (self.stiffness - seen)) ** 2
+            by_spring = Contribution(abs(swings) * self.std * abs(behind / self.stiffness) ** 2)
+            storage, loss = (
+                part.through(swings * own, gain).with_cause(_SPRING, by_spring)
+                for part, own in ((octave.in_phase, behind.real), (octave.in_quadrature, behind.imag))
             )
-        )
-    return tuple(found)
+            if self.share_std:
+                by_tip = squared * self.share_std
+                storage = storage.with_cause(_TIP, Contribution(by_tip * abs(behind.real)))
+                loss = loss.with_cause(_TIP, Contribution(by_tip * abs(behind.imag)))
+            found.append(replace(octave, in_phase=storage, in_quadrature=loss))
+        return tuple(found)
 
+    def slope(self, seen: Measurement) -> Measurement:
+        """The surface's slope from that of both [N/m]."""
+        self._check(seen.value)
+        gain = self.stiffness / (self.stiffness - seen.value)
+        by_spring = Contribution(self.std * (gain * seen.value / self.stiffness) ** 2)
+        return seen.through(gain * seen.value, gain**2).with_cause(_SPRING, by_spring)
 
-def spectrum_without_swing(
-    spectrum: tuple[DynamicStiffness, ...], share: float, share_std: float
-) -> tuple[DynamicStiffness, ...]:
-    """Dynamic stiffness Z (1 + m s^2/k) of the surface, the deviation of m/k in its half-widths."""
-    found = []
-    for octave in spectrum:
-        squared = (2.0 * np.pi * octave.frequency) ** 2
-        gain, more = 1.0 - squared * share, squared * share_std
-        storage, loss = (
-            part.through(gain * part.value, gain).with_cause(
-                "tip's mass", Contribution(more * abs(part.value))
+    def slopes(self, seen: Slopes) -> Slopes:
+        """The same of the slopes of some loadings."""
+        own = self.slope(seen.stiffness)
+        gain = (own.value / seen.stiffness.value) ** 2
+        return replace(seen, stiffness=own, again=None if seen.again is None else gain * seen.again)
+
+    def press(self, seen: Press) -> Press:
+        """The press over the depth of the surface alone."""
+        tangent = [
+            Tangent(t.force, self.slope(t.slope)) for t in seen.tangent if t.stiffness < self.stiffness
+        ]
+        curves = []
+        for curve in (seen.loading, seen.unloading):
+            own = curve.copy()
+            if own.size:
+                own[0] -= (own[1] - own[1][0]) / self.stiffness
+            curves.append(own)
+        return replace(seen, tangent=tuple(tangent), loading=curves[0], unloading=curves[1])
+
+    def _check(self, apparent: float) -> None:
+        """Two springs in series are softer than either.
+
+        Raises:
+            InputError: the log is as stiff as what is said to be in series with the surface.
+        """
+        if abs(apparent) >= self.stiffness:
+            raise InputError(
+                f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g}"
+                " N/m, but two springs in series are softer than either: check its value and unit, or leave it out"
             )
-            for part in (octave.in_phase, octave.in_quadrature)
-        )
-        found.append(replace(octave, in_phase=storage, in_quadrature=loss))
-    return tuple(found)
-
-
-def slope_without_series(own: Measurement, series: float, series_std: float) -> Measurement:
-    """The surface's slope from that of both.
-
-    Args:
-        own: slope that the log shows [N/m].
-        series: stiffness in series [N/m].
-        series_std: standard deviation of that [N/m].
-    """
-    check(own.value, series)
-    gain = series / (series - own.value)
-    value = gain * own.value
-    by_series = Contribution(series_std * (value / series) ** 2)
-    return own.through(value, gain**2).with_cause("series stiffness", by_series)
-
-
-def slopes_without_series(found: Slopes, series: float, series_std: float) -> Slopes:
-    """The same of the slopes of some loadings."""
-    own = slope_without_series(found.stiffness, series, series_std)
-    gain = (own.value / found.stiffness.value) ** 2
-    return replace(found, stiffness=own, again=None if found.again is None else gain * found.again)
-
-
-def press_without_series(press: Press, series: float, series_std: float) -> Press:
-    """The press over the depth of the surface alone."""
-    tangent = [
-        Tangent(t.force, slope_without_series(t.slope, series, series_std))
-        for t in press.tangent
-        if t.stiffness < series
-    ]
-    curves = []
-    for curve in (press.loading, press.unloading):
-        own = curve.copy()
-        if own.size:
-            own[0] -= (own[1] - own[1][0]) / series
-        curves.append(own)
-    return replace(press, tangent=tuple(tangent), loading=curves[0], unloading=curves[1])

@@ -80,8 +80,6 @@ def covariance(
     place: NDArray[np.intp],
     noise: Noise,
     prior: Array | None = None,
-    less: Array | None = None,
-    more: Array | None = None,
 ) -> Array:
     """Covariance of the least-squares answer under coloured noise, shape (p, p).
 
@@ -92,8 +90,6 @@ def covariance(
         place: rows of the even grid, shape (n,).
         noise: colour of the noise.
         prior: standard deviation of each parameter known beforehand, infinite where nothing is; shape (p,).
-        less: information that noise of the columns themselves only pretends, shape (p, p).
-        more: covariance of what stands in Phi' f beside the noise, shape (p, p).
     """
     place = _closed_up(place)
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -106,10 +102,6 @@ def covariance(
         weight = level / (prior * scale) ** 2
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)
-    if less is not None:
-        gram = gram - less / np.outer(scale, scale)
-    if more is not None:
-        meat = meat + more / np.outer(scale, scale)
     bread = inverse(gram)
     cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
     return cov

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import hypot, isfinite
 from typing import Any
 
@@ -98,7 +98,26 @@ def prior_of(lag: Lag, noise: float, free_lag: bool) -> Prior:
 
 @dataclass(frozen=True)
 class Options:
-    """Everything that `palpate.identify` is told beside the record; see there."""
+    """Knowledge of a log beside its record.
+
+    Args:
+        model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
+            None to choose.
+        lag: how much later the force is read than the position [s], if it is calibrated.
+        lag_std: standard deviation of that [s].
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
+        calibration: relative standard deviation of the scales of force and position together.
+        series_stiffness: of what lies between the position sensor and the surface [N/m]; it is taken out.
+        series_std: standard deviation of that [N/m].
+        series_mass: mass between that and the surface, which swings on it, and its standard deviation [kg].
+        bonded: True if the probe is fixed to the surface, False if it is not, None to find out.
+        cutoff: of the filter chain [Hz]; None to choose.
+        force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`.
+            The position then goes through the same, and is read at the sensor's own samples. The lag, if it is given,
+            is that of a fresh reading, this low-pass included.
+        mass: prior of the mass, value and standard deviation [kg]; 0 fixes it.
+        force_sign: 1 if the force grows as the probe presses, -1 if it falls; None to find out.
+    """
 
     model: str | None = None
     lag: float | None = None
@@ -187,3 +206,5 @@ def _check_numbers(o: Options) -> None:
 
 
 NOTHING_SAID = Options()
+NAMED = tuple(own.name for own in fields(Options))
+"""Names of the options."""

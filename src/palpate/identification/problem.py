@@ -31,7 +31,7 @@ FREE_ROWS = 64
 _FEWEST = 30
 
 
-def numbered(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
+def number_rows(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
     """The rows of all contacts, and the number of each one's contact.
 
     Args:
@@ -192,9 +192,11 @@ def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None
     return replace(problem.at(at, force, np.r_[spans, numbers][order]), counted=True)
 
 
-def reduced(problem: Problem) -> Problem:
+def with_fewer_rows(problem: Problem) -> Problem:
     """The same with so many rows at most, in evenly spaced unbroken pieces."""
-    wider = (None if own is None else reduced(own) for own in (problem.with_touches, problem.with_approach))
+    wider = (
+        None if own is None else with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach)
+    )
     rows = problem.motion.rows
     kept = _pieces(len(rows)) if len(rows) > MOST_ROWS else np.ones(len(rows), bool)
     fewer = problem if kept.all() else problem.at(rows[kept], problem.force[kept], problem.spans[kept])

@@ -150,6 +150,8 @@ class WorkingPoint(Readable):
         prediction95: interval for the same measured once more; None if it was measured once.
         from_surface: whether the depth counts from the surface, which free motion shows; else from the middle of the
             motion.
+        each: stiffness of each press, in the order of time.
+        differs: whether these lie farther apart than the tolerance, and it is not identified for that.
     """
 
     stiffness: Parameter
@@ -159,6 +161,8 @@ class WorkingPoint(Readable):
     source: str
     prediction95: tuple[float, float] | None = None
     from_surface: bool = True
+    each: tuple[float, ...] = ()
+    differs: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
@@ -169,6 +173,7 @@ class WorkingPoint(Readable):
             "depth_m": self.depth_m,
             "frequency_Hz": self.frequency_Hz,
             "source": self.source,
+            "each": list(self.each),
         }
 
 

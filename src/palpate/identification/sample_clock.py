@@ -232,6 +232,38 @@ def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | 
     return stuck if stuck.sum() >= _FEWEST_AT_LIMIT else np.zeros(len(force), bool)
 
 
+_MORE = 4.0
+"""Deviations of its noise by which a force goes beyond where it was when the position came to its end."""
+_FLANK = 0.4
+"""Share of that by which it does so in the quarter next to either end: a straight line has 0.25, half a sine 0.6."""
+
+
+def past_end(position: Array, force: Array) -> Rows:
+    """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
+
+    A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
+    goes on and comes back.
+
+    Args:
+        position: of one axis [m], shape (n,).
+        force: of the same rows [N], shape (n,).
+    """
+    rise = np.sign(float(np.cov(position, force)[0, 1]))
+    noise = float(np.median(np.abs(np.diff(force, 2)))) / 1.65  # of a normal distribution: 6^0.5 times 0.674
+    past = np.zeros(len(force), bool)
+    for level, way in ((position.max(), rise), (position.min(), -rise)):
+        for begin, end in runs(at_limit(position, force, (level,))):
+            first, *own, last = way * force[begin:end]
+            inside, quarter = np.array(own), (end - begin + 3) // 4
+            beyond = [float(inside.mean()) - at for at in (first, last)]
+            near = [
+                float(part.mean()) - at for part, at in ((inside[:quarter], first), (inside[-quarter:], last))
+            ]
+            clear = min(beyond) > _MORE * noise * (1 + 1 / len(own)) ** 0.5
+            past[begin:end] = clear and all(n > _FLANK * b for n, b in zip(near, beyond, strict=True))
+    return past
+
+
 def _travel(place: Array) -> float:
     """How far the probe gets [m]."""
     place = place.reshape(len(place), -1)

@@ -10,7 +10,7 @@ from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn, from_word
 from palpate.identification.filters.state_variable import block_means
-from palpate.identification.sample_clock import at_limit
+from palpate.identification.sample_clock import at_limit, past_end
 from palpate.records import Record
 from palpate.signals.samples import fresh_rows
 
@@ -118,7 +118,7 @@ def channels_of(record: Record) -> Channels:
     dt, even = _period(time, step, warnings)
     use_x = _usable("position", position, dt, warnings)
     use_f = _usable("force", force, dt, warnings)
-    _leave_saturated(use_f & use_x, use_f, position, force, warnings)
+    _leave_saturated(use_x, use_f, position, force, warnings)
     rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
     if rate < _SLOW:
         text = (
@@ -302,16 +302,17 @@ def _usable(name: str, values: Array, dt: float, warnings: list[Warn]) -> Mask:
 
 
 def _leave_saturated(
-    both: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]
+    use_position: Mask, use_force: Mask, position: Array, force: Array, warnings: list[Warn]
 ) -> None:
-    rows = np.flatnonzero(both)
-    stuck = at_limit(force[rows], position[rows], _far_end(force[rows]))
-    if not stuck.any():
-        return
-    level = force[rows[stuck]][0]
-    text = f"the force rests at its extreme value {level:.6g} for {int(stuck.sum())} rows; they are left out"
-    warnings.append(Warn(Code.SATURATED, text))
-    use_force[rows[stuck]] = False
+    """Take rows out in which a channel stands at the end of its range."""
+    rows = np.flatnonzero(use_force & use_position)
+    x, f = position[rows], force[rows]
+    stuck, past = at_limit(f, x, _far_end(f)), past_end(x, f)
+    for name, values, at, use in (("force", f, stuck, use_force), ("position", x, past, use_position)):
+        if at.any():
+            rests = f"the {name} rests at its extreme value {values[at][0]:.6g}"
+            warnings.append(Warn(Code.SATURATED, f"{rests} for {int(at.sum())} rows; they are left out"))
+            use[rows[at]] = False
 
 
 def _far_end(force: Array) -> list[float]:

@@ -14,7 +14,7 @@ open. A lag of the force moves it along the curve: where the speed changes, it c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -47,7 +47,8 @@ for another has 1.5, half a sine 1.9."""
 _STILL = 0.1
 """Share of a stroke's mean speed below which a part of it rests."""
 _SHARE = 0.8
-"""Share of all the way of the probe that goes in strokes, of a press: else something shakes it as well."""
+"""Share of the probe's way, in or out, that goes in strokes, of a press: else something shakes it as well. A return may
+be at any speed."""
 _SEEN = 8.0
 """Deviations of the noise that a way must exceed to be one."""
 
@@ -85,8 +86,10 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
         return ()
     steady = [_steady(x, a, b, least) for a, b in pairwise(_turns(x, _STROKE * reach))]
     ends = [own for own in steady if own is not None]
-    whole = float(np.abs(np.diff(x[_turns(x, least)])).sum())
-    if sum(abs(float(x[b] - x[a])) for a, b in ends) < _SHARE * whole:
+    whole, made = np.diff(x[_turns(x, least)]), np.array([x[b] - x[a] for a, b in ends])
+    if not any(
+        0 < _SHARE * way[way > 0].sum() <= own[own > 0].sum() for way, own in ((whole, made), (-whole, -made))
+    ):
         return ()
     dt = size * channels.dt
     start = channels.start + (size - 1) / 2 * channels.dt
@@ -147,6 +150,8 @@ _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
 _FOLLOWED = 0.5
 """Share of a stroke's force that a smooth curve of the position follows, of a contact."""
+_TOUCHED = 0.2
+"""Share of the largest range of the force above which a stroke is a press, too, if not one of those that are named."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
 _DEGREES = (2, 4, 6, 8)
@@ -177,6 +182,11 @@ class Curve:
         low, high = np.percentile(self.force, [1, 99])
         return float(low), float(high)
 
+    @property
+    def span(self) -> float:
+        """Range of the force [N]."""
+        return self.reach[1] - self.reach[0]
+
 
 @dataclass(frozen=True)
 class Slopes:
@@ -198,6 +208,18 @@ class Slopes:
     again: float | None
     rise: float
     explained: float = 1.0
+
+    def spread_as(self, wider: Slopes | None) -> Slopes:
+        """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
+        if wider is None or not wider.stiffness.value:
+            return self
+        spread = wider.stiffness.contributions["repetition"].times(
+            self.stiffness.value / wider.stiffness.value
+        )
+        if spread.half <= self.stiffness.contributions["repetition"].half:
+            return self
+        parts = {**self.stiffness.contributions, "repetition": spread}
+        return replace(self, stiffness=Measurement(self.stiffness.value, parts), each=wider.each, again=None)
 
 
 @dataclass(frozen=True)
@@ -236,10 +258,17 @@ def steady_press(
         lag: prior of the lag.
         drift: of the force, which was removed from the channels.
     """
-    curves = curves_of(channels, strokes, signs, drift)
+    every = curves_of(channels, strokes, signs, drift)
+    deepest = max((own.span for own in every), default=0.0)
+    curves = [own for own in every if own.span > deepest / 2]
     named = [own for own in curves if own.loads] or curves
     headline = slopes_at(named, WINDOW, lag, rest)
-    if headline is None or headline.explained < _FOLLOWED or not headline.stiffness.known_to(1.0):
+    if headline is None or headline.explained < _FOLLOWED:
+        return None
+    beside = [own for own in every if own.loads is named[0].loads and own.span > _TOUCHED * deepest]
+    if len(beside) > len(named):  # at a force that all reach
+        headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
+    if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
     windows = [(level - _WIDE, min(level + _WIDE, 1.0)) for level in LEVELS]
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
@@ -251,7 +280,7 @@ def steady_press(
 def _draw(curves: Sequence[Curve]) -> Array:
     if not curves:
         return np.empty((2, 0))
-    curve = max(curves, key=lambda own: own.reach[1] - own.reach[0])
+    curve = max(curves, key=lambda own: own.span)
     return few_points(np.stack([curve.depth, curve.force]))
 
 
@@ -263,7 +292,7 @@ def few_points(curve: Array) -> Array:
 def curves_of(
     channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
 ) -> list[Curve]:
-    """The strokes through more than half of the force's range."""
+    """The force of each stroke over its depth."""
     curves = []
     for stroke in strokes:
         rows = stroke.rows(channels)
@@ -276,8 +305,7 @@ def curves_of(
             curves.append(
                 Curve(time, position, force, gone, ends[-1] > ends[0], min(channels.rate * channels.dt, 1.0))
             )
-    whole = max((own.reach[1] - own.reach[0] for own in curves), default=0.0)
-    return [own for own in curves if own.reach[1] - own.reach[0] > whole / 2]
+    return curves
 
 
 def slopes_at(
@@ -301,7 +329,10 @@ def slopes_at(
     level = float(np.mean([chebyshev.chebval(0.0, _fit(own, 2)) for own in windows]))
     every = [_tangent(own, level) for own in windows]
     values, variances, bends, drifts, depths, follows = (np.array(part) for part in zip(*every, strict=True))
-    mean = random_effects(values, variances)
+    bent = zip(windows, values, depths, strict=True)
+    pulls, open_ = np.array([_bend(own, level, slope, depth) for own, slope, depth in bent]).T
+    values = values + pulls
+    mean = random_effects(values, variances + open_)
     n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
     weight /= weight.sum()
     noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
@@ -316,6 +347,7 @@ def slopes_at(
         "repetition": Contribution(differ, freedom),
         "noise": Contribution(noise, freedom),
         "lag": Contribution(lag.std * abs(value * bend)),
+        "curvature": Contribution(float(np.sqrt(weight**2 @ open_))),
         "other forces": Contribution.within(drift),
     }
     rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
@@ -323,6 +355,20 @@ def slopes_at(
         level - rest, float(weight @ depths), Measurement(value, parts), tuple(values.tolist()), mean.next_half,
         rise, float(follows.min()),
     )  # fmt: skip
+
+
+def _bend(window: _Window, level: float, slope: float, depth: float) -> tuple[float, float]:
+    """How far a bend that no smooth curve follows, as a yield or a second layer, moves the slope of a window.
+
+    In half of the window it is smaller. The slopes' difference is that bias and the noise of the narrower one, so that
+    the bias is known as well as its excess over the noise (James and Stein's shrinkage).
+
+    Returns:
+        The bias to add [N/m] and its variance.
+    """
+    near, variance, *_ = _tangent(window.about(depth), level)
+    share = max(1 - variance / max((near - slope) ** 2, 1e-300), 0.0)
+    return share * (near - slope), share * variance
 
 
 @dataclass(frozen=True)
@@ -335,6 +381,17 @@ class _Window:
     drift: Array
     middle: float
     reach: float
+
+    def about(self, depth: float) -> _Window:
+        """The half of it about a depth; the whole where that has too few blocks."""
+        near = np.abs(self.scaled - (depth - self.middle) / self.reach) <= 0.5
+        if np.count_nonzero(near) < _FEWEST:
+            return self
+        x = self.middle + self.reach * self.scaled[near]
+        middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
+        return _Window(
+            self.time[near], (x - middle) / reach, self.force[near], self.drift[near], middle, reach
+        )
 
 
 def _within(curve: Curve, low: float, high: float) -> _Window | None:

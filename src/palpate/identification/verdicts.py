@@ -191,13 +191,17 @@ def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] 
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
-    """Of a press at constant speed K is its tangent, unless a model knows it better; such a motion shows no more."""
+    """K of presses at constant speed is their tangent, unless a model among them knows it better; no more is shown."""
     shown = {
         name: replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=_STEADY)
         for name, p in parameters.items()
         if p.verdict is Verdict.REJECTED
     }
-    both = [p for p in (point.stiffness, parameters["K"]) if p.verdict is Verdict.IDENTIFIED]
+    own = parameters["K"]
+    if len(point.each) > 1 and own.ci95 is not None:
+        among = own.ci95[0] <= max(point.each) and own.ci95[1] >= min(point.each)
+        own = own if among else point.stiffness
+    both = [p for p in (point.stiffness, own) if p.verdict is Verdict.IDENTIFIED]
     K = min(both, key=lambda p: p.std or np.inf, default=point.stiffness)
     return parameters | shown | {"K": K}
 

@@ -203,7 +203,7 @@ def press(
 
 
 def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, time: float) -> Array:
-    (_, force, position, _), action, truth = tick.sample, tick.action, arm.truth
+    (_, force, position, *_), action, truth = tick.sample, tick.action, arm.truth
     seen, pressing = place.axes @ position, action.phase == CONTACT
     true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else seen
     reading = float(place.normal @ force)

@@ -27,6 +27,7 @@ from palpate.force.sliding import slide_state
 
 if TYPE_CHECKING:
     from palpate.force.sliding.sliding_loop import SlidingLoop
+    from palpate.force.sliding.turning_tool import TurningTool
 
 
 TARE = 0.5
@@ -184,6 +185,7 @@ class TipSample(NamedTuple):
     force: Array  # that the tip exerts on the environment [N], shape (3,)
     position: Array  # of the tip [m], shape (3,)
     missed: float = 0.0  # readings that never came, since the one before
+    rotation: Array | None = None  # of the tool, its axes in columns, shape (3, 3); where it is to turn
 
 
 class MovableArm(Protocol):
@@ -193,8 +195,8 @@ class MovableArm(Protocol):
         """The readings at this tick; waits for the tick if the arm has its own clock."""
         ...
 
-    def move(self, velocity: Array) -> None:
-        """Moves the tip with this velocity until the next command [m/s], shape (3,); it does not turn."""
+    def move(self, velocity: Array, turning: Array | None = None) -> None:
+        """Moves the tool's point with this velocity [m/s] and turning [rad/s] until the next command, shape (3,)."""
         ...
 
 
@@ -345,6 +347,7 @@ class SlidingDriver:
         loop: its sliding loop, whose desired force is set.
         direction: of the slide at a time since it began [s], shape (3,).
         show: called with the sentence of a trouble when it begins.
+        tool: turns the tool with that loop; None for one that does not turn.
     """
 
     def __init__(
@@ -353,16 +356,22 @@ class SlidingDriver:
         loop: SlidingLoop,
         direction: Callable[[float], ArrayLike],
         show: Callable[[str], None] = lambda _: None,
+        tool: TurningTool | None = None,
     ):
-        self._arm, self.loop, self._direction = arm, loop, direction
+        self._arm, self.loop, self._direction, self._tool = arm, loop, direction, tool
         self._slid = False
         self.troubles = Troubles(loop.gains.theta, show)
 
     def step(self, sample: TipSample, desired: float, since: float) -> Action:
         """One tick, as `PressDriver` describes it."""
-        loop = self.loop
-        velocity = loop.update(sample.force, sample.position, self._direction(since), sample.missed)
-        self._arm.move(velocity)
+        loop, way = self.loop, self._direction(since)
+        if self._tool is None or sample.rotation is None:
+            velocity = loop.update(sample.force, sample.position, way, sample.missed)
+            self._arm.move(velocity)
+        else:
+            twist = self._tool.update(sample.force, sample.position, sample.rotation, way, sample.missed)
+            velocity = twist[:3]
+            self._arm.move(velocity, twist[3:])
         self._slid = self._slid or loop.sliding
         phase = CONTACT if loop.sliding else LOST if self._slid else APPROACH
         lasting = self.troubles.lasting(loop.trouble, sample.time)

@@ -19,7 +19,7 @@ from palpate.press.cell import Reading, TouchState, Workcell, body_at
 from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
 from palpate.press.sequence import TARE, TipSample
 from palpate.press.setting import Place
-from palpate.robots.serial.inverse import pose_error
+from palpate.robots.serial.inverse import pose_error, rotation_by
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
 from palpate.signals.types import Task, alike, triple
@@ -122,9 +122,11 @@ class SimulatedArm:
         """Rests in free motion, and takes what the sensor shows in the second half of that for zero."""
         self.zero = float(self.at_rest().mean())
 
-    def move(self, velocity: Array) -> None:
-        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
+    def move(self, velocity: Array, turning: Array | None = None) -> None:
+        """Moves the tip for a tick with a velocity [m/s], and a turning if there is one [rad/s], each of shape (3,)."""
         self._goal[:3, 3] += self.loop.tick * np.asarray(velocity)
+        if turning is not None:
+            self._goal[:3, :3] = rotation_by(self.loop.tick * turning) @ self._goal[:3, :3]
         self._follow_goal()
 
     def move_to(self, pose: Array) -> None:
@@ -225,7 +227,8 @@ class _TipLoop:
         self._n = n
 
     def towards(self, goal: Array) -> Task:
-        """The task of standing at a pose; the tip keeps its turn."""
+        """The task of standing at a pose."""
+        self._held = Mat3(*map(triple, goal[:3, :3]))
         x: Any = Vec6(triple(self._axes @ goal[:3, 3]), ZERO3)
         nothing = 0.0 * x
         return Task(x, nothing, nothing, nothing, nothing)

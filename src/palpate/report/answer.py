@@ -1,6 +1,6 @@
 """A result as a page shows it: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import ceil, floor, inf, isfinite, log10
 from typing import Any
@@ -84,6 +84,14 @@ class PageAnswer:
     tables: Sequence[Table] = ()
     folds: Sequence[tuple[str, str, Sequence[Sequence[str]]]] = ()
     source: tuple[str, str] = ("", "")
+
+
+def warning_alerts(notes: Iterable[str]) -> list[dict[str, str]]:
+    """Warnings of a page, each a sentence, whether its capital and its full stop are there or not."""
+    return [
+        {"tone": "warn", "title": "", "text": f"{note[:1].upper()}{note[1:].removesuffix('.')}."}
+        for note in notes
+    ]
 
 
 def answer_page(

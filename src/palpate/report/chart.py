@@ -190,7 +190,7 @@ def draw(axis: Axes, chart: Chart) -> None:
         for i, ends in enumerate(mark.spans):
             label = "" if i else mark.label
             _interval((axis.axvline, moment), (axis.axvspan, 0.12), ends, mark.colour, label)
-    axis.set(xlabel=chart.x, ylabel=chart.y)
+    axis.set(xlabel=style.literal(chart.x), ylabel=style.literal(chart.y))
     axis.set_title(style.literal(chart.title), loc="left")
     axis.set(**{name: ends for name in ("xlim", "ylim") if (ends := getattr(chart, name))})
     if "y" in chart.log:

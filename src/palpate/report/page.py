@@ -56,29 +56,6 @@ _SENTENCE = 32
 """Letters of a cell from which on it is a sentence; a value with its interval and unit is shorter."""
 
 
-def page(
-    *,
-    title: str,
-    about: str,
-    tables: Sequence[Table],
-    figures: Mapping[Path, str],
-    command: str,
-    source: str = "",
-    notes: Sequence[str] = (),
-) -> str:
-    """The page as HTML; `figures` are PNG files with a caption each, put into the page."""
-    return render(
-        "page.html",
-        title=title,
-        about=about,
-        notes=notes,
-        tables=tables,
-        figures=with_captions(figures),
-        source=source,
-        command=command,
-    )
-
-
 def with_captions(figures: Mapping[Path, str]) -> list[dict[str, str]]:
     """PNG files with a caption each, as a page holds them."""
     return [{"source": png(path), "caption": caption} for path, caption in figures.items()]

@@ -9,8 +9,9 @@ import numpy as np
 from palpate.contact_frame.tool_payload import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
+from palpate.report.answer import PageAnswer, answer_page, warning_alerts
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import CommandAnswer, Table, data_address, render
+from palpate.report.page import CommandAnswer, Table, data_address
 from palpate.report.style import svg
 from palpate.text import printable
 
@@ -115,21 +116,16 @@ def html(found: Weighed) -> str:
 
 def page(found: Weighed, title: str = "a record") -> str:
     """The page of `palpate payload --report`."""
-    return render(
-        "page.html",
+    caption = "The force in each orientation: measured (dots) and predicted from tool and bias (rings)"
+    answer = PageAnswer(
         title=f"Payload of the sensor, from {title}",
-        about=sentence(found),
-        notes=[note["text"] for note in found.notes] + found.lacking,
+        sentence=sentence(found),
+        alerts=warning_alerts([*(note["text"] for note in found.notes), *found.lacking]),
         tables=[table(found)],
-        figures=[
-            {
-                "source": data_address(svg(draw(found)), "image/svg+xml"),
-                "caption": "The force in each orientation: measured (dots) and predicted from tool and bias (rings)",
-            }
-        ],
-        source="" if found.payload is None else found.payload.to_toml(),
-        command=f"palpate payload {title}",
+        figures=[{"source": data_address(svg(draw(found)), "image/svg+xml"), "caption": caption}],
+        source=("The tool", "" if found.payload is None else found.payload.to_toml()),
     )
+    return answer_page(answer, room="payload", command=f"palpate payload {title}")
 
 
 def _parts(one: Estimated) -> list[tuple[str, float, float]]:

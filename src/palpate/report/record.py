@@ -9,10 +9,11 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
-from palpate.report import style
+from palpate.report.answer import PageAnswer, answer_page
+from palpate.report.chart import Chart, Series, figure_of, panels
 from palpate.report.look.assets import with_peaks
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Table, data_address, render
+from palpate.report.page import Table
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -73,39 +74,34 @@ def draw(record: Record) -> Figure:
     Raises:
         InputError: there is nothing to draw.
     """
+    charts = charts_of(record)
+    if not charts:
+        raise InputError("this record has no numeric column besides its time; there is nothing to draw")
+    return figure_of(charts)
+
+
+def charts_of(record: Record) -> list[Chart]:
+    """A chart a column, of the first twelve that have numbers."""
     clock = _clock(record)
     names = [name for name in record.columns if name != clock and np.isfinite(record[name]).any()][:_DRAWN]
-    if not names:
-        raise InputError("this record has no numeric column besides its time; there is nothing to draw")
     time = record[clock] if clock else np.arange(len(record), dtype=float)
-    with style.ink():
-        figure, axes = style.figure(rows=len(names), height=1.6)
-        for axis, name in zip(axes, names, strict=True):
-            axis.plot(*with_peaks(time, record[name], _POINTS), color=style.SERIES[0], linewidth=0.9)
-            axis.set_ylabel(style.literal(f"{name} [{record.units[name]}]"))
-        axes[-1].set_xlabel("time [s]" if clock else "row")
-    return figure
+    return [
+        Chart(
+            f"{name} [{record.units[name]}]", [Series(*with_peaks(time, record[name], _POINTS), "s0", width=0.9)],
+            x="time [s]" if clock else "row", height=1.6,
+        )
+        for name in names
+    ]  # fmt: skip
 
 
 def page(record: Record) -> str:
     """The table and the figure as a page."""
-    from palpate.report.style import svg
-
-    figures = []
-    if any(np.isfinite(record[name]).any() for name in record.columns if name != _clock(record)):
-        caption = (
-            f"Its first {_DRAWN} columns over time"
-            if len(record.columns) > _DRAWN
-            else "Its columns over time"
-        )
-        figures = [{"source": data_address(svg(draw(record)), "image/svg+xml"), "caption": caption}]
-    return render(
-        "page.html",
+    charts = charts_of(record)
+    first = f"Its first {_DRAWN} columns" if len(record.columns) > _DRAWN else "Its columns"
+    answer = PageAnswer(
         title="A record",
-        about=line(record),
-        notes=(),
+        sentence=line(record),
         tables=[Table("Columns", HEAD, rows(record))],
-        figures=figures,
-        source="",
-        command="palpate.read_log(...).report(...)",
+        figures=[{"panels": panels(charts), "caption": f"{first} over time."}] if charts else (),
     )
+    return answer_page(answer, room="record", command="palpate.read_log(...).report(...)")

@@ -12,7 +12,7 @@ from rich.text import Text
 from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
-from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale
+from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
 from palpate.report.page import CommandAnswer
@@ -187,10 +187,7 @@ def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> 
         sentence=tuning_sentence(told),
         about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
         f"{quantity(gains.theta, 's')}.",
-        alerts=[
-            {"tone": "warn", "title": "", "text": f"{text[0].upper()}{text[1:]}."}
-            for _, text in told.warnings
-        ],
+        alerts=warning_alerts(text for _, text in told.warnings),
         cards={"": _cards(told)},
         lower={"Margins on the stiffest surface": _margins(told)},
         scale=_scale(told),

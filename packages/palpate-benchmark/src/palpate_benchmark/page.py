@@ -3,13 +3,13 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from palpate.files import with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.page import Table, render, with_captions
+from palpate.report.answer import PageAnswer, answer_page
+from palpate.report.page import Table, with_captions
 from palpate_benchmark.simulated import ForceResult
 from palpate_benchmark.summary import (
     as_values,
@@ -56,32 +56,25 @@ def write_page(results: Sequence[ForceResult], folder: Path, command: str) -> No
         "Force over time in the first press on each stiffness; dashed: desired."
     )
     several = len(results) > 1
-    html = render(
-        "page.html",
+    answer = PageAnswer(
         title="Test of force control",
-        about=sentence(results),
+        sentence=sentence(results),
         tables=[
             leaderboard(results) if several else by_surface(results[0]),
             Table("Metrics", ("", ""), MEANINGS),
         ],
         figures=with_captions(figures),
         folds=[_fold(one) for one in best_first(results) if several],
-        source=json.dumps(description(results[0].plan)),
-        source_title="The test in numbers",
-        command=command,
+        source=("The test in numbers", json.dumps(description(results[0].plan))),
     )
-    write_text(folder / "report.html", html)
+    write_text(folder / "report.html", answer_page(answer, room="benchmark", command=command))
     write_json(folder / "result.json", with_author({"command": command, **as_values(results)}))
 
 
-def _fold(one: ForceResult) -> dict[str, Any]:
+def _fold(one: ForceResult) -> tuple[str, str, Sequence[Sequence[str]]]:
     """Table of an entry, to be opened."""
     table = by_surface(one)
-    return {
-        "title": one.name,
-        "about": f"{one.passes} of {len(one.runs)}, by stiffness",
-        "rows": [table.head, *table.rows],
-    }
+    return one.name, f"{one.passes} of {len(one.runs)}, by stiffness", [table.head, *table.rows]
 
 
 def _metrics(results: Sequence[ForceResult], path: Path) -> Path:

@@ -12,13 +12,13 @@ from cyclopts import Group, Parameter
 from palpate.cli.options import values
 from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
 from palpate.cli.options.values import FLAG, SIGNED, si
-from palpate.cli.toolkit import command, console, place, print_answer
+from palpate.cli.toolkit import command, print_result
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate_excitation import Budget, Design, DesignProblem, ExcitedLoop, Remedy, Sensors, SurfaceRange
+    from palpate_excitation import Budget, Design, DesignProblem, ExcitedLoop, Sensors, SurfaceRange
 
 
 _FASTEST = 200_000
@@ -259,8 +259,11 @@ def _answer(problem: DesignProblem, rate: int, output: ExcitationOutput, picture
         from palpate_excitation.report.page import page
 
         write_text(output.report, page(found, helps, printable(command())))
-    written = [*([output.out, output.experiment] if found.feasible else []), output.report]
-    _print(found, helps, written, picture, output.json)
+    written = [*([output.out, output.experiment] if found.feasible else []), output.report, picture]
+    from palpate_excitation.report.table import answer_of
+
+    files = [("written:", path) for path in written if path is not None]
+    print_result(answer_of(found, helps), json=output.json, files=files)
     return 0 if found.feasible else 1
 
 
@@ -271,20 +274,3 @@ def _write(found: Design, rate: int, out: Path | None, experiment: Path | None) 
         table.write_force(found, out, float(rate))
     if experiment is not None:
         write_text(experiment, table.experiment(found))
-
-
-def _print(
-    found: Design, helps: list[Remedy], written: list[Path | None], picture: Path | None, json: bool
-) -> None:
-    if json:
-        from palpate_excitation.report.table import summary
-
-        print_answer(summary(found, helps))
-        return
-    from palpate_excitation.report.table import show
-
-    screen = console()
-    screen.soft_wrap = True
-    show(found, helps, screen)
-    for path in (*filter(None, written), *([picture] if picture else [])):
-        place(screen, "written:", path)

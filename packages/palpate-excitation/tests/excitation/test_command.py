@@ -52,7 +52,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
     assert main(["excite", *ASKED, "--duration", "4"]) == 0
     printed = capsys.readouterr().out
     assert "multisine of" in printed
-    assert "yes, predicted K" in printed
+    assert "predicted K" in printed
     assert "written: excite.png" in printed
     assert (elsewhere / "excite.png").read_bytes().startswith(b"\x89PNG")
 
@@ -81,7 +81,7 @@ def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
     assert main(["excite", *words, "--no-figure"]) == 1
     printed = capsys.readouterr().out
-    assert "no; the best is K" in printed
+    assert "at best K" in printed
     assert "a lag between force and position known exactly" in printed
     assert "all of these" in printed
     assert list(elsewhere.iterdir()) == []

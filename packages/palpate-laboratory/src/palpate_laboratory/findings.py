@@ -7,7 +7,8 @@ import numpy as np
 
 from palpate.files import MADE, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.page import Table, page
+from palpate.report.answer import PageAnswer, answer_page, warning_alerts
+from palpate.report.page import Table, with_captions
 from palpate_laboratory.judge import Judged
 from palpate_laboratory.result import (
     Contradiction,
@@ -168,21 +169,19 @@ def present(result: InferenceResult, folder: Path, command: str) -> None:
     style.save(drawn_figure(result.posterior), folder / FIGURE)
     write_json(folder / FOUND, with_author(as_json(result, command)))
     notes, found = [_cross_validated(result), _worth(result.posterior)], main_tables(result)
-    whole = page(
+    caption = "The posterior of each unknown in shares of its prior (grey: the prior itself)."
+    answer = PageAnswer(
         title="The thesis' laboratory, inferred",
-        about=(
+        sentence=(
             f"{len(sentences())} sentences report results of the thesis' own laboratory. The search looks for values "
             f"of {len(UNKNOWNS)} unknowns under which most of them are true at once. It assumes that a sentence is "
             f"wrong about its own laboratory with a probability of {100 * WRONG:g} %. The thresholds are unchanged."
         ),
-        notes=notes,
+        alerts=warning_alerts(notes),
         tables=[*found, *details(result)],
-        figures={
-            folder / FIGURE: "The posterior of each unknown in shares of its prior (grey: the prior itself)."
-        },
-        command=command,
+        figures=with_captions({folder / FIGURE: caption}),
     )
-    write_text(folder / PAGE, whole)
+    write_text(folder / PAGE, answer_page(answer, room="laboratory", command=command))
     write_text(folder / DOCUMENT, document(notes, found, command))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, panels
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
@@ -137,10 +137,7 @@ def page(result: MapResult, title: str, command: str, *, live: bool = False) -> 
         sentence=sentence(result),
         about=f"{len(result.map)} presses, {len(result.presses.refused)} refused. Interpolated by a Gaussian process "
         "on the logarithm of the stiffness; outside the presses nothing is said.",
-        alerts=[
-            {"tone": "warn", "title": "", "text": f"{note[0].upper()}{note[1:]}."}
-            for note in warnings(result)
-        ],
+        alerts=warning_alerts(warnings(result)),
         cards={"": _cards(result)},
         pairs=[
             {"source": data_address(svg(figure), "image/svg+xml"), "caption": caption}

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from palpate.arrays import Array
     from palpate.force import Gains
     from palpate_slide.ground import Ground
-    from palpate_slide.jointed_arm import JointedArm
+    from palpate_slide.jointed_arm import HeldTip, JointedArm
 
 SHORTEST = 0.003
 """Path that is one [m]."""
@@ -67,13 +67,19 @@ class SlideOptions(SlideLimits):
     normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
+    turn: values.Length | None = None
+    """Keeps the tool perpendicular to the surface, about the centre of its spherical tip: how far that is behind the
+    tool's point, as 20:mm or 0:mm. A flat tool's moment is not covered."""
+    payload: Path | None = None
+    "File of palpate payload, whose weight is taken off in every orientation of the tool; for --turn."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
     """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
     which palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
     physics: Annotated[Physics, QUIET, _SIMULATED] = "own"
-    "own: a tip with the arm's lags in each axis; mujoco: the arm's joints (extra: arms)."
+    """own: a tip with the arm's lags in each axis, or with --turn the arm's joints; mujoco: the arm's joints
+    (extra: arms)."""
     seed: Annotated[int, WHOLE, _SIMULATED] = 0
     "Of the sensor's noise."
 
@@ -129,15 +135,39 @@ class SlideOptions(SlideLimits):
             raise InputError(f"--shape {name} needs a radius from 1 mm to 10 km, got {radius:g} m")
         return radius
 
+    @property
+    def has_no_joints(self) -> bool:
+        """Whether the arm is a tip with lags in each axis."""
+        return self.physics == "own" and self.turn is None
+
     @cached_property
     def joints(self) -> JointedArm:
         """The arm with its joints, for MuJoCo's physics."""
         from palpate.press.engines import ENGINES
+        from palpate.robots.serial.loading import mujoco
         from palpate_slide.jointed_arm import jointed_arm
 
         if self.physics not in ENGINES:
             raise unknown("physics", self.physics, ENGINES)
+        if self.physics == "mujoco":
+            mujoco()
         return jointed_arm(self.arm)
+
+    @property
+    def tool(self) -> HeldTip | None:
+        """The tool that is kept perpendicular; None for one that does not turn."""
+        from palpate.contact_frame import load_payload
+        from palpate.press.setting import held_tool
+        from palpate_slide.jointed_arm import HeldTip
+
+        if self.turn is None:
+            if self.payload is not None:
+                raise InputError("--payload is for a tool that turns; add --turn, as 20:mm")
+            return None
+        back = self.turn.si
+        if not 0.0 <= back <= 0.5:
+            raise InputError(f"--turn must be from 0 to 500 mm, got {1e3 * back:g} mm")
+        return HeldTip(back, held_tool(load_payload(self.payload) if self.payload else None).weight)
 
     @property
     def into(self) -> tuple[float, ...]:
@@ -146,18 +176,20 @@ class SlideOptions(SlideLimits):
 
     def run(self, gains: Gains, ground: Ground, ways: Array) -> Array:
         """Rows of the slide."""
-        if self.physics == "own":
+        if self.has_no_joints:
             from palpate_slide.dither import dither_frequency
             from palpate_slide.world import simulate
 
             share = (self.dither, dither_frequency(gains))
             return simulate(gains, ground, ways, into=self.into, seed=self.seed, dither=share)
         if self.dither:
-            raise InputError("--dither needs --physics own; leave out --physics mujoco")
-        return self.joints.slide(gains, ground, ways, into=self.into, seed=self.seed)
+            raise InputError("--dither needs an arm without joints; leave out --physics mujoco and --turn")
+        return self.joints.slide(
+            gains, ground, ways, into=self.into, seed=self.seed, physics=self.physics, tool=self.tool
+        )
 
     def tuned_gains(self) -> Gains:
-        """Gains for the slide; for MuJoCo's physics with the mass of the arm's tip."""
+        """Gains for the slide; for an arm with joints with the mass of its tip."""
         from msgspec.structs import replace as msgspec_replace
 
         from palpate.force import load_arm, load_gains
@@ -169,7 +201,7 @@ class SlideOptions(SlideLimits):
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
-        gains = gains_for(load_arm(self.arm) if self.physics == "own" else self.joints.inner, wanted)
+        gains = gains_for(load_arm(self.arm) if self.has_no_joints else self.joints.inner, wanted)
         return self.gains_with(gains, abs(self.radius))
 
 
@@ -223,18 +255,21 @@ def slide(
     for part in (wire, limits):
         only(part, "a real arm, and --wire is missing; add --wire")
     check_share(asked.dither)
-    gains = asked.tuned_gains()
-    slide_numbers = numbers_of(gains)
-    ways = directions(asked.path, asked.seconds, gains.arm.rate, slide_numbers.speed, asked.extent)
-    ground = asked.ground(ways, slide_numbers.speed, gains.arm.rate)
     if live:
-        return _watch(replaced(asked, physics="mujoco"))
+        asked = replaced(asked, physics="mujoco", path="circle", seconds=1.0)
+    tool = asked.tool
+    gains = asked.tuned_gains()
+    speed = numbers_of(gains).speed
+    ways = directions(asked.path, asked.seconds, gains.arm.rate, speed, asked.extent)
+    ground = asked.ground(ways, speed, gains.arm.rate)
+    if live:
+        return _watch(asked, gains, ground)
     folder = out or Path("runs") / f"slide-{Path(asked.arm).stem}-{asked.seed}"
     with fresh_folder(folder, replace=replace) as fresh:
         rows = asked.run(gains, ground, ways)
         head = {name: getattr(asked, name) for name in ("seed", "shape", "path", "physics")}
         summary: dict[str, Any] = with_author(
-            {"command": printable(command()), **head, **summarise(rows, gains, ground)}
+            {"command": printable(command()), **head, **summarise(rows, gains, ground, tool is not None)}
         )
         summary["along"] = None
         if asked.dither:
@@ -254,11 +289,8 @@ def slide(
     return 0 if summary["end"] == "held" else 1
 
 
-def _watch(asked: SlideOptions) -> int:
+def _watch(asked: SlideOptions, gains: Gains, ground: Ground) -> int:
     """Serves the live page of a slide."""
-    from palpate.force.sliding.paths import directions
-    from palpate.force.sliding.slide_domain import numbers_of
-
     try:
         from palpate_live.command import ServedOptions, show_live
         from palpate_slide.watched import WatchedSlide
@@ -266,12 +298,8 @@ def _watch(asked: SlideOptions) -> int:
         raise InputError(
             "--live needs palpate-live, which is not installed: pip install palpate-live"
         ) from None
-    gains = asked.tuned_gains()
-    ways = directions("circle", 1.0, gains.arm.rate, numbers_of(gains).speed, asked.extent)
-    ground = asked.ground(ways, numbers_of(gains).speed, gains.arm.rate)
-    return show_live(
-        WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed), ServedOptions()
-    )
+    watched = WatchedSlide(asked.joints, gains, ground, asked.extent, asked.into, asked.seed, asked.tool)
+    return show_live(watched, ServedOptions())
 
 
 def _slide_over(asked: SlideOptions, wire: WireOptions, limits: LimitOptions, json: bool) -> int:

@@ -68,10 +68,8 @@ class PathStiffness:
 
     def to_csv(self) -> str:
         """As `palpate map --table` reads it."""
-        rows = np.column_stack([self.places, self.stiffness, self.half])
-        return f"{MADE} slide.\nx_m,y_m,z_m,stiffness,half\n" + "".join(
-            ",".join(f"{value:.6g}" for value in row) + "\n" for row in rows
-        )
+        rows = [",".join(f"{value:.6g}" for value in row.values()) for row in self.to_json()]
+        return "\n".join([f"{MADE} slide.", "x_m,y_m,z_m,stiffness,half", *rows, ""])
 
 
 def stiffness_along(rows: Array, arm: Arm, frequency: float) -> PathStiffness:

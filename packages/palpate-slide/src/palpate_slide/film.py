@@ -1,4 +1,4 @@
-"""The film of a slide: the surface from aside, the tip on it with the estimated normal, the force and friction."""
+"""The film of a slide: the surface from aside, the tool or the normal on it with its cone, the force and friction."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def slide_film(rows: Array, tick: float, ground: Ground, half: str = "") -> str:
     """The film of a slide as SVG.
 
     Args:
-        rows: as of `world.simulate`, shape (n, 21).
+        rows: as of `world.simulate`, shape (n, 25).
         tick: between two rows [s].
         ground: the surface.
         half: `surface` or `force` for that half alone, which is legible on a telephone; both if empty.
@@ -83,7 +83,8 @@ def _surface_panel(c: dict[str, Array], seconds: float, ground: Ground) -> list[
         np.vstack([line for line in net if len(line)]), SURFACE, np.radians(-65.0), np.radians(28.0)
     )
     seen, size = view(tip), ROD / view.scale
-    ends, on = view(tip - size * n), c["sliding"] > 0.0
+    axis = np.stack([c[name] for name in ("ax", "ay", "az")], 1)
+    ends, on = view(tip - size * (axis if axis.any() else n)), c["sliding"] > 0.0
     cones = [coordinates(_cone(view, *one, size)) for one in zip(tip, n, c["cone"], strict=True)]
     way = np.linalg.norm(np.diff(tip, axis=0), axis=1) * on[1:]
     gone = np.append(0.0, np.cumsum(way)) / max(float(way.sum()), 1e-9)

@@ -1,8 +1,8 @@
-"""A slide of a serial arm: MuJoCo moves the joints, the tip slides along a curved surface with friction.
+"""A slide of a serial arm: MuJoCo or palpate's own laws move the joints, the tip slides along a surface with friction.
 
-Drives, contact and sensor are palpate's laws, those of a press and of `slide_world.py`: MuJoCo's own contact, as soft
+Drives, contact and sensor are palpate's laws, those of a press and of `world.py`: MuJoCo's own contact, as soft
 as this, creeps below the limit of friction. Beside the simulation of a point with the same lags in each axis, this
-one has the joints' inertia, their drive trains, a tip that tilts, and resolved rates.
+one has the joints' inertia, their drive trains, a tip that tilts, resolved rates, and a tool that may turn.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm
 from palpate.force.gains import Gains
 from palpate.force.simulated_press import world_of
+from palpate.force.sliding.slide_state import VELOCITY, vector_at
 from palpate.force.sliding.sliding_loop import DOWN, SlidingLoop
+from palpate.force.sliding.turning_tool import TurningTool
 from palpate.press.cell import Body, Reading, TouchState, Workcell, apply_drive, read_sensor
 from palpate.press.engines import ByMuJoCo, check_mode, loop_of, usual_mode
 from palpate.press.sequence import PressSequence, SlidingDriver, TipSample
 from palpate.press.setting import Place, cell_of, place_of
 from palpate.press.simulated_arm import SimulatedArm
-from palpate.robots.serial.chain import Tip
+from palpate.robots.serial.chain import Tip, axis_of, chain_motion
 from palpate.robots.serial.from_toml import names
-from palpate.robots.serial.loading import mujoco
+from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.signals.types import triple
-from palpate_slide.ground import Ground
+from palpate_slide.ground import Ground, outside
 from palpate_slide.world import COLUMNS, LONGEST, Carried, contact, note
 
 
@@ -61,6 +63,29 @@ class Frame(NamedTuple):
     origin: Vec3
 
 
+@law
+def slid_tick(cell, world, ground, frame, body, before, back, setpoint, k, noise):
+    """The k-th tick of an arm that palpate's own laws move: semi-implicit Euler, as of a press."""
+    n, room = len(body.q), body.room
+    for j in range(cell.steps):
+        tip = chain_motion(cell.chain, body.q, body.qd, room)
+        arm = -back * Vec3(tip.R.r1.z, tip.R.r2.z, tip.R.r3.z)
+        centre = Tip(tip.p + arm, tip.R, tip.v + cross(tip.w, arm), tip.w, tip.a, tip.dw)
+        time = (k * cell.steps + j + 1) * cell.step
+        before = slid(cell, world, ground, frame, body, before, centre, setpoint, time, noise)
+        force = frame.axes.T @ before.tip.force
+        push = Wrench(cross(centre.p, force), force)
+        factorise(room.M, body.L)
+        for i in range(n):
+            body.qdd[i] = body.drive[i] - room.h[i] - push.power(axis_of(room, i))
+        forward(body.L, body.qdd)
+        backward(body.L, body.qdd)
+        for i in range(n):
+            body.qd[i] += cell.step * body.qdd[i]
+            body.q[i] += cell.step * body.qd[i]
+    return before
+
+
 # More than seven arguments: the cell with its surface, and the state.
 @law
 def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
@@ -75,13 +100,13 @@ def slid(cell, world, ground, frame, body, before, tip, setpoint, time, noise):
     )  # fmt: skip
 
 
-compiled_slid, compiled_note = kernel(slid), kernel(note)
+compiled_slid, compiled_tick, compiled_note = kernel(slid), kernel(slid_tick), kernel(note)
 _UPRIGHT = Mat3(*map(triple, np.eye(3)))
 _NOTHING = Carried(ZERO3, ZERO3, ZERO3, 0.0, 0.0, ZERO3, 0.0, 0.0)
 
 
 class OnGround(ByMuJoCo):
-    """MuJoCo moves the arm; its tip touches a ground, and the sensor shows three axes.
+    """MuJoCo or palpate's own laws move the arm; its tip touches a ground, and the sensor shows three axes.
 
     Args:
         arm, cell, q: as for `ByMuJoCo`.
@@ -89,13 +114,18 @@ class OnGround(ByMuJoCo):
         inner: the arm's inner loop.
         frame: of the surface.
         seed: of the noise.
+        physics: own or mujoco.
+        back: from the tool's point back to what touches, along the tool's axis [m].
     """
 
     # More than seven arguments: arm and surface.
     def __init__(
-        self, arm: SerialArm, cell: Workcell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int
-    ):
-        super().__init__(arm, cell, q)
+        self, arm: SerialArm, cell: Workcell, q: Array, ground: Ground, inner: Arm, frame: Frame, seed: int,
+        physics: str = "mujoco", back: float = 0.0,
+    ):  # fmt: skip
+        self._own, self._back = BoundKernel(compiled_tick) if physics == "own" else None, back
+        if self._own is None:
+            super().__init__(arm, cell, q)
         none = Reading(ZERO3, 0.0, 0.0, 0.0)
         self.slid, self._law = Slid(_NOTHING, none, none, none, 0.0), BoundKernel(compiled_slid)
         # the links' place is known here, and no spring lies between it and the surface
@@ -110,6 +140,20 @@ class OnGround(ByMuJoCo):
         """One tick, as `Engine` describes it; noise is drawn for three axes here."""
         self.slid = self.slid._replace(mean=0.0)
         self._noise = self._generator.standard_normal((3, 8))
+        if self._own is not None:
+            self.slid = self._own(
+                cell,
+                self._world,
+                self.ground,
+                self._frame,
+                body,
+                self.slid,
+                self._back,
+                setpoint,
+                k,
+                self._noise,
+            )
+            return touch
         return super().tick(cell, body, touch, setpoint, k, noise)
 
     @property
@@ -136,13 +180,28 @@ class OnGround(ByMuJoCo):
         """Joints, Jacobian, and of the tip the place and the velocity: the contact takes no more of MuJoCo."""
         data, J, dofs = self._data, self._J[:3], self._dofs
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
-        at = self._scene.tip(data)[0]
+        at, axes = self._scene.tip(data)
+        at = at - self._back * axes[:, 2]
         self._engine.mj_jac(self._model, data, J, None, at, self._scene.body)
         v = J @ data.qvel
         return Tip(triple(at), _UPRIGHT, triple(v), ZERO3, ZERO3, ZERO3)
 
     def _load(self, body: Body, touch: TouchState) -> Array:
         return np.asarray((self._axes @ self._J[:3, self._dofs]).T @ np.array(self.slid.tip.force))
+
+
+class HeldTip(NamedTuple):
+    """A tool that is kept perpendicular, with a spherical tip and the weight of a payload.
+
+    The surface is that of the sphere's centre, parallel to the touched one.
+
+    Args:
+        back: from the tool's point back to that centre, along the tool's axis [m].
+        weight: reading of the payload alone, in the base's axes [N].
+    """
+
+    back: float = 0.0
+    weight: Vec3 = ZERO3
 
 
 @dataclass(frozen=True)
@@ -159,11 +218,12 @@ class JointedArm:
     place: Place
     inner: Arm
 
-    # More than seven arguments: as of `slide_world.simulate`.
+    # More than seven arguments: as of `world.simulate`.
     def slide(
-        self, gains: Gains, ground: Ground, ways: Array, *, into: ArrayLike = DOWN, seed: int = 0
-    ) -> Array:
-        """A slide from free motion on: rows of `slide_world.COLUMNS` in the surface's axes, shape (n, 21).
+        self, gains: Gains, ground: Ground, ways: Array, *, into: ArrayLike = DOWN, seed: int = 0,
+        physics: str = "mujoco", tool: HeldTip | None = None,
+    ) -> Array:  # fmt: skip
+        """A slide from free motion on: rows of `world.COLUMNS` in the surface's axes, shape (n, 25).
 
         Args:
             gains: with a table `slide`.
@@ -171,25 +231,22 @@ class JointedArm:
             ways: directions of the slide, tick by tick, shape (m, 3).
             into: direction in which the law looks for the surface, shape (3,).
             seed: of the noise.
+            physics: own or mujoco.
+            tool: with a spherical tip; None for a point.
 
         Raises:
             InputError: a joint reached the end of its range; gains of another kind of arm.
         """
         rate = gains.arm.rate
-        run = JointedSlide(self, gains, ground, lambda since: ways[round(since * rate)], into, seed)
+        run = JointedSlide(
+            self, gains, ground, lambda since: ways[round(since * rate)], into, seed, physics, tool
+        )
         rows = np.zeros((len(ways) + round(LONGEST * rate), len(COLUMNS)))
         for k, row in enumerate(rows):
             if round(run.sequence.next_since * rate) >= len(ways):
                 return rows[:k]
             run.tick(row)
         return rows
-
-    def frame(self) -> Frame:
-        """The surface's axes, and its first point before the tip."""
-        n, axes = self.place.normal, self.place.axes
-        at = self.place.pose[:3, 3]
-        at = at + (self.place.place - n @ at) * n
-        return Frame(Mat3(triple(axes[2]), triple(axes[1]), triple(-n)), triple(at))
 
 
 class JointedSlide:
@@ -198,7 +255,7 @@ class JointedSlide:
     Args:
         at: the arm before the surface.
         direction: in the surface's axes, at a time since the slide began [s].
-        gains, ground, into, seed: as of `JointedArm.slide`.
+        gains, ground, into, seed, physics, tool: as of `JointedArm.slide`.
 
     Raises:
         InputError: gains of another kind of arm.
@@ -206,32 +263,34 @@ class JointedSlide:
 
     # More than seven arguments: those of a slide, and the path.
     def __init__(
-        self,
-        at: JointedArm,
-        gains: Gains,
-        ground: Ground,
-        direction: Callable[[float], ArrayLike],
-        into: ArrayLike = DOWN,
-        seed: int = 0,
-    ):
+        self, at: JointedArm, gains: Gains, ground: Ground, direction: Callable[[float], ArrayLike],
+        into: ArrayLike = DOWN, seed: int = 0, physics: str = "mujoco", tool: HeldTip | None = None,
+    ):  # fmt: skip
         if gains.arm.kind != "servo":  # which takes the place of any arm's own loop
             check_mode(gains, at.inner.kind)
-        self.loop, frame = SlidingLoop(gains, into), at.frame()
-        cell = cell_of(at.arm, at.place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
-        self.engine = OnGround(at.arm, cell, at.place.q, ground, gains.arm, frame, seed)
-        self.tip = SimulatedArm(at.arm, gains.arm, at.place, cell, self.engine)
-        self._axes, self._origin = np.array(frame.axes), np.array(frame.origin)
-        driver = SlidingDriver(self, self.loop, direction)
+        held, place, n = tool or HeldTip(), at.place, at.place.normal
+        self.loop, self._axes = SlidingLoop(gains, into), np.array([place.axes[2], place.axes[1], -n])
+        self._origin = place.point - held.back * n
+        frame = Frame(Mat3(*map(triple, self._axes)), triple(self._origin))
+        cell = cell_of(at.arm, place, KelvinVoigt(ground.stiffness, ground.damping, 0.0), gains.arm)
+        self.engine = OnGround(at.arm, cell, place.q, ground, gains.arm, frame, seed, physics, held.back)
+        self.tip = SimulatedArm(at.arm, gains.arm, place, cell, self.engine)
+        tared, weight = self._axes @ place.pose[:3, :3], self._axes @ np.array(held.weight)
+        turning = TurningTool(self.loop, centre=(0.0, 0.0, -held.back), weight=weight, tared=tared)
+        driver = SlidingDriver(self, self.loop, direction, tool=turning if tool else None)
+        self._weight, self._unturned = weight, tared.T @ weight
         self.sequence = PressSequence(self, driver, lambda _: self.loop.desired, gains.arm.tick)
 
     def read(self) -> TipSample:
         """The readings at this tick."""
-        time, _, position, _ = self.tip.read()
-        return TipSample(time, self.engine.reading, self._axes @ (position - self._origin))
+        pose = self._axes @ self.tip.pose[:3]
+        R, at = pose[:, :3], pose[:, 3] - self._axes @ self._origin
+        reading = self.engine.reading + self._weight - R @ self._unturned
+        return TipSample(self.tip.read().time, reading, at, rotation=R)
 
-    def move(self, velocity: Array) -> None:
-        """Moves the tip for a tick with a velocity [m/s], shape (3,)."""
-        self.tip.move(velocity @ self._axes)
+    def move(self, velocity: Array, turning: Array | None = None) -> None:
+        """Moves the tool's point for a tick with a velocity [m/s] and a turning [rad/s], each of shape (3,)."""
+        self.tip.move(velocity @ self._axes, None if turning is None else turning @ self._axes)
 
     def tick(self, row: Array) -> None:
         """A tick; fills a row of `world.COLUMNS`.
@@ -239,15 +298,17 @@ class JointedSlide:
         Raises:
             InputError: a joint reached the end of its range.
         """
-        sample, desired, action = self.sequence.tick()
+        sample, desired, _ = self.sequence.tick()
         loop, after, arm, q = self.loop, self.engine.slid, self.tip.arm, self.tip.truth.q
         beyond = np.flatnonzero(~((q >= arm.lower) & (q <= arm.upper)))
         if len(beyond):
             at = f"reached the end of its range at {sample.time:.3f} s"
             raise InputError(f"{arm.names[beyond[0]]} {at}; make --length smaller")
-        v, f = triple(action.velocity), triple(sample.force)
+        v, f = vector_at(loop.state, VELOCITY), triple(sample.force)
         compiled_note(self.engine.ground, loop.state, after.tip, v, f, float(after.mean), row)
-        row[20] = desired
+        axis = self._axes @ arm.forward_kinematics(q)[:3, 2]
+        up = np.array(outside(self.engine.ground, after.tip.x)[1])
+        row[20], row[21], row[22:] = desired, np.arccos(np.clip(-axis @ up, -1.0, 1.0)), axis
         row[13] = (1.0 if loop.sliding else 2.0) * (self.sequence.touch is not None)
 
 
@@ -257,10 +318,9 @@ def jointed_arm(name: str) -> JointedArm:
     Raises:
         InputError: an arm whose joints are not known, or no MuJoCo.
     """
-    mujoco()
     if name not in names():
         raise InputError(
-            f"--physics mujoco needs an arm whose joints are known ({', '.join(names())}), got {name}"
+            f"--turn and --physics mujoco need an arm whose joints are known ({', '.join(names())}), got {name}"
         )
     arm = SerialArm.named(name)
     place = place_of(arm, None, None)

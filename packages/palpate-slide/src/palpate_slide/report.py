@@ -18,7 +18,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
-from palpate.report.numbers import plain, quantity
+from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
@@ -27,11 +27,18 @@ from palpate_slide.world import COLUMNS, SETTLED, figures_of
 _UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
     ("x", "y", "z"), "m"
 )
-_UNITS |= {"normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
+_UNITS |= {"tool": "rad", "normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 
 
-def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
-    """Plain JSON values: how the force was held, normal, friction and stiffness with intervals, and the truth."""
+def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -> dict[str, Any]:
+    """Plain JSON values: how the force was held, normal, friction and stiffness with intervals, and the truth.
+
+    Args:
+        rows: as of `world.simulate`.
+        gains: of the law.
+        ground: the surface.
+        turned: whether the tool was kept perpendicular.
+    """
     c, found = dict(zip(COLUMNS, rows.T, strict=True)), figures_of(rows, gains, ground)
     on = c["sliding"] > 0.0
     said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
@@ -40,6 +47,7 @@ def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
         "end": "no contact" if not found.touched else "held" if found.obeys else "not held",
         "truth": {"friction": ground.friction, "stiffness": _seen(gains, ground)},
         "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
+        "tool": None,
     }  # fmt: skip
     if not found.touched:
         return summary
@@ -59,6 +67,10 @@ def summarise(rows: Array, gains: Gains, ground: Ground) -> dict[str, Any]:
         "stiffness": {"value": float(K), "ci95": list(K.ci95)},
         "path_m": float(np.linalg.norm(np.diff(where, axis=0), axis=1).sum()),
         "contact_lost": found.lost,
+        "tool": {
+            "median_angle_deg": float(np.degrees(np.median(c["tool"][judged]))),
+            "angle95_deg": float(np.degrees(np.percentile(c["tool"][judged], 95))),
+        } if turned else None,
     }  # fmt: skip
 
 
@@ -72,10 +84,12 @@ def sentence(summary: dict[str, Any]) -> str:
     if f is None:
         return "The surface was never touched, or the force was not held before a slide."
     n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
+    angle = (summary["tool"] or {}).get("angle95_deg")
+    within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
     return (
         f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
         f"{1e3 * summary['path_m']:.3g} mm; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; friction {mu} "
-        f"\N{PLUS-MINUS SIGN} {half}."
+        f"\N{PLUS-MINUS SIGN} {half}{within}."
     )
 
 
@@ -91,6 +105,7 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     from palpate.logs import write_record
 
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
+    columns = {name: column for name, column in columns.items() if not np.isnan(column).all()}
     units = {name: _UNITS.get(name, "1") for name in columns}
     write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
     charts = _charts(rows, gains, summary)
@@ -112,9 +127,10 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     answer = PageAnswer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
-        about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}.",
+        about=f"{gains.arm.title}. Simulated, seed {summary['seed']}; {slide_sentence(gains)}."
+        + " A flat tool's moment is not covered." * (summary["tool"] is not None),
         alerts=alerts, cards={"": _cards(summary)}, pairs=pairs, folds=_along(summary),
-        figures=[{"panels": shown[:4], "caption": caption}, {"panels": shown[4:], "caption": caption}],
+        figures=[{"panels": part, "caption": caption} for part in (shown[:-1], shown[-1:])],
         source=("The gains", gains.to_toml()),
     )  # fmt: skip
     write_text(folder / "report.html", answer_page(answer, room="slide", command=summary["command"]))
@@ -124,9 +140,8 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     f, n, truth = summary["force"], summary["normal"], summary["truth"]
     if f is None:
         return [Card("Contact", "none", tone="fail")]
-    K, (mu, half) = summary["stiffness"], _friction(summary)
+    K, (mu, half), t = summary["stiffness"], _friction(summary), summary["tool"]
     lost = summary["contact_lost"]
-    low, high = (quantity(end, "N/m") for end in K["ci95"])
     off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, most = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
     true = quantity(truth["stiffness"], "N/m")
@@ -134,8 +149,22 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
         Card("Normal", f"± {n['cone95_deg']:.2g}", "\N{DEGREE SIGN}", why=off),
+        *(
+            [
+                Card(
+                    "Tool",
+                    f"{t['median_angle_deg']:.2g}",
+                    "\N{DEGREE SIGN}",
+                    why=f"95 %: {t['angle95_deg']:.2g}",
+                )
+            ]
+            if t
+            else []
+        ),
         Card("Friction", mu, half=half, why=f"truth {truth['friction']:g}"),
-        Card("Stiffness", low, why=f"to {high}; truth {true}", colour="K"),
+        Card(
+            "Stiffness", quantity_between(K["ci95"][0], K["ci95"][1], "N/m"), why=f"truth {true}", colour="K"
+        ),
     ]
 
 
@@ -167,6 +196,7 @@ def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
         ("force error [N]", c["normal_force"] - c["desired"], (), (-within, within), "F", None),
         ("speed [mm/s]", 1e3 * c["speed"], (), (asked,), "ink", 0.0),
         ("normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), "ink", 0.0),
+        ("tool's angle [deg]", np.degrees(c["tool"]), (), (), "ink", 0.0),
         ("friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), "ink", None),
         ("K [N/m]", c["stiffness"], _interval(c, "stiffness"), (truth["stiffness"],), "K", None),
     ):
@@ -175,7 +205,8 @@ def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
         settled = [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)]
         bands, marks = [Band(level, level, **KNOWN) for level in known], [Mark(slower, "warn")]
         ylim = _limits(np.concatenate([*settled, np.array(known)]), least)
-        charts.append(Chart(label, series, bands, marks, ylim=ylim, height=1.7))
+        if np.isfinite(value).all():
+            charts.append(Chart(label, series, bands, marks, ylim=ylim, height=1.7))
     return [*charts[:-1], replace(charts[-1], x="path [mm]")]
 
 

@@ -24,7 +24,7 @@ from palpate_live.view import (
 )
 from palpate_live.view import COLUMNS as SHOWN
 from palpate_slide.ground import Ground
-from palpate_slide.jointed_arm import JointedArm, JointedSlide
+from palpate_slide.jointed_arm import HeldTip, JointedArm, JointedSlide
 from palpate_slide.world import COLUMNS
 
 PLACE = {name: i for i, name in enumerate(COLUMNS)}
@@ -42,13 +42,18 @@ class WatchedSlide(WatchedArm):
         radius: of the circle [m].
         into: direction in which the law looks for the surface, shape (3,).
         seed: of the noise.
+        tool: that is kept perpendicular; None for one that does not turn.
 
     Raises:
         InputError: an arm of more joints than are drawn, gains of another kind of arm.
     """
 
     # More than seven arguments: as of a slide, and the circle.
-    def __init__(self, at: JointedArm, gains: Gains, ground: Ground, radius: float, into: Any, seed: int = 0):
+    def __init__(
+        self, at: JointedArm, gains: Gains, ground: Ground, radius: float, into: Any, seed: int = 0,
+        tool: HeldTip | None = None,
+    ):  # fmt: skip
+        self._tool = tool
         self._at, self._ground, self._radius, self._into = at, ground, radius, into
         self._speed, self._tick = numbers_of(gains).speed, gains.arm.tick
         self._series = gains.arm.series if gains.arm.kind == "position" else np.inf
@@ -73,7 +78,13 @@ class WatchedSlide(WatchedArm):
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
         self._run = JointedSlide(
-            self._at, self._gains, self._surface, self._direction, self._into, self.state.seed or 0
+            self._at,
+            self._gains,
+            self._surface,
+            self._direction,
+            self._into,
+            self.state.seed or 0,
+            tool=self._tool,
         )
         self._run.loop.desired = self.state.values["force"]
         self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))

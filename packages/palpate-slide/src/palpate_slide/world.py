@@ -41,10 +41,11 @@ from palpate_slide.ground import Ground, outside
 
 COLUMNS = (
     "normal_force", "x", "y", "z", "nx", "ny", "nz", "normal_error", "cone", "mu", "mu_std", "stiffness",
-    "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true", "desired",
+    "stiffness_std", "sliding", "trouble", "speed", "fx", "fy", "fz", "mu_true", "desired", "tool", "ax", "ay", "az",
 )  # fmt: skip
 """Of a run: N [N], tip [m], estimated normal, its error and one standard deviation [rad], mu, K [N/m], phase, trouble,
-speed commanded along the surface [m/s], reading [N], friction as it acts, desired force [N]."""
+speed commanded along the surface [m/s], reading [N], friction as it acts, desired force [N], and of an arm with joints
+the angle between the tool's axis and the true normal [rad], and that axis; NaN of a point."""
 
 
 @part
@@ -135,7 +136,7 @@ def slide_run(world, ground, control, s, course, out):
         control: a part as `OwnLaw`.
         s: its state, as it starts, shape (SIZE,) or longer.
         course: of the run.
-        out: shape (n, 21).
+        out: shape (n, 25).
     """
     h, ticks, samples = world.tick / world.steps, 0, 0.0
     torque = world.torque * (1.0 - world.yields)
@@ -234,7 +235,7 @@ def simulate(
     control: Callable[[Sliding], Any] = OwnLaw,
     dither: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """A slide from free motion on: rows of `COLUMNS`, shape (n, 21).
+    """A slide from free motion on: rows of `COLUMNS`, shape (n, 25).
 
     Args:
         gains: with a table `slide`.
@@ -250,6 +251,7 @@ def simulate(
     law.start(state)
     world = world_of(arm, noise=arm.sensor.noise)
     out = np.zeros((len(ways) + round(LONGEST * arm.rate), len(COLUMNS)))
+    out[:, COLUMNS.index("tool") :] = np.nan
     start = (GAP if law.into.z > 0.0 else -GAP) * law.into  # outside, however wrong it is
     noise = np.random.default_rng(seed).standard_normal((len(out), 3))
     course = Course(

@@ -1,4 +1,4 @@
-"""Slides of arms with joints, which MuJoCo moves."""
+"""Slides of arms with joints, which MuJoCo or palpate's own laws move."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from palpate._vector import Vec3
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.force import Gains
@@ -15,8 +16,8 @@ from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
 from palpate_slide.ground import ground_of
-from palpate_slide.jointed_arm import JointedArm, jointed_arm
-from palpate_slide.world import GAP, figures_of
+from palpate_slide.jointed_arm import HeldTip, JointedArm, jointed_arm
+from palpate_slide.world import COLUMNS, GAP, SlideFigures, figures_of
 
 pytest.importorskip("mujoco", reason="the extra `arms` is not installed")
 
@@ -97,3 +98,66 @@ def test_the_command_says_by_whom_the_arm_was_moved(tmp_path, capsys) -> None:
     assert answer["physics"] == "mujoco"
     assert answer["end"] == "held"
     assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+def test_a_tool_is_kept_perpendicular_by_palpates_own_physics(name: str) -> None:
+    """With its payload's weight the force is held as before, and the tool follows a normal that turns by 30 degrees."""
+    arm = jointed_arm(name)
+    gains, ground = tuned(arm), ground_of("bowl", 0.12, 2e4, friction=0.4)
+    ways = directions("circle", 4.0, gains.arm.rate, 0.03, 0.03)
+    weight = Vec3(0.0, 0.0, 12.0)
+
+    def slid(tool: HeldTip | None) -> tuple[SlideFigures, float]:
+        rows = arm.slide(gains, ground, ways, into=[0.05, 0.05, -1.0], physics="own", tool=tool)
+        late = rows[-round(2.0 * gains.arm.rate) :, COLUMNS.index("tool")]
+        return figures_of(rows, gains, ground), float(np.degrees(late.max()))
+
+    fixed, stood = slid(None)
+    turned, angle = slid(HeldTip(0.02, weight))
+    assert stood > 20.0
+    assert angle < 6.0
+    assert turned.obeys
+    assert turned.rms < fixed.rms + 0.005
+
+
+def test_the_command_says_how_far_the_tool_was_off(tmp_path, capsys) -> None:
+    quick = [
+        "--seconds",
+        "1",
+        "--touches",
+        "0:mm",
+        "--tilt",
+        "3",
+        "--shape",
+        "bowl:150:mm",
+        "--turn",
+        "20:mm",
+    ]
+    assert main(["slide", *quick, "--out", str(tmp_path / "out")]) == 0
+    assert "of the normal for 95 % of the time" in capsys.readouterr().out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert 0.0 < summary["tool"]["median_angle_deg"] <= summary["tool"]["angle95_deg"] < 20.0
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "of the normal for 95 % of the time" in page
+    assert "flat tool's moment is not covered" in page.replace("&#39;", "'")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--turn", "-3:mm"], "--turn must be from 0 to 500 mm"),
+        (["--turn", "nan:mm"], "--turn"),
+        (["--turn", "20"], "--turn"),
+        (["--turn", "20:mm", "--dither", "0.1"], "an arm without joints"),
+        (["--payload", "tool.toml"], "add --turn"),
+        (["--turn", "20:mm", "--payload", "missing.toml"], "missing.toml"),
+        (["--turn", "20:mm", "--arm", "arm.toml"], "arm.toml"),
+    ],
+)
+def test_a_turning_that_is_none_is_one_line(words: list[str], said: str, tmp_path, capsys) -> None:
+    assert main(["slide", "--out", str(tmp_path / "out"), *words]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

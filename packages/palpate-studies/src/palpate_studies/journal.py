@@ -1,4 +1,7 @@
-"""A journal: one value per line with its checksum, on disk at once; damaged lines are skipped."""
+"""A journal: one value per line with its checksum, on disk at once; damaged lines are skipped.
+
+Text, no database: a damaged line costs one value, and a damaged page of SQLite the file.
+"""
 
 import errno
 import os

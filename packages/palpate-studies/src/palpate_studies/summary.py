@@ -20,7 +20,7 @@ from palpate_studies.metrics import metric_of
 from palpate_studies.pairing import PairedComparison, comparisons, short, with_unit
 from palpate_studies.plan import MAIN, RunPlan
 from palpate_studies.preview import MetricMean, Ranked, Ranking, rankings
-from palpate_studies.report.plain import StudyPage, study_page
+from palpate_studies.report.plain import study_page
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -79,7 +79,9 @@ def present(
     found = Findings(told, shown, notes(frame, plan, ranked, compared))
     drawn = list(figures(frame, plan))
     described = Table("Metrics", ("metric", "meaning"), [(m, _description(m)) for m in plan.study.metrics])
-    page = StudyPage(
+    page = study_page(
+        charts(plan, compared, drawn),
+        draw(drawn, folder, endings, dpi),
         title=plan.study.title,
         about=plan.study.about,
         sentence=answer[0],
@@ -87,8 +89,6 @@ def present(
         notes=found.notes,
         tables=found.tables,
         below=[described],
-        charts=charts(plan, compared, drawn),
-        figures=draw(drawn, folder, endings, dpi),
         command=command,
         study=source,
         origin=[
@@ -97,7 +97,7 @@ def present(
             *((p.name, f"sources {p.stamp}") for p in plan.plugins),
         ],
     )
-    write_text(folder / PAGE, study_page(page))
+    write_text(folder / PAGE, page)
     write_json(folder / SUMMARY, found.summary)
     return found
 

@@ -131,7 +131,7 @@ class GuardedArm:
         end_if(reason_to_stop(self.now, self._order, self.rest))
         return TipSample(sense.stamp, force, position, float(self.now.missed))
 
-    def move(self, velocity: Array) -> None:
+    def move(self, velocity: Array, turning: Array | None = None) -> None:
         """Command a velocity [m/s], within the limit.
 
         A speed that the arm cannot have, or that is no number, is a fault of the law: the guard refuses it as it is.

@@ -108,9 +108,10 @@ def slide_sentence(gains: Gains) -> str:
     )
     floor = (
         f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step costs "
-        f"0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap:.3g} N/m"
+        f"0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap / 1e3:.3g} kN/m"
     )
     if domain is None:
         better = "slow down, or give a better normal"
         return f"no surface lies in the domain of a slide {least}{slide.mu_max:g}: {better}; {floor}"
-    return f"the domain of a slide is {domain[0]:.3g} to {domain[1]:.3g} N/m {least}{slide.mu_max:g}; {floor}"
+    low, high = (f"{end / 1e3:.3g}" for end in domain)
+    return f"the domain of a slide is {low} to {high} kN/m {least}{slide.mu_max:g}; {floor}"

@@ -116,8 +116,6 @@ WORTH = 0.06
 """Share of F_d that the slope's uncertainty may cost: the speed is limited so that it costs no more."""
 EXCESS = 0.3
 """Share of F_d by which an edge of 45 degrees may raise the force within the loop's lag, where steps are expected."""
-SLOWEST = 0.1
-"""Share of the speed that is kept however unsure the slope is."""
 CROOKED = 0.4
 """Cosine between force and direction below which a press is in other axes: friction of 0.9 and a tilt of 20 degrees
 have 0.48."""
@@ -371,7 +369,7 @@ def along_surface(law, s, desired, direction):
     elif asked > 0.0 and s[LOSS] == 0.0:
         stiffness = s[BOUND] / (1.0 + c.compliance * s[BOUND])
         slope = sqrt(max(slope_variance(s), 1e-12))
-        sure = max(WORTH * c.alpha * desired / (stiffness * c.theta * slope), SLOWEST * law.speed)
+        sure = WORTH * c.alpha * desired / (stiffness * c.theta * slope)
         if stiffness * law.step > EXCESS * desired:
             sure = min(sure, EXCESS * desired / (stiffness * law.lead))
         wanted = min(law.speed * min(asked, 1.0) * s[SLOW], sure) * unit(flat, e1)

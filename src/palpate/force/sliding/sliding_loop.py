@@ -188,8 +188,8 @@ class SlidingLoop(Readable):
     def limit_speed(self, speed: float) -> None:
         """Lets no command be faster than this [m/s], where that is below the arm's own limit."""
         press = self.law.press
-        slower = press._replace(speed=min(press.speed, speed))
-        self._numbers = flatten(self.law._replace(press=slower))
+        self.law = self.law._replace(press=press._replace(speed=min(press.speed, speed)))
+        self._numbers = flatten(self.law)
 
     def update(
         self, force: ArrayLike, position: ArrayLike, direction: ArrayLike, missed: float = 0.0

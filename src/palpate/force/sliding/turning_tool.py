@@ -7,10 +7,13 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.force.sliding.slide_state import HALT
 from palpate.force.sliding.sliding_loop import SlidingLoop, three
 
 SLOWER = 10.0
 """Half the time constant of the turning, in theta: below 10 it moves the normal that the force loop learns."""
+SMOOTH = 0.25
+"""Time constant of the turning's low-pass over that time: a normal that jumps would shake an elastic arm."""
 FASTEST = 0.5
 """Of the turning [rad/s]."""
 
@@ -19,8 +22,10 @@ class TurningTool:
     """Turns a tool's axis into the estimated normal, about the centre of its spherical tip.
 
     The force loop works on that centre, which moves along a surface parallel to the touched one, with the same normal:
-    so turning about it moves nothing. The turning is a proportional and integral one, critically damped: it follows a
-    normal that turns evenly without an error. A flat tool's moment is not covered.
+    so turning about it moves nothing. The turning is a proportional and integral one, smooth and well damped: it
+    follows a normal that turns evenly without an error, and rests while the slide halts. Neither the tip nor the
+    tool's point is faster than the loop's limit: the turning has the speed that the slide leaves. A flat tool's
+    moment is not covered.
 
     Args:
         loop: holds the force.
@@ -49,7 +54,7 @@ class TurningTool:
         if not length > 0.0:
             raise InputError("the tool's axis needs a length, got 0,0,0")
         self._axis /= length
-        self._rate = np.zeros(3)
+        self._rate, self._turning = np.zeros((2, 3))
         self._bias = np.zeros(3) if tared is None else _rotation(tared).T @ self._weight
 
     def update(
@@ -75,13 +80,26 @@ class TurningTool:
         velocity = self.loop.update(
             three("force", force) - rest, three("position", position) + arm, direction, missed
         )
-        if not self.loop.sliding:
-            self._rate *= 0.0
+        if not self.loop.sliding or self.loop.state[HALT] > 0.0:
+            self._rate, self._turning = np.zeros((2, 3))
             return np.concatenate([velocity, self._rate])
+        tick = self.loop.gains.arm.tick
         T, error = SLOWER * self.loop.gains.theta, np.cross(R @ self._axis, self.loop.normal)
-        self._rate = _within(self._rate + self.loop.gains.arm.tick / (4.0 * T * T) * error)
-        turning = _within(self._rate + error / T)
-        return np.concatenate([velocity - np.cross(turning, arm), turning])
+        self._rate = _within(self._rate + tick / (4.0 * T * T) * error)
+        self._turning += tick / (SMOOTH * T) * (_within(self._rate + error / T) - self._turning)
+        turning = self._turning
+        added = np.cross(arm, turning)
+        share = _share_within(velocity, added, self.loop.law.press.speed)
+        return np.concatenate([velocity + share * added, share * turning])
+
+
+def _share_within(velocity: Array, added: Array, most: float) -> float:
+    """Largest share of what is added to a velocity with which its size stays within the most [m/s]."""
+    square, both = float(added @ added), float(velocity @ added)
+    room = max(most * most - float(velocity @ velocity), 0.0)
+    if 2.0 * both + square <= room:
+        return 1.0
+    return float(max(np.sqrt(both * both + square * room) - both, 0.0) / square)
 
 
 def _within(turning: Array) -> Array:

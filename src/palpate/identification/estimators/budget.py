@@ -23,7 +23,6 @@ from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
 from palpate.identification.uncertainty import Contribution
 from palpate.signals.samples import detrend, quadrature
-from palpate.signals.types import NORMAL
 
 HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
@@ -172,39 +171,6 @@ def _scaling(normal: Array, cov: Array) -> Array:
     return found
 
 
-def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
-    """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
-
-    The less precise of the two errs by the difference beside what both err by (Hausman, 1978).
-
-    Args:
-        theta: of the answer, shape (p,).
-        budget: of the answer.
-        other: parameters of the other, shape (p,).
-        others: its budget.
-    """
-    own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
-    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.abs(less - own))
-    return Spread(np.maximum(apart, 0.0) ** 2)
-
-
-def stiffness_left(stiffness: float, branch: float, tau: float, gap: float) -> float:
-    """Stiffness that a relaxing branch still has of the contact before [N/m].
-
-    A model's branch follows the probe into free motion. The surface does not: left alone it recovers with
-    tau (1 + K1/K), the creep time of a standard linear solid.
-
-    Args:
-        stiffness: K of the model [N/m].
-        branch: its K1 [N/m].
-        tau: of its relaxation [s].
-        gap: between two contacts [s].
-    """
-    if stiffness <= 0 or branch <= 0:
-        return 0.0
-    return branch * float(np.exp(-gap / (tau * (1 + branch / stiffness))))
-
-
 def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:
     """Possible effect of a force hidden along the parameters' columns, as large as the residual beyond the noise.
 
@@ -277,7 +243,8 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         found[TOUCH] = motion.filtered(motion.touched, 0, lag)
         found["free inertia"] = motion.filtered(motion.free, 2, lag)
     depth = (x - float(x[inside].mean())) / reach
-    return found | {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+    shapes = {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+    return found | shapes | {"hysteresis, slow": _summed(depth, segments)}
 
 
 def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
@@ -293,6 +260,17 @@ def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str,
     turned = [motion.filtered(motion.direction(way), 0, lag) for way in ways]
     sooner = {f"{FRICTION} {i}": short - long for i, (short, long) in enumerate(pairwise(turned))}
     return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
+
+
+def _summed(x: Array, segments: list[Segment]) -> Array:
+    """A force that goes on under a position that stays, shape (m,): the slow beginning of any relaxation or creep.
+
+    Of the surface, or of a load cell that creeps or whose amplifier lets its charge go.
+    """
+    found = np.zeros(len(x))
+    for s in segments:
+        found[s.first : s.last] = np.cumsum(x[s.first : s.last])
+    return found
 
 
 def _in_quadrature(x: Array, segments: list[Segment]) -> Array:

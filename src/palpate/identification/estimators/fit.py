@@ -1,9 +1,4 @@
-"""A model fitted to a log by least squares, and how far its parameters can be trusted.
-
-White noise n of the position stands in every column as a filtered derivative of it. It adds N S to the information
-Phi' Phi and nothing to Phi' f, which pulls the answer towards zero; taken out again, the answer is right on average
-(bias-compensated least squares: Soderstrom, Errors-in-Variables Methods in System Identification, 2018, ch. 7).
-"""
+"""A model fitted to a log by least squares, were it exactly true and its noise the force's alone."""
 
 from __future__ import annotations
 
@@ -17,108 +12,6 @@ from palpate.identification.least_squares import Noise, covariance, noise_of
 from palpate.identification.models import Model, Motion
 from palpate.identification.options import Lag, prior_of
 from palpate.identification.uncertainty import student
-
-_LEAST = 0.1
-"""Share of the information in any direction that must be left for the noise's to be taken out."""
-_NOTHING = 0.05
-"""Share of it under which a direction is as good as unknown."""
-_ENCODERS = 2
-_DOUBT = 0.3
-"""Relative error of each of the noise's measured covariances."""
-
-
-@dataclass(frozen=True)
-class Compensation:
-    """Effect of noise of the position on a least-squares answer.
-
-    Args:
-        step: to add to the answer, shape (p,).
-        less: information that was the noise's and has to be taken out, shape (p, p).
-        doubt: covariance of what the answer may still be off by, shape (p, p).
-    """
-
-    step: Array
-    less: Array
-    doubt: Array
-
-
-def compensation(jacobian: Array, noisy: Array, theta: Array, spread: Array, weight: Array) -> Compensation:
-    """Find it, in each direction of the parameters with its own share of noise in the information.
-
-    Args:
-        jacobian: derivatives of the prediction by the parameters, shape (n, p).
-        noisy: how the columns' noise is made of that of the position's derivatives, shape (p, k).
-        theta: how the force's noise is made of them, shape (k,).
-        spread: covariance of the derivatives' noise in one row, shape (k, k).
-        weight: of what is known of each parameter beforehand, shape (p,).
-    """
-    gram = jacobian.T @ jacobian + np.diag(weight)
-    scale = np.sqrt(np.diag(gram))
-    scale[scale == 0] = 1.0
-    rows = len(jacobian)
-    whole = rows * noisy @ spread @ noisy.T / np.outer(scale, scale)
-    scores = (
-        rows * noisy @ spread * theta / scale[:, None]
-    )  # what each derivative's noise pulls by, shape (p, k)
-    root = np.linalg.cholesky(gram / np.outer(scale, scale) + 1e-13 * np.eye(len(scale)))
-    inner = np.linalg.solve(root, np.linalg.solve(root, whole).T)
-    noise, ways = np.linalg.eigh((inner + inner.T) / 2)
-    share = np.minimum(1.0, (1 - _LEAST) / np.maximum(noise, 1e-300))
-    pulls = ways.T @ np.linalg.solve(root, scores)
-    # A direction that is nearly all noise is left where it is: how far to move it, nobody knows.
-    step = np.where(share == 1, pulls.sum(axis=1) / np.maximum(1 - noise, _LEAST), 0.0)
-    # How a pull c / (1 - n) moves with the noise's power, c and n both in proportion to it.
-    doubt = _DOUBT * np.linalg.norm(pulls, axis=1) / np.maximum(1 - noise, _NOTHING) ** 2
-    back = np.linalg.solve(root.T, ways) / scale[:, None]
-    taken = (root @ ways) * scale[:, None]
-    return Compensation(back @ step, (taken * (share * noise)) @ taken.T, (back * doubt**2) @ back.T)
-
-
-def resting(jacobian: Array, position: Array, count: float, stiffness: float) -> Array:
-    """Covariance of Phi' e, for the force e that a coarse position hides, shape (p, p).
-
-    Where the position rests it errs by the same part of a count all the time, which no number of samples averages out:
-    one error, even in a count (deviation count / sqrt(12)), for each place of a count's width. As the tip of an arm is
-    read through several encoders, two are counted that are as coarse as the one seen.
-
-    Args:
-        jacobian: Phi, shape (n, p).
-        position: shape (n,).
-        count: what it moves by when its encoder counts on.
-        stiffness: force per position.
-    """
-    if count == 0:
-        return np.zeros((jacobian.shape[1], jacobian.shape[1]))
-    _, place = np.unique(np.floor(position / count), return_inverse=True)
-    sums = np.zeros((int(place.max()) + 1, jacobian.shape[1]))
-    np.add.at(sums, place, jacobian)
-    found: Array = _ENCODERS * (stiffness * count) ** 2 / 12 * sums.T @ sums
-    return found
-
-
-def bias_corrected(
-    model: Model, motion: Motion, jacobian: Array, theta: Array, level: float, lag: Lag, std: Array | None
-) -> Compensation:
-    """Bias of the estimate by the position's noise; none of the lag if the log does not estimate it.
-
-    Where no sensor's way and no encoder's counts are known, the noise is only known to be no larger: nothing is taken
-    out then, and all that it may have done is open.
-    """
-    noisy, force = np.zeros((len(theta), 4)), np.zeros(4)  # of the position's derivatives 0 to 3
-    for name, d in model.derivatives.items():
-        place = model.linear.index(name)
-        noisy[place, d], force[d] = 1.0, theta[place]
-    noisy[-1, 1:] = -force[:3]
-    weight = np.zeros(len(theta)) if std is None else (level / std) ** 2
-    asked = lag.std > 0
-    free = np.arange(len(theta)) < len(theta) - (not asked)
-    spread = motion.chain.noise_spread(motion.noise)
-    part = compensation(jacobian[:, free], noisy[free], force, spread, weight[free])
-    if not (motion.matched or motion.noise.count):
-        part = Compensation(0 * part.step, 0 * part.less, np.outer(part.step, part.step))
-    if free.all():
-        return part
-    return Compensation(np.append(part.step, 0.0), np.pad(part.less, (0, 1)), np.pad(part.doubt, (0, 1)))
 
 
 @dataclass(frozen=True)
@@ -189,26 +82,12 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | Non
     theta = np.array([*point.theta, *(point.nonlinear[k.name] for k in model.nonlinear), point.lag])
     level = float(np.sqrt(point.rss / max(len(force) - len(point.theta), 1)))
     std = descent.known.std(names, level)
-    pulled, less, more = np.zeros((len(names), len(names))), None, None
-    if model.of_position:
-        by_noise = bias_corrected(model, motion, jacobian, theta, level, lag, std)
-        theta, pulled, less = theta + by_noise.step, by_noise.doubt, by_noise.less
-        stiffness = float(theta[names.index("K")]) if "K" in names else 0.0
-        more = resting(jacobian, motion.moved(0, float(theta[-1])), motion.noise.count, stiffness)
     prior = np.full(len(names), np.inf) if std is None else std
     prior[-1] = lag.std
-    cov, own = np.zeros_like(pulled), slice(None if lag.std > 0 else -1)
-    cov[own, own] = pulled[own, own] + covariance(
-        jacobian[:, own],
-        motion.rows,
-        noise,
-        prior[own],
-        None if less is None else less[own, own],
-        None if more is None else more[own, own],
-    )
-    residuals = point.residuals - jacobian @ (theta - [*point.theta, *point.nonlinear.values(), point.lag])
+    cov, own = np.zeros((len(names), len(names))), slice(None if lag.std > 0 else -1)
+    cov[own, own] = covariance(jacobian[:, own], motion.rows, noise, prior[own])
     spread = float(np.mean((force - force.mean()) ** 2))
-    return Fit(names, theta, cov, 1 - float(np.mean(residuals**2)) / spread if spread else 0.0, noise)
+    return Fit(names, theta, cov, 1 - point.rss / len(force) / spread if spread else 0.0, noise)
 
 
 def nonlinear_fit(model: Model, motion: Motion, force: Array, lag: Lag) -> dict[str, float]:

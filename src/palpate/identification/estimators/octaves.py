@@ -130,12 +130,12 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     for number, segment in enumerate(segments):
         own = columns[segment.first : segment.last]
         for octave in range(count):
-            length = segment.length if octave == 0 else longest >> (octave - 1)
-            if length > segment.length or (octave == 0 and 2 * length < longest) or length < SHORTEST:
+            length, numbers = _block(segment.length, octave, longest)
+            if not numbers:
                 continue
             starts = np.arange(0, segment.length - length + 1, max(length // 2, 1))
             group = (begins[number] + starts + length // 2) * GROUPS // max(int(begins[-1]), 1)
-            for g, part in _sums(own, starts, group, length, _WHOLE_LINES if octave == 0 else LINES):
+            for g, part in _sums(own, starts, group, length, numbers):
                 share = (OVERLAP if len(starts) > 1 else 1.0) / TIED
                 products[g, octave] += share * part[0]
                 lines[g, octave] += share * part[1]
@@ -146,6 +146,22 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     return (
         Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
     )
+
+
+def _block(own: int, octave: int, longest: int) -> tuple[int, tuple[float, ...]]:
+    """Rows of a segment's blocks in an octave, and their lines; no line where the octave has none of it.
+
+    A segment that is shorter than the octave's blocks is one itself, with those of its lines that lie in the octave: a
+    tap beside a long contact is seen at the frequencies that it has.
+    """
+    length = longest >> max(octave - 1, 0)
+    if 2 * own >= longest:
+        length, numbers = (own, _WHOLE_LINES) if octave == 0 else (length, LINES)
+        return length, numbers if length <= own else ()
+    if octave == 0 or length <= own:
+        return length, LINES if octave else ()
+    middle = PERIODS * own / length
+    return own, tuple(n for n in _WHOLE_LINES if 0.5 < (n / middle) ** 2 <= 2)
 
 
 def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: int) -> Array:

@@ -5,31 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.identification import in_series
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
     STILL,
-    Loading,
-    apart,
-    line,
     loadings_in,
-    of_speed,
     read_later,
     slope_between,
     slope_of,
 )
 from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.steady_press import Slopes, SteadyPress, few_points
-from palpate.identification.uncertainty import Contribution, Measurement
+from palpate.identification.uncertainty import Measurement
 from palpate.signals.samples import runs
 
 
@@ -166,9 +161,6 @@ def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, flo
 
 _LEVELS = (0.3, 0.5, 0.7, 0.9)
 
-_WIDE = 0.15
-"""Half of the share of the force about a level over which its slope is taken: the levels lie .2 apart."""
-
 
 def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
     """The press of a log; None without a loading."""
@@ -177,10 +169,10 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
         return None
     loading = max(loadings, key=lambda loading: len(loading.depth))
     later = read_later(problem, lag, segments, loadings)
-    tangent = [t for level in _LEVELS if (t := _tangent(loadings, later, level)) is not None]
+    slopes = (slope_between(loadings, later, level) for level in _LEVELS)
     back = unloading_of(problem, lag, segments)
     return Press(
-        tuple(t for t in tangent if t.half < abs(t.stiffness)),
+        tuple(Tangent(own.force, own.stiffness) for own in slopes if own and own.stiffness.known_to(1.0)),
         few_points(np.stack([loading.depth, loading.force])),
         few_points(back.curve),
         back.loss,
@@ -197,61 +189,14 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
         seen: the press by the filtered contact, if that shows one.
         origin: position of the surface [m].
     """
-    tangents = [Tangent(own.force, own.stiffness) for own in (*steady.others, steady.headline)]
+    known = [own for own in (*steady.others, steady.headline) if own.stiffness.known_to(1.0)]
+    tangents = [Tangent(own.force, own.stiffness) for own in known]
     surface = np.array([[origin], [0.0]])
     ordered = tuple(sorted(tangents, key=lambda own: own.force))
     curves = steady.loading - surface, steady.unloading - surface
     if seen is None:
         return Press(ordered, *curves)
     return replace(seen, tangent=ordered, loading=curves[0], unloading=curves[1])
-
-
-def _tangent(loadings: list[Loading], later: list[Loading], level: float) -> Tangent | None:
-    """Slope of the loadings about a share of the force; with it what it moves by if the force is later than assumed.
-
-    Args:
-        loadings: the loadings.
-        later: the same, the force later by a deviation of the lag's prior.
-        level: the share.
-    """
-    found, other = _tangent_of(loadings, level), _tangent_of(later, level)
-    if found is None or other is None:
-        return None
-    by_lag = Contribution(abs(other.stiffness - found.stiffness))
-    return replace(found, slope=found.slope.with_cause("lag", by_lag))
-
-
-def _tangent_of(loadings: list[Loading], level: float) -> Tangent | None:
-    slopes, variances, forces, by_speed, by_filter = [], [], [], [], []
-    for loading in loadings:
-        loss = of_speed(loading)
-        low, high = np.percentile(loading.force, [2, 98])
-        rows = _about(loading.force, low, high, level)
-        if len(rows) < FEWEST or np.ptp(loading.depth[rows]) <= 0:
-            continue
-        slope, variance, _ = line(loading.depth[rows], loading.force[rows])
-        at_rest, *_ = line(loading.depth[rows], loading.force[rows] - loss * loading.speed[rows])
-        slopes.append((slope + at_rest) / 2)
-        variances.append(variance)
-        by_speed.append((slope - at_rest) / 2)
-        forces.append(float(low + level * (high - low)))
-        if loading.read is not None:
-            depth, force = loading.read
-            by_filter.append(apart(depth, force, _about(force, low, high, level), slope, variance))
-    if not slopes:
-        return None
-    mean = random_effects(np.array(slopes), np.array(variances))
-    causes = {
-        "repetition": Contribution(mean.std, mean.freedom),
-        "speed": Contribution.within(abs(float(np.mean(by_speed)))),
-        "filter": Contribution.within(float(np.mean(by_filter)) if by_filter else 0.0),
-    }
-    return Tangent(float(np.mean(forces)), Measurement(mean.value, causes))
-
-
-def _about(force: Array, low: float, high: float, level: float) -> NDArray[np.intp]:
-    """Rows about a share of the force between two ends."""
-    return np.flatnonzero(np.abs((force - low) / (high - low or 1.0) - level) < _WIDE)
 
 
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
@@ -279,13 +224,11 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
     )
     if steady is not None:
         press = at_constant_speed(steady, press, problem.origin)
-    if options.series_stiffness is not None:
-        series = options.series_stiffness, options.series_std
-        spectrum = in_series.spectrum_without_series(spectrum, *series)
-        press = None if press is None else in_series.press_without_series(press, *series)
-        headline = None if headline is None else in_series.slopes_without_series(headline, *series)
-    if options.series_mass is not None:
-        spectrum = in_series.spectrum_without_swing(spectrum, *options.swing)
+    series = SeriesSpring.of(options)
+    if series is not None:
+        spectrum = series.spectrum(spectrum)
+        press = None if press is None else series.press(press)
+        headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
     return spectrum, press, working_point(whole, spectrum, options, unit, hidden)

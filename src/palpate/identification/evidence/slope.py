@@ -113,14 +113,6 @@ def _one_way(depth: Array, speed: Array, begin: int, top: int, reach: float) -> 
     return (first, last) if depth[last - 1] - depth[first] >= 0.5 * reach else (begin, top)
 
 
-def of_speed(loading: Loading) -> float:
-    """Dependence of the force on the speed over a whole loading, beside a spring that may curve [N s/m]."""
-    low, high = np.percentile(loading.force, [2, 98])
-    met = loading.force >= low + _MET * (high - low)
-    u = loading.depth - loading.depth[met].mean()
-    return _last_of(np.column_stack([np.ones(len(u)), u, u**2, loading.speed])[met], loading.force[met])
-
-
 def _last_of(columns: Array, force: Array) -> float:
     """Coefficient of the last column in a force; nothing of directions below a thousandth of the columns."""
     size = np.sqrt((columns**2).sum(axis=0))
@@ -131,6 +123,8 @@ def _last_of(columns: Array, force: Array) -> float:
 
 _UPPER = 0.4
 """Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
+_WIDE = 0.15
+"""Half of the share of the force about a level over which its slope is taken: the levels of a press lie .2 apart."""
 
 
 def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
@@ -144,79 +138,89 @@ def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
     return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
-def slope_between(loadings: list[Loading], later: list[Loading]) -> Slopes | None:
+def slope_between(loadings: list[Loading], later: list[Loading], level: float | None = None) -> Slopes | None:
     """The slope of some loadings; its interval reaches that of the same with the force later.
 
     Args:
         loadings: the loadings.
         later: the same with the force later, or the same list if the lag is exact.
+        level: as `slope_of` has it.
     """
-    found = slope_of(loadings)
-    other = slope_of(later) if found is not None and later is not loadings else None
+    found = slope_of(loadings, level)
+    other = slope_of(later, level) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
     by_lag = Contribution(abs(other.stiffness.value - found.stiffness.value))
     return replace(found, stiffness=found.stiffness.with_cause("lag", by_lag))
 
 
-def slope_of(loadings: list[Loading]) -> Slopes | None:
-    """Slope in the upper part of the force; None without a loading that rises.
+def slope_of(loadings: list[Loading], level: float | None = None) -> Slopes | None:
+    """Slope in the upper part of the force, or about a share of it; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
-    the interval reaches both. It has the scatter of each loading, the change of the slope over the range, what it
-    differs by from the slope of the channels as they were read, and the variance between loadings (a random effect,
-    Student's t).
+    the interval reaches both. It has the scatter of each loading, what it differs by from the slope of the channels as
+    they were read, and the variance between loadings (a random effect, Student's t); of the upper part, the change of
+    the slope over it.
+
+    Args:
+        loadings: the loadings.
+        level: share of the force; None for the upper part.
     """
-    slopes, variances, rises, changes, speeds, filters, levels = [], [], [], [], [], [], []
-    for loading in loadings:
-        rows = _upper(loading.force)
-        if len(rows) < FEWEST or np.ptp(loading.depth[rows]) <= 0:
-            continue
-        slope, variance, change = line(loading.depth[rows], loading.force[rows])
-        at_rest = _at_rest(loading.whole or loading)
-        slopes.append((slope + at_rest) / 2)
-        variances.append(variance)
-        changes.append(change)
-        speeds.append(abs(slope - at_rest) / 2)
-        filters.append(_by_filter(loading, slope, variance))
-        rises.append(float(loading.time[-1] - loading.time[0]))
-        levels.append((loading.force[rows].mean(), loading.depth[rows].mean()))
-    if not slopes:
+    every = [own for loading in loadings if (own := _slope_in(loading, level)) is not None]
+    if not every:
         return None
-    mean = random_effects(np.array(slopes), np.array(variances))
+    slopes, variances, changes, filters, speeds, forces, depths, rises = np.array(every).T
+    mean = random_effects(slopes, variances)
     bounds = zip(("curvature", "filter", "speed"), (changes, filters, speeds), strict=True)
-    causes = {cause: Contribution.within(float(np.mean(own))) for cause, own in bounds}
+    causes = {cause: Contribution.within(float(own.mean())) for cause, own in bounds}
+    if level is not None:
+        del causes["curvature"]
     causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
-    force, depth = (float(own) for own in np.mean(levels, axis=0))
-    own = Measurement(mean.value, causes)
-    return Slopes(force, depth, own, tuple(slopes), mean.next_half, float(np.mean(rises)))
+    at = float(forces.mean()), float(depths.mean())
+    return Slopes(
+        *at, Measurement(mean.value, causes), tuple(slopes.tolist()), mean.next_half, float(rises.mean())
+    )
 
 
-def _upper(force: Array) -> NDArray[np.intp]:
-    """Rows of a loading after the last that was below the share: a force may fall before it rises for good."""
+def _slope_in(loading: Loading, level: float | None) -> tuple[float, ...] | None:
+    """Of one loading: slope, its variance, its change; by how much filter and speed move it; force, depth, duration."""
+    rows = _rows(loading.force, level)
+    depth, force = loading.depth[rows], loading.force[rows]
+    if len(rows) < FEWEST or np.ptp(depth) <= 0:
+        return None
+    slope, variance, change = _line(depth, force)
+    if level is None:
+        at_rest, at = _at_rest(loading.whole or loading), float(force.mean())
+    else:
+        at_rest, *_ = _line(depth, force - _of_speed(loading) * loading.speed[rows])
+        low, high = np.percentile(loading.force, [2, 98])
+        at = float(low + level * (high - low))
+    by_filter = 0.0 if loading.read is None else _apart(loading.read, level, slope, variance)
+    rise = float(loading.time[-1] - loading.time[0])
+    value, by_speed = (slope + at_rest) / 2, abs(slope - at_rest) / 2
+    return value, variance, change, by_filter, by_speed, at, float(depth.mean()), rise
+
+
+def _rows(force: Array, level: float | None) -> NDArray[np.intp]:
+    """Rows about a share of the force; or all after the last below the upper part, as a force may fall once."""
     low, high = np.percentile(force, [2, 98])
-    below = np.flatnonzero(force <= low + _UPPER * (high - low))
+    share = (force - low) / (high - low or 1.0)
+    if level is not None:
+        return np.flatnonzero(np.abs(share - level) < _WIDE)
+    below = np.flatnonzero(share <= _UPPER)
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
 
-def _by_filter(loading: Loading, slope: float, variance: float) -> float:
-    """By how much a slope contradicts that of the same loading before any filter [N/m]: beyond their 95 % interval.
+def _apart(read: Array, level: float | None, slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of the channels as read [N/m], beyond their 95 % interval.
 
-    All of it, if the loading has too few readings for a slope of its own: its shape is then the filter's.
+    All of it, if there are too few readings for a slope of their own: the loading's shape is then the filter's.
     """
-    if loading.read is None:
-        return 0.0
-    depth, force = loading.read
-    if len(depth) < LINE:
-        return abs(slope)
-    return apart(depth, force, _upper(force), slope, variance)
-
-
-def apart(depth: Array, force: Array, rows: NDArray[np.intp], slope: float, variance: float) -> float:
-    """By how much a slope contradicts that of some readings [N/m]; all of it, if they are too few for one."""
+    depth, force = read
+    rows = _rows(force, level) if len(force) else np.empty(0, np.intp)
     if len(rows) < LINE or np.ptp(depth[rows]) <= 0:
         return abs(slope)
-    own, doubt, _ = line(depth[rows], force[rows])
+    own, doubt, _ = _line(depth[rows], force[rows])
     return max(abs(own - slope) - NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)
 
 
@@ -237,7 +241,7 @@ def unseen(problem: Problem) -> float:
     return apart / float(position.var()) * gap / rest if rest else 0.0
 
 
-def line(x: Array, f: Array) -> tuple[float, float, float]:
+def _line(x: Array, f: Array) -> tuple[float, float, float]:
     """Slope, its variance under coloured noise, and half of what the slope changes by over the range."""
     middle, reach = float(x.mean()), float(np.ptp(x))
     u = (x - middle) / reach
@@ -257,6 +261,14 @@ def _at_rest(loading: Loading) -> float:
     Of the whole loading: within one advance that dies out the speed is the depth over again, and only rests between
     advances tell the two apart.
     """
-    rows = _upper(loading.force)
+    rows = _rows(loading.force, None)
     columns = np.column_stack([np.ones(len(rows)), loading.speed[rows], loading.depth[rows]])
     return _last_of(columns, loading.force[rows])
+
+
+def _of_speed(loading: Loading) -> float:
+    """Dependence of the force on the speed over a whole loading, beside a spring that may curve [N s/m]."""
+    low, high = np.percentile(loading.force, [2, 98])
+    met = loading.force >= low + _MET * (high - low)
+    u = loading.depth - loading.depth[met].mean()
+    return _last_of(np.column_stack([np.ones(len(u)), u, u**2, loading.speed])[met], loading.force[met])

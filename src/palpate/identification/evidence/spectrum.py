@@ -28,7 +28,7 @@ from palpate.identification.estimators.octaves import (
     transform_of,
 )
 from palpate.identification.evidence.slope import slope_in, unseen
-from palpate.identification.in_series import slopes_without_series
+from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, WorkingPoint
@@ -228,8 +228,9 @@ def working_point(
     tolerance, bonded = options.tolerance, problem.contacts.bonded
     segments = segments_of(problem.motion.rows, problem.spans)
     press, octave = slope_in(problem, segments), _octave_point(spectrum, tolerance)
-    if press is not None and options.series_stiffness is not None:
-        press = slopes_without_series(press, options.series_stiffness, options.series_std)
+    series = SeriesSpring.of(options)
+    if press is not None and series is not None:
+        press = series.slopes(press)
     if press is not None and (
         octave is None
         or (
@@ -284,9 +285,11 @@ def point_of(found: Slopes, source: str, problem: Problem, options: Options, uni
     """
     value, again = found.stiffness.value, found.again
     interval = None if again is None else (value - again, value + again)
+    own, each = _judge(found.stiffness, options, unit), found.each if source == "press" else ()
+    apart = len(each) > 1 and float(np.ptp(each)) > 2 * options.tolerance * abs(value)
     return WorkingPoint(
-        _judge(found.stiffness, options, unit), found.force, found.depth, 0.25 / found.rise, source, interval,
-        not problem.contacts.bonded,
+        own, found.force, found.depth, 0.25 / found.rise, source, interval, not problem.contacts.bonded, each,
+        apart and own.verdict is not Verdict.IDENTIFIED,
     )  # fmt: skip
 
 

@@ -154,7 +154,7 @@ class SensorPath:
     dt: float
     instants: Array
     period: float
-    _kept: list[tuple[Array, float, Array]] = field(default_factory=list)
+    _kept: list[tuple[Array, NDArray[np.intp], float, Array]] = field(default_factory=list)
 
     @property
     def rate(self) -> float:
@@ -202,22 +202,25 @@ class SensorPath:
             lag: how much later than the signal the force stands in the log, the low-pass included [s].
             rows: shape (k,).
         """
-        base, stack = self._stack(signal, lag)
-        value, slope, curve = stack[derivative : derivative + 3, rows]
+        base, stack = self._stack(signal, lag, rows)
+        value, slope, curve = stack[derivative : derivative + 3]
         step = base - lag
         series: Array = value if step == 0 else value + step * slope + step * step / 2 * curve
         return series
 
-    def _stack(self, signal: Array, lag: float) -> tuple[float, Array]:
-        """Signal and derivatives at all instants for a lag near by, and that lag."""
-        near = [k for k in self._kept if k[0] is signal and abs(k[1] - lag) <= _NEAR * self.dt]
+    def _stack(self, signal: Array, lag: float, rows: NDArray[np.intp]) -> tuple[float, Array]:
+        """Signal and derivatives at some samples for a lag near by, and that lag."""
+        near = [
+            (base, stack)
+            for own, at, base, stack in self._kept
+            if own is signal and at is rows and abs(base - lag) <= _NEAR * self.dt
+        ]
         if near:
-            _, base, stack = min(near, key=lambda k: abs(k[1] - lag))
-            return base, stack
+            return min(near, key=lambda kept: abs(kept[0] - lag))
         late = (lag - self.low_pass.lag) / self.dt
-        stack = read(signal, self.instants - late, self._taps)
+        stack = read(signal, self.instants[rows] - late, self._taps)
         stack /= self.dt ** np.arange(DERIVATIVES)[:, None]
-        self._kept = [*self._kept[-_MOST_KEPT:], (signal, lag, stack)]
+        self._kept = [*self._kept[-_MOST_KEPT:], (signal, rows, lag, stack)]
         return lag, stack
 
     def noise_spread(self, noise: PositionNoise) -> Array:

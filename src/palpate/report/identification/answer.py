@@ -17,6 +17,7 @@ from palpate.report.identification import details, figure
 from palpate.report.identification import page as pages
 from palpate.report.identification.words import (
     ADVICE,
+    APART,
     CALLED,
     MARKS,
     STYLES,
@@ -26,10 +27,11 @@ from palpate.report.identification.words import (
     as_json,
     behind_the_arm,
     by_the_model,
-    first_reason,
+    each_press,
     full_number,
     interval,
     limited_by,
+    no_contact_in,
     place_of,
     press_facts,
     sentence,
@@ -58,7 +60,6 @@ _REMEDIES = {
     "lag": "--lag SECONDS",
     "noise": "press deeper or more often",
     "other forces": "begin and end in free motion",
-    "touch": "approach more slowly",
     "octaves": "excite a wider band",
     "blocks": "press longer, at one depth",
     "repetition": "press more often",
@@ -75,7 +76,6 @@ _CAUSES = {
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
     "octaves": "frequencies differ",
-    "touch": "the touch",
     "unseen way": "the first reading",
 }
 """Causes whose names in a budget need an explanation."""
@@ -153,12 +153,14 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
         yield from (Text(printable(fact)) for fact in found.slide.facts)
         yield from _rows(found)
     elif not found.contacts or point is None:
-        reason = (
-            f": {first_reason(found)}" if not found.contacts else ": no stretch in contact is long enough"
-        )
-        title = UNTOUCHED.replace("this log", name) if not found.contacts else f"{name} shows no stiffness"
-        yield Text(printable(f"{title}{reason}."), style="bold")
-        yield Text(ADVICE[Code.NO_CONTACT] if not found.contacts else "Log longer, or press deeper.")
+        title = f"{name} shows no stiffness: no stretch in contact is long enough"
+        if not found.contacts:
+            title = no_contact_in(name, found)
+        yield Text(printable(f"{title}."), style="bold")
+        if found.contacts:
+            yield Text("Log longer, or press deeper.")
+        elif title.startswith(UNTOUCHED.partition("in")[0]):
+            yield Text(ADVICE[Code.NO_CONTACT])
     else:
         modulus = found.parameters.get("E")
         if modulus is not None:
@@ -187,6 +189,12 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     if behind_the_arm(found):
         what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
         detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
+    elif point.differs:
+        text = f"{each_press(point)}   stiffness of each press   "
+        line = Text(text, style="bold").append("? they differ", style=STYLES[own.verdict])
+        yield line.append(printable(f"        {name}") if name else "")
+        yield Text(printable(f"   {at}: {APART}."))
+        return
     elif by_the_model(found):
         own, what = found.parameters["K"], f"stiffness by the model {found.model}"
         mark = _IN_DOUBT if unit_warnings(found) else _mark(own)

@@ -10,7 +10,7 @@ from typing import Any
 
 from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.files import RECORD
-from palpate.identification.causes import Cause, Code, cause_of
+from palpate.identification.causes import BRIEF, Cause, Code, cause_of
 from palpate.identification.result import Identification, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.numbers import plain, quantity, quantity_between, with_half
@@ -72,7 +72,7 @@ def sentence(found: Identification) -> str:
     if found.slide is not None:
         return found.slide.sentence
     if not found.contacts:
-        return f"{UNTOUCHED}: {first_reason(found)}."
+        return f"{no_contact_in('this log', found)}."
     point = found.working_point
     if point is None:
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
@@ -88,6 +88,8 @@ def sentence(found: Identification) -> str:
         return (
             by_model if own.value is None else f"{by_model} Without a model it is {full_number(own)} {where}."
         )
+    if point.differs:
+        return f"{len(point.each)} presses differ, {each_press(point)} {where}; {APART}."
     if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
         lost = _loss(found, point)
         start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
@@ -100,6 +102,16 @@ def sentence(found: Identification) -> str:
         )
     only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
     return f"The stiffness is {full_number(own)}{only} {where}; {_mostly(limit)}."
+
+
+APART = "to identify one alone, give --start and --end"
+_LISTED = 5
+
+
+def each_press(point: WorkingPoint) -> str:
+    """The stiffness of each press, in the order of time; of many, of the first."""
+    more = ", ..." if len(point.each) > _LISTED else ""
+    return ", ".join(quantity(own, point.stiffness.unit) for own in point.each[:_LISTED]) + more
 
 
 def _known_by_model(found: Identification) -> str | None:
@@ -288,10 +300,13 @@ def by_the_model(found: Identification) -> bool:
     return point.stiffness.verdict is not Verdict.IDENTIFIED
 
 
-def first_reason(found: Identification) -> str:
-    """Why nothing was touched."""
+def no_contact_in(log: str, found: Identification) -> str:
+    """Why a log has no contact."""
     own = next((warn.text for warn in found.warnings if warn.code is Code.NO_CONTACT), "")
-    return own.partition(":")[0].rstrip(".") or "the force does not leave its rest"
+    if own.startswith(BRIEF):
+        return f"The contacts in {log} are too short: {own.replace(':', ';')}"
+    reason = own.partition(":")[0].rstrip(".") or "the force does not leave its rest"
+    return f"{UNTOUCHED.replace('this log', log)}: {reason}"
 
 
 _CHUNK = 1 << 20

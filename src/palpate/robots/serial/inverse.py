@@ -69,6 +69,13 @@ def rotation_vector(R: Array) -> Array:
     return np.pi * axis / np.linalg.norm(axis)
 
 
+def rotation_by(vector: Array) -> Array:
+    """The rotation about an axis times an angle [rad], shape (3, 3)."""
+    angle = float(np.linalg.norm(vector))
+    k = np.cross(np.eye(3), vector / angle if angle > 0.0 else vector)
+    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
+
+
 def _starts(arm: SerialArm, near: Array) -> list[Array]:
     """Where the arm is, and points all over its range."""
     generator = np.random.default_rng(0)

@@ -14,13 +14,11 @@ from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Interval, Mark, Series, figure_of, panels
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import plain, quantity
-from palpate.report.page import Table
 from palpate_excitation import Design, Remedy
-from palpate_excitation.report.table import describe_remedy, describe_wave, half_widths_reached, percent
+from palpate_excitation.report.table import describe_wave, percent, remedies_table, sentence, surfaces_table
 
 _SHOWN = 4.0
 """Of the desired force that is drawn of a multisine, after it has settled [s]; more would be a block of ink."""
-_UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
 def write_figure(found: Design, path: Path) -> Path:
@@ -109,13 +107,13 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
     told = describe_wave(found)
     answer = PageAnswer(
         title="A desired force",
-        sentence=_sentence(found),
+        sentence=sentence(found),
         about=f"{told[0].upper()}{told[1:]}.",
         alerts=[]
         if found.feasible
         else [{"tone": "fail", "title": "The precision cannot be had.", "text": ""}],
         cards={"": _cards(found)},
-        tables=[*([_remedies(found, helps)] if helps else []), surfaces(found)],
+        tables=[*([remedies_table(found, helps)] if helps else []), surfaces_table(found)],
         figures=[
             {
                 "panels": panels(charts_of(found)),
@@ -124,22 +122,6 @@ def page(found: Design, helps: Sequence[Remedy], command: str) -> str:
         ],
     )
     return answer_page(answer, room="excite", command=command)
-
-
-def _remedies(found: Design, helps: Sequence[Remedy]) -> Table:
-    rows = [(one.change, describe_remedy(one, found)) for one in helps]
-    return Table("What would change that", ("", ""), rows)
-
-
-def _sentence(found: Design) -> str:
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
-    lasts = quantity(found.seconds, "s", digits=3)
-    if found.feasible:
-        says = f"In {lasts} this force identifies every surface of the range to the requested precision"
-        return f"{says}: {asked} (95 %)."
-    worst = half_widths_reached(found.made.worst(found.seconds), found)
-    limits = "No force within these limits identifies every surface to the requested precision"
-    return f"{limits}, {asked} (95 %): at best {worst}."
 
 
 def _cards(found: Design) -> list[Card]:
@@ -165,27 +147,3 @@ def _cards(found: Design) -> list[Card]:
         Card("Duration", quantity(found.seconds, "s", digits=3), why=f"of pressing{settles}"),
         Card("Force", f"{plain(low, 3)} to {plain(high, 3)}", "N", why=asked_of),
     ]
-
-
-def surfaces(found: Design) -> Table:
-    """Each surface: its parameters, their predicted uncertainty, marked where it is not enough, and its force."""
-    names, rows = found.predictions[0].names, []
-    for one in found.predictions:
-        widths = one.half_widths(found.seconds)
-        values = dict(zip(("K", "B", "M"), one.surface.values, strict=True))
-        bad = {name for name in names if widths[name] > found.problem.precision.get(name, np.inf)}
-        rows.append(
-            (
-                *(plain(values[name], 4) for name in names),
-                *(f"± {percent(widths[name])}{' ✕' if name in bad else ''}" for name in names),
-                f"{one.force[0]:.1f} to {one.force[1]:.1f}",
-                f"{1e6 * one.travel:.0f}",
-            )
-        )
-    head = (
-        *(f"{n} [{_UNITS[n]}]" for n in names),
-        *(f"{n}, 95 %" for n in names),
-        "force [N]",
-        "travel [µm]",
-    )
-    return Table("Each surface: the corners of the range and its middle", head, rows)

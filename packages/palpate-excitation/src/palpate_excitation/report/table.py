@@ -1,31 +1,64 @@
-"""A designed excitation on the terminal: the wave, its predicted uncertainty on each surface, the remedies."""
+"""A designed excitation in a sentence, as tables, as JSON, and its force and experiment as files."""
 
-from math import ceil, isfinite
+from collections.abc import Sequence
+from math import ceil, inf, isfinite
 from pathlib import Path
 from typing import Any
-
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from palpate.errors import InputError
 from palpate.files import FORCE, MADE, write_text
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.references import Multisine
-from palpate.report.terminal import bare_table
+from palpate.report.numbers import plain, quantity
+from palpate.report.page import CommandAnswer, Table
 from palpate_excitation import Design, HybridLoop, Remedy
-from palpate_excitation.force_loops import SurfaceResponse
 from palpate_excitation.problem import LONGEST
 
 
-def show(found: Design, remedies: list[Remedy], console: Console) -> None:
-    """Print a design, and for an infeasible one what would help."""
-    console.print(describe_wave(found))
-    console.print(_table(found))
-    console.print(_verdict(found))
-    for remedy in remedies:
-        console.print(f"  {remedy.change}: {describe_remedy(remedy, found)}")
+def answer_of(found: Design, helps: Sequence[Remedy]) -> CommandAnswer:
+    """The answer of `palpate excite`: the wave, every surface, whether it is enough, and what else would be."""
+    tables = [remedies_table(found, helps)] if helps else []
+    said = f"\n{sentence(found)}"
+    return CommandAnswer(summary(found, helps), describe_wave(found), said, [surfaces_table(found), *tables])
+
+
+def sentence(found: Design) -> str:
+    """Whether every surface is identified to the requested precision, and how long it takes."""
+    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
+    reached = half_widths_reached(found.made.worst(found.seconds), found)
+    if found.feasible:
+        lasts = quantity(found.seconds, "s", digits=3)
+        says = f"In {lasts} this force identifies every surface of the range to the requested precision"
+        return f"{says}: {asked} (95 %); predicted {reached}."
+    limits = "No force within these limits identifies every surface to the requested precision"
+    return f"{limits}, {asked} (95 %): at best {reached}."
+
+
+def surfaces_table(found: Design) -> Table:
+    """Each surface: its parameters, their predicted uncertainty, marked where it is not enough, and its force."""
+    names, rows = found.predictions[0].names, []
+    for one in found.predictions:
+        widths = one.half_widths(found.seconds)
+        values = dict(zip(("K", "B", "M"), one.surface.values, strict=True))
+        bad = {name for name in names if widths[name] > found.problem.precision.get(name, inf)}
+        rows.append(
+            (
+                *(plain(values[name], 4) for name in names),
+                *(f"± {percent(widths[name])}{' ✕' if name in bad else ''}" for name in names),
+                f"{one.force[0]:.1f} to {one.force[1]:.1f}",
+                f"{1e6 * one.travel:.0f}",
+            )
+        )
+    units = {"K": "N/m", "B": "N s/m", "M": "kg"}
+    head = (*(f"{n} [{units[n]}]" for n in names), *(f"{n}, 95 %" for n in names), "force [N]", "travel [µm]")
+    return Table("Each surface: the corners of the range and its middle", head, rows)
+
+
+def remedies_table(found: Design, helps: Sequence[Remedy]) -> Table:
+    """Changes of the problem, and whether each is enough."""
+    rows = [(one.change, describe_remedy(one, found)) for one in helps]
+    return Table("Remedies", ("", ""), rows)
 
 
 def describe_remedy(remedy: Remedy, found: Design) -> str:
@@ -51,44 +84,9 @@ def describe_wave(found: Design) -> str:
     return f"{kind}: {force.min():.1f} to {force.max():.1f} N about {budget.mean:g} N, {lasts}"
 
 
-def _table(found: Design) -> Table:
-    names = found.predictions[0].names
-    units = {"K": "N/m", "B": "N s/m", "M": "kg"}
-    known, widths = [f"{name} [{units[name]}]" for name in names], [f"± {name}" for name in names]
-    table = bare_table(*known, *widths, "force [N]", "travel")
-    for prediction in found.predictions:
-        table.add_row(*_row(prediction, found))
-    return table
-
-
-def _row(prediction: SurfaceResponse, found: Design) -> list[str | Text]:
-    widths = prediction.half_widths(found.seconds)
-    values = dict(zip(("K", "B", "M"), prediction.surface.values, strict=True))
-    low, high = prediction.force
-    return [
-        *(f"{values[name]:.4g}" for name in prediction.names),
-        *(_width(widths[name], found.problem.precision.get(name)) for name in prediction.names),
-        f"{low:.1f}-{high:.1f}",
-        f"{1e6 * prediction.travel:.0f} um",
-    ]
-
-
-def _width(width: float, asked: float | None) -> Text:
-    style = "" if asked is None else "green" if width <= asked else "red"
-    return Text(percent(width), style=style)
-
-
 def percent(share: float) -> str:
     """A share in per cent."""
     return f"{100 * share:.2g} %" if share < 1 else "> 100 %"
-
-
-def _verdict(found: Design) -> str:
-    worst = found.made.worst(found.seconds)
-    asked = ", ".join(f"{name} {percent(share)}" for name, share in found.problem.precision.items())
-    if found.feasible:
-        return f"every surface to within {asked} (95 %): yes, predicted {half_widths_reached(worst, found)}"
-    return f"every surface to within {asked} (95 %): no; the best is {half_widths_reached(worst, found)}. Remedies:"
 
 
 def half_widths_reached(widths: dict[str, float], found: Design) -> str:
@@ -171,7 +169,7 @@ def experiment(found: Design) -> str:
     return "\n".join(lines) + "\n"
 
 
-def summary(found: Design, remedies: list[Remedy]) -> dict[str, Any]:
+def summary(found: Design, remedies: Sequence[Remedy]) -> dict[str, Any]:
     """All of a design as plain JSON values."""
     problem = found.problem
     return {

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report.look.assets import ABSENT, CHARTS, MAPS, OUTCOMES, TABLES, data, scripts, text_of
-from palpate.report.page import Table, render, with_captions
+from palpate.report.page import render, with_captions
 from palpate_studies.report.lines import COLORS, Cloud, LinePanel, MetricLine, Points, Scale, decades, middles
 from palpate_studies.report.maps import Heat
 
@@ -130,56 +129,22 @@ def heat(one: Heat) -> dict[str, Any]:
 _OF: dict[type, Any] = {Cloud: cloud, LinePanel: curve, Heat: heat}
 
 
-@dataclass(frozen=True)
-class StudyPage:
-    """Content of the page.
+def study_page(figures: Mapping[str, Any], pictures: Mapping[Path, str], **values: Any) -> str:
+    """The page as HTML.
 
     Args:
-        title, about: of the study.
-        sentence, answers: the answer, and further ones.
-        notes: warnings.
-        tables: in the order to be read.
-        below: tables that stand below the figures.
-        charts: plain values from which the page draws; empty where there is nothing to draw.
-        figures: the same as PNG files with a caption each, for a browser that runs no scripts.
-        command: that makes it.
-        study: its file.
-        origin: lines of its foot, name and text.
+        figures: plain values from which the page draws; empty where there is nothing to draw.
+        pictures: the same as PNG files with a caption each, for a browser that runs no scripts.
+        values: what `study.html` shows.
     """
-
-    title: str
-    about: str
-    sentence: str
-    answers: Sequence[str]
-    notes: Sequence[str]
-    tables: Sequence[Table]
-    below: Sequence[Table]
-    charts: Mapping[str, Any]
-    figures: Mapping[Path, str]
-    command: str
-    study: str
-    origin: Sequence[tuple[str, str]]
-
-
-def study_page(of: StudyPage) -> str:
-    """The page as HTML."""
-    worth = bool(of.charts.get("figures") or of.charts.get("comparisons"))
-    own = text_of("study.js", "palpate_studies.report")
+    worth = bool(figures.get("figures") or figures.get("comparisons"))
+    codes = (*scripts(*TABLES, *CHARTS), text_of("study.js", "palpate_studies.report"))
     return render(
         "study.html",
         "palpate_studies.report",
         room="study",
-        title=of.title,
-        about=of.about,
-        sentence=of.sentence,
-        answers=of.answers,
-        notes=of.notes,
-        tables=of.tables,
-        below=of.below,
-        charts=data(of.charts) if worth else "",
-        figures=with_captions(of.figures),
-        command=of.command,
-        study=of.study,
-        origin=of.origin,
-        scripts=(*scripts(*TABLES, *CHARTS), own) if worth else scripts(*TABLES),
+        charts=data(figures) if worth else "",
+        figures=with_captions(pictures),
+        scripts=codes if worth else scripts(*TABLES),
+        **values,
     )
