@@ -40,6 +40,7 @@ class CommandAnswer:
         sentence: the answer, with what stands between it and the title.
         tables: below it.
         notes: warnings.
+        doubts: warnings that stand before the answer.
         show: prints it on a terminal instead of title, sentence, tables and notes, where its lines have a layout of
             their own.
     """
@@ -49,6 +50,7 @@ class CommandAnswer:
     sentence: str = ""
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
+    doubts: Sequence[str] = ()
     show: Callable[[Console], None] | None = None
 
 
