@@ -22,7 +22,7 @@ from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
-from palpate_slide.world import COLUMNS, SETTLED, figures_of
+from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of
 
 _UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
     ("x", "y", "z"), "m"
@@ -44,7 +44,7 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
     said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
     summary: dict[str, Any] = {
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,
-        "end": "no contact" if not found.touched else "held" if found.obeys else "not held",
+        "end": "held" if found.obeys else "not held" if found.touched else "no slide" if c["normal_force"].any() else "no contact",
         "truth": {"friction": ground.friction, "stiffness": _seen(gains, ground)},
         "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
         "tool": None,
@@ -82,7 +82,9 @@ def sentence(summary: dict[str, Any]) -> str:
     """The answer in a line."""
     f = summary["force"]
     if f is None:
-        return "The surface was never touched, or the force was not held before a slide."
+        if summary["end"] == "no slide":
+            return f"The force was not held within {LONGEST:g} s: the tip did not slide."
+        return f"The surface was never touched in {LONGEST:g} s: does --normal point into it?"
     n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
     angle = (summary["tool"] or {}).get("angle95_deg")
     within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
