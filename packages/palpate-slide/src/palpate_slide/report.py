@@ -41,10 +41,11 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
     """
     c, found = dict(zip(COLUMNS, rows.T, strict=True)), figures_of(rows, gains, ground)
     on = c["sliding"] > 0.0
+    never = "no slide" if c["normal_force"].any() else "no contact"
     said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
     summary: dict[str, Any] = {
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,
-        "end": "held" if found.obeys else "not held" if found.touched else "no slide" if c["normal_force"].any() else "no contact",
+        "end": "held" if found.obeys else "not held" if found.touched else never,
         "truth": {"friction": ground.friction, "stiffness": _seen(gains, ground)},
         "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
         "tool": None,
@@ -90,7 +91,7 @@ def sentence(summary: dict[str, Any]) -> str:
     within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
     return (
         f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
-        f"{1e3 * summary['path_m']:.3g} mm; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; friction {mu} "
+        f"{1e3 * summary['path_m']:.3g} mm; normal known to {plain(n['cone95_deg'], 2)}\N{DEGREE SIGN}; friction {mu} "
         f"\N{PLUS-MINUS SIGN} {half}{within}."
     )
 
@@ -150,7 +151,7 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     return [
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
-        Card("Normal", f"± {n['cone95_deg']:.2g}", "\N{DEGREE SIGN}", why=off),
+        Card("Normal", f"± {plain(n['cone95_deg'], 2)}", "\N{DEGREE SIGN}", why=off),
         *(
             [
                 Card(

@@ -58,6 +58,6 @@ def check_directions(ways: Array, gains: Gains, into: ArrayLike) -> None:
     angle, cone = np.degrees([np.arccos(min(nearest, 1.0)), CHI2_95 * numbers_of(gains).slope])
     if angle <= cone:
         raise InputError(
-            f"--normal is {angle:.2g} degrees off a direction of the path and may be wrong by {cone:.2g} (--tilt): the tip"
-            " would not slide; give the direction into the surface, across the path"
+            f"--normal is {angle:.2g} degrees off a direction of the path and may be wrong by {cone:.2g} (--tilt): the"
+            " tip would not slide; give the direction into the surface, across the path"
         )
