@@ -6,9 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "identification"))
-
 from foreign.bound import columns_of, half_widths
 from foreign.logs import CELLS, Cell, make_log
 from foreign.motions import tracked

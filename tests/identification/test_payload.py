@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -62,7 +59,6 @@ def test_one_frequency_in_contact_leaves_stiffness_and_mass_to_the_noise_of_the_
 @pytest.mark.long
 def test_a_damping_below_zero_refuses_all_that_is_seen_in_time():
     """A relaxing surface under a tool compensated with the wrong sign: its branch was called known, 19 % off."""
-    sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "identification"))
     from foreign.logs import Cell, make_log
     from foreign.scoring import record_of
 

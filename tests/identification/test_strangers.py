@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from foreign.cases import outcome, wrong_payload
 from scipy.signal import butter, sosfilt
 
 import palpate
 from palpate.identification import Verdict
 from palpate.records import Record
 from palpate.report.identification.words import sentence
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "identification"))
-
-from foreign.cases import outcome, wrong_payload
 
 UNITS = {"time": "s", "position": "m", "force": "N"}
 K, B = 4000.0, 5.0

@@ -18,7 +18,7 @@ LAG = "lag"
 USUAL_LAG = 0.005
 USUAL_LAG_STD = 0.0075
 """Mean and deviation of the lag of a force sensor that nobody has calibrated [s]. Filters and transports of the
-sensors and arms in `benchmarks/identification/foreign` take 0 to 20 ms; the prior's 95 % reach from -10 to 20 ms."""
+sensors and arms in `tests/oracles/foreign` take 0 to 20 ms; the prior's 95 % reach from -10 to 20 ms."""
 
 
 @dataclass(frozen=True)

@@ -150,9 +150,11 @@ class IndenterOptions:
 
     def check(self) -> None:
         """Check the options before any work is done."""
+        if self.poisson is None and self.indenter is None:
+            return
         from palpate.identification.indenter import check_poisson
 
-        if self.poisson is not None and self.indenter is None:
+        if self.indenter is None:
             raise InputError("--poisson needs a known shape of the indenter; add --indenter")
         check_poisson(self.ratio)
         self.shape()

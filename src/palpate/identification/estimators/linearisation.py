@@ -16,6 +16,7 @@ from palpate.identification.estimators.averaging import (
     mean_budget,
     members,
     of_octaves,
+    of_supposition,
     position_lines,
     seen,
     sensor_lines,
@@ -177,6 +178,9 @@ class Linearisation:
         solution = averaged(likely)
         budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
         budget["octaves"] = of_octaves(solution, *question)
+        if "M" in self.names and "M" not in self.prior:
+            place = self.names.index("M")
+            budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}

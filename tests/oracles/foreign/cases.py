@@ -1,8 +1,8 @@
 """Kinds of logs on which identification has been confidently wrong, one by one, each with its truth.
 
-    python benchmarks/identification/foreign/cases.py
-    python benchmarks/identification/foreign/cases.py 1 7b --data FOLDER
-    python benchmarks/identification/foreign/cases.py --markdown
+    python tests/oracles/foreign/cases.py
+    python tests/oracles/foreign/cases.py 1 7b --data FOLDER
+    python tests/oracles/foreign/cases.py --markdown
 
 Each trial prints what is answered and OK or WRONG. WRONG is an identified number whose interval misses the truth, a
 lag beyond its own bound, a crash, or what the case says besides. With --data the cases

@@ -1,8 +1,8 @@
 """Judge `palpate.identify` by logs of a simulator that shares nothing with the project's bench.
 
-    python benchmarks/identification/foreign/judge.py --trials 3
-    python benchmarks/identification/foreign/judge.py --cells '^mass/(drift|jitter)' --trials 20 --json scores.json
-    python benchmarks/identification/foreign/judge.py --show 7/mass/drift --save-log drift.csv
+    python tests/oracles/foreign/judge.py --trials 3
+    python tests/oracles/foreign/judge.py --cells '^mass/(drift|jitter)' --trials 20 --json scores.json
+    python tests/oracles/foreign/judge.py --show 7/mass/drift --save-log drift.csv
 
 A cell is a surface, a nuisance and a motion (any: drawn). "id hold wrong": how many parameters were called identified,
 the share of their 95 % intervals that hold the truth, how many are confidently wrong (more than 25 % off, or more than
@@ -64,7 +64,7 @@ def main() -> None:
     if asked.trials < 1:
         parser.error(f"--trials must be 1 or more, got {asked.trials}")
     scores = judged(cells, range(asked.seed, asked.seed + asked.trials), asked.workers)
-    command = f"benchmarks/identification/foreign/judge.py --trials {asked.trials} --seed {asked.seed}"
+    command = f"tests/oracles/foreign/judge.py --trials {asked.trials} --seed {asked.seed}"
     command += f" --cells '{asked.cells}'" if asked.cells else ""
     command += " --worlds" if asked.worlds else ""
     every = tables(scores)
