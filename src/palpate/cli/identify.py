@@ -13,8 +13,7 @@ from cyclopts import Group, Parameter
 from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
-from palpate.cli.options.common import WRITTEN, PictureOptions
-from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.common import WRITTEN, CellOptions, PictureOptions
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
 from palpate.cli.options.values import FLAG
 from palpate.errors import InputError, PalpateError

@@ -342,7 +342,7 @@ class Source:
 
 def as_json(found: Identification, source: Source) -> dict[str, Any]:
     """The object that `palpate identify --json` prints for one log."""
-    from palpate import __version__
+    from importlib.metadata import version
 
     own = found.to_json()
     return {
@@ -350,7 +350,7 @@ def as_json(found: Identification, source: Source) -> dict[str, Any]:
         **own,
         "options": {**source.options, **own["options"]},
         "sha256": source.sha256,
-        "version": __version__,
+        "version": version("palpate"),
     }
 
 
