@@ -69,7 +69,7 @@ def test_the_dependence_on_a_temperature_is_pooled(presses, capsys):
         == 0
     )
     printed = capsys.readouterr().out
-    assert "N/m per temperature_C" in printed
+    assert "N/m per temperature_C" in " ".join(printed.split())
     assert "temperature_C 20.17" in " ".join(printed.split())
 
 

@@ -257,3 +257,34 @@ def test_the_limits_are_options(tmp_path, capsys):
     assert set(json.loads(capsys.readouterr().out)) == {
         "command", "options", "files", "version", "entries", "troubles", "identify",
     }  # fmt: skip
+
+
+def proposed(tmp_path, names, *columns):
+    path = saved(
+        tmp_path,
+        "\n".join([names, *(",".join(f"{v:.6f}" for v in row) for row in zip(*columns, strict=True))]),
+    )
+    return list_log(path).proposal
+
+
+def test_a_velocity_a_copy_and_another_device_are_no_position(tmp_path):
+    """The force of a damper follows the velocity best, and a command goes where the probe goes."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 8, 0.01)
+    x = 5 * np.sin(2 * np.pi * t) + 0.01 * rng.standard_normal(len(t))
+    f = 40 * np.sign(np.cos(2 * np.pi * t)) + 2 * x
+    found = proposed(tmp_path, "t,dist,x_F.0,x_F.1,forc", t, x, x, np.gradient(x, t), f)
+    assert (found.options["position"], found.options["force"]) == ("dist:mm", "forc:N")
+    pressed_in = np.maximum(x, 0)
+    found = proposed(
+        tmp_path, "t,AI0_mm,AI1_mN,AO0_mm", t, x, pressed_in + 0.2 * rng.standard_normal(len(t)), x + 1
+    )
+    assert found.options["position"] == "AI0_mm:mm"
+
+
+def test_rare_taps_are_a_force_that_follows(tmp_path):
+    """In free motion, nine rows of ten, its ranks are those of noise."""
+    t = np.arange(0, 9, 0.002)
+    x = -5 + 6 * np.exp(-(((t % 1.5 - 0.7) / 0.08) ** 2))
+    f = 8 * np.maximum(x, 0) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    assert proposed(tmp_path, "time_s,z_mm,fz_N", t, x, f).options["force"] == "fz_N:N"

@@ -6,8 +6,8 @@ from html import unescape
 
 import numpy as np
 import pytest
-from rich.console import Console
 
+from palpate.cli._terminal import show_answer
 from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Traces, WorkingPoint
@@ -16,7 +16,7 @@ from palpate.report.identification.words import Source
 from palpate.report.many.page import draw_logs as draw
 from palpate.report.many.page import page_of_logs as page
 from palpate.report.many.page import write_figure
-from palpate.report.many.table import LogRow, failures, json_of, sentence, show
+from palpate.report.many.table import LogRow, answer_of, failures, json_of, sentence
 from report.test_identification_page import Reader
 
 NONE = np.empty(0)
@@ -111,12 +111,10 @@ def test_both_files_are_whole_and_ours(rows, pooled, tmp_path):
     check_place(tmp_path / "a.html", "--report")
 
 
-@pytest.mark.parametrize("width", [80, 160])
-def test_the_terminal_shows_each_log_and_the_mean(rows, pooled, width):
-    console = Console(width=width, force_terminal=False)
-    with console.capture() as capture:
-        show(rows, pooled, console)
-    text = capture.get()
+def test_the_terminal_shows_each_log_and_the_mean(rows, pooled, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    show_answer(answer_of(rows, pooled))
+    text = capsys.readouterr().out
     assert " ".join(text.split()).startswith(sentence(rows, pooled))
     assert "5000 ± 40" in text
     assert "there is no file <b>" in text

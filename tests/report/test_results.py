@@ -69,7 +69,7 @@ def test_an_identification_is_readable(found):
 def test_many_logs_are_readable(pooled):
     text = str(pooled)
     assert text.startswith("Over 2 of 3 logs the stiffness is ")
-    assert re.search(r"^left.csv +\d", text, re.MULTILINE)
+    assert re.search(r"^ *left.csv +\d", text, re.MULTILINE)
     assert "broken.csv" in text
     assert repr(pooled).startswith("<Pooled: 3 logs; working point 5232 ± ")
     assert "1 of 3 logs could not be identified" in pooled._repr_html_()

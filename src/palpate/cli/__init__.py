@@ -28,7 +28,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     from palpate.cli._program import COMMANDS, COMPANIONS, EXPANDED, TYPED, program
     from palpate.cli._streams import run_guarded
     from palpate.cli._terminal import print_lines
-    from palpate.cli.options.kept import expand
     from palpate.files.limits import check_address_space
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
@@ -38,6 +37,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         app = program(*words[:1])
         check_address_space()
         if any(word.startswith(("--options", "--preset")) for word in words):
+            from palpate.cli.options.kept import expand
+
             words = expand(words, app)
         if words[1:] == ["-h"] and words[0] in {*COMMANDS, *COMPANIONS}:
             print_lines(*short_help(app, words[0]))

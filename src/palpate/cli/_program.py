@@ -78,9 +78,9 @@ def command() -> str:
 
 
 def _version() -> str:
-    from palpate import __version__
+    from importlib.metadata import version
 
-    return str(__version__)
+    return version("palpate")
 
 
 def _describe(place: str) -> str:
@@ -182,10 +182,10 @@ def print_answer(found: Mapping[str, Any]) -> None:
     That is the `command`, palpate's `version`, the given `options`, and the input `files` with their SHA-256. Keys of
     these names in the result are kept; docs/json.md has the keys of each command.
     """
-    from palpate import __version__
+    from importlib.metadata import version
 
     options = given_options()
-    head = {"command": command(), "version": __version__, "options": _plain(options)}
+    head = {"command": command(), "version": version("palpate"), "options": _plain(options)}
     print_json({**head, **({} if "files" in found else {"files": _files(options)}), **found})
 
 

@@ -115,6 +115,8 @@ def show_answer(answer: CommandAnswer) -> Console:
     if answer.show is not None:
         answer.show(screen)
         return screen
+    for doubt in answer.doubts:
+        screen.print(doubt, style=STYLE, soft_wrap=True)
     head(screen, answer.title, answer.sentence)
     for table in answer.tables:
         show_table(screen, table)
@@ -128,9 +130,9 @@ def place(console: Console, what: str, where: object) -> None:
     console.print(f"{what} {where}", soft_wrap=True)
 
 
-def places(paths: Iterable[Path]) -> list[str]:
-    """Paths of written files, each with its kind by its ending."""
-    return [f"{KINDS.get(path.suffix.lower(), 'figure')}: {path}" for path in paths]
+def kind_of(path: Path) -> str:
+    """The kind of a written file, by its ending."""
+    return KINDS.get(path.suffix.lower(), "figure")
 
 
 COMPILING = "compiling the loop: some ten seconds, once after installation"

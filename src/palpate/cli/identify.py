@@ -12,9 +12,8 @@ from cyclopts import Group, Parameter
 
 from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
-from palpate.cli._terminal import bar, console, places, say
-from palpate.cli.options.common import WRITTEN, PictureOptions
-from palpate.cli.options.kept import CellOptions
+from palpate.cli._terminal import bar, console, kind_of, say
+from palpate.cli.options.common import WRITTEN, CellOptions, PictureOptions
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
 from palpate.cli.options.values import FLAG
 from palpate.errors import InputError, PalpateError
@@ -156,7 +155,8 @@ def many(
     if rows:
         from palpate.report.many.table import answer_of
 
-        print_result(answer_of(rows, pooled, places(_write(rows, pooled, files, dpi))), json=json)
+        written = [(f"{kind_of(path)}:", path) for path in _write(rows, pooled, files, dpi)]
+        print_result(answer_of(rows, pooled), json=json, files=written)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
@@ -367,7 +367,7 @@ def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
     from palpate.report.identification.answer import answer_of
 
     more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
-    written = places(path for path in (figure, page, table) if path is not None)
+    written = [f"{kind_of(path)}: {path}" for path in (figure, page, table) if path is not None]
     answer = answer_of(found, origin, written, more, verbose=output.verbose, budget=output.budget)
     print_result(answer, json=output.json)
     return 0 if has_number(found) else 1

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 from palpate.cli._program import print_result
-from palpate.cli.options.common import WRITTEN, FileOptions, ReportOption
-from palpate.cli.options.kept import CellOptions
+from palpate.cli.options.common import WRITTEN, CellOptions, FileOptions, ReportOption
 from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, si
 from palpate.errors import InputError

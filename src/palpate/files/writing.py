@@ -117,9 +117,9 @@ def _encodable(value: Any) -> Any:
 
 def with_author(value: Mapping[str, Any]) -> dict[str, Any]:
     """An object that is to be written as JSON, saying first who wrote it."""
-    from palpate import __version__
+    from importlib.metadata import version
 
-    return {WRITTEN: f"{SIGNATURE} {__version__}", **value}
+    return {WRITTEN: f"{SIGNATURE} {version('palpate')}", **value}
 
 
 RECORD = "record.parquet"

@@ -23,6 +23,9 @@ _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
 
+_RATE = 0.9
+"""Correlation with the rate of a position, above which a column is its velocity: of a sine's own position it is 0."""
+
 
 @dataclass(frozen=True)
 class ColumnStatistics:
@@ -148,6 +151,15 @@ def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
     slope, offset = np.polyfit(a[there], b[there], 1)
     apart = np.abs(b[there] - slope * a[there] - offset)
     return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
+
+
+def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
+    """Whether a column is the velocity of a position rather than one itself."""
+    a, b = column.readings, position.readings
+    if len(a) != len(b) or not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return False
+    rate = np.gradient(b)
+    return bool(np.ptp(rate) > 0 and np.ptp(a) > 0 and np.corrcoef(a, rate)[0, 1] > _RATE)
 
 
 def roughness(column: ColumnStatistics) -> float:

@@ -14,6 +14,7 @@ from palpate.logs.columns import (
     ColumnStatistics,
     explained_power,
     is_one_reading,
+    is_rate,
     rank_correlation,
     roughness,
 )
@@ -100,6 +101,7 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return Proposal(None, (_JOINTS_ONLY,))
     others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
+    others = [own for i, own in enumerate(others) if not any(_same(own, other) for other in others[:i])]
     space = _in_space(table, others, guesses)
     if space:
         return Proposal({**options, **timing, **space}, tuple(guesses))
@@ -109,6 +111,17 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     position, force = pair
     place, load = (_with_unit(table, *column, guesses) for column in ((position, "length"), (force, "force")))
     return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
+
+
+def _same(own: ColumnStatistics, other: ColumnStatistics) -> bool:
+    """Whether a column repeats another's numbers."""
+    return np.array_equal(own.values, other.values, equal_nan=True)
+
+
+def _stem(column: ColumnStatistics) -> str:
+    """The letters that a column's name begins with, which the channels of one device share: AI of AI0 and AI1."""
+    found = re.match(r"[^\W\d_]+", column.name)
+    return found[0] if found else ""
 
 
 def _member(name: str) -> str:
@@ -177,7 +190,9 @@ def _timing(
     if clock is None and table.rate is not None:
         return {}, None
     if clock is None:
-        guesses.append(f"the log does not state its rate: --rate {_RATE} is only an example")
+        named = [name for name in table.names if re.search(NAMES["time"], name, re.IGNORECASE)]
+        none = f"{named[0]!r} is no time that is read, and " if named else ""
+        guesses.append(f"{none}the log does not state its rate: --rate {_RATE} is only an example")
         return {"rate": f"{_RATE}"}, None
     if not clock.named_time:
         guesses.append(f"{clock.name!r} is used as the time: it has even steps")
@@ -206,6 +221,7 @@ def _pair(
         [column for column in moving if column not in forces[:1]],
         lambda column: column.score("position", "length"),
     )
+    places = [own for own in places if not any(own is not p and is_rate(own, p) for p in places)]
     pairs = [(a, b) for a in places or moving for b in forces or columns if a is not b]
     by_name = bool(places and forces)
     if not (places or forces):
@@ -218,7 +234,7 @@ def _pair(
     pairs = [pair for pair in follow if not is_one_reading(*pair)]
     if not pairs:
         return None
-    position, force = max(pairs, key=lambda pair: rank_correlation(*pair))
+    position, force = max(pairs, key=lambda pair: (_stem(pair[0]) == _stem(pair[1]), rank_correlation(*pair)))
     left = dict.fromkeys(column.name for pair in pairs for column in pair if column not in (position, force))
     if by_name and left:
         more = ", ".join([*left][:8])

@@ -93,11 +93,11 @@ class Signals:
         Raises:
             InputError: the log cannot be read, or something would have to be guessed.
         """
-        from palpate.logs.listing import list_log
-
         bag = kind_of(path).is_bag
         if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
             return self, {}
+        from palpate.logs.listing import list_log
+
         proposal = list_log(path, self.delimiter, self.limits).proposal
         guesses = [guess for guess in proposal.guesses if not (known_frame and "--wrench-frame" in guess)]
         if bag and (proposal.options is None or guesses):

@@ -40,6 +40,7 @@ class CommandAnswer:
         sentence: the answer, with what stands between it and the title.
         tables: below it.
         notes: warnings.
+        doubts: warnings that stand before the answer.
         show: prints it on a terminal instead of title, sentence, tables and notes, where its lines have a layout of
             their own.
     """
@@ -49,6 +50,7 @@ class CommandAnswer:
     sentence: str = ""
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
+    doubts: Sequence[str] = ()
     show: Callable[[Console], None] | None = None
 
 
@@ -71,9 +73,10 @@ def render(template: str, *packages: str, **values: Any) -> str:
             `seconds` it took, what the page is of (`room`), the date it was `made` (now, if none is given), further
             lines of its foot (`origin`, pairs of name and text), and `scripts`, which alone may run.
     """
+    from importlib.metadata import version
+
     from jinja2 import ChoiceLoader, Environment, PackageLoader
 
-    from palpate import __version__
     from palpate.report.look.assets import TABLES, policy, scripts, styles
 
     codes = tuple(values.pop("scripts", scripts(*TABLES)))
@@ -83,7 +86,9 @@ def render(template: str, *packages: str, **values: Any) -> str:
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["advice"] = advice
-    return environment.get_template(template).render(version=__version__, signature=SIGNATURE, **values)
+    return environment.get_template(template).render(
+        version=version("palpate"), signature=SIGNATURE, **values
+    )
 
 
 def advice(text: str) -> Markup:

@@ -21,7 +21,7 @@ from palpate.files import check_place, fresh_folder, with_author, write_json, wr
 from palpate.units import split_spec
 
 if TYPE_CHECKING:
-    from palpate.cli.options.press import AskOptions, PhantomOptions, SimulatedOptions
+    from palpate.cli.press import AskOptions, PhantomOptions, SimulatedOptions
     from palpate_maps.presses import Presses
     from palpate_maps.result import MapRequest, MapResult
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.cli import _streams
 from palpate.cli.options.common import PluginOptions
-from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions
+from palpate.cli.press import AskOptions, LimitOptions, WireOptions
 from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop

@@ -2,7 +2,7 @@
 
 # No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -282,3 +282,34 @@ def read_found(path: Path) -> dict[str, Any]:
 def _whole(text: str) -> int | float:
     """A whole number; one of more than 64 bits is what it is to most programs, a double, and infinite at last."""
     return int(text) if len(text) <= _DIGITS else float(text)
+
+
+@Parameter(name="*", group=Group("Options from a file", sort_key=7))
+@dataclass(frozen=True, kw_only=True)
+class CellOptions:
+    """Options saved in a file."""
+
+    options: Path | None = None
+    'A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.'
+    preset: Annotated[Preset | None, QUIET] = None
+    """ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides
+    it."""
+    save_options: Path | None = None
+    "Where to write the options of log, frame, arm and model, for --options."
+
+    def check(self) -> None:
+        """Check the path before any work is done."""
+        if self.save_options is not None:
+            check_place(self.save_options, "--save-options", ending=".toml")
+
+    def save(self, parts: Iterable[Any], command: str = "") -> None:
+        """Write the options, if requested.
+
+        Args:
+            parts: dataclasses of options.
+            command: whose options they are; options of a single call are not saved.
+        """
+        if self.save_options is not None:
+            from palpate.cli.options.kept import save_options
+
+            save_options(self.save_options, parts, command)

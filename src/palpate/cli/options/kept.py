@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Any, get_type_hints
 
-from cyclopts import Group, Parameter
-
-from palpate.cli.options.common import QUIET, Preset
 from palpate.errors import InputError, unknown
-from palpate.files import check_place, read_text, read_toml, write_text
+from palpate.files import read_text, read_toml, write_text
 from palpate.files.writing import MADE
 from palpate.logs.presets import preset
 
@@ -34,35 +31,10 @@ _KNOWN_BY = ("identify", "press")
 """Commands that take one file together: what one of them knows is no mistake to the other."""
 
 
-@Parameter(name="*", group=Group("Options from a file", sort_key=7))
-@dataclass(frozen=True, kw_only=True)
-class CellOptions:
-    """Options saved in a file."""
-
-    options: Path | None = None
-    'A TOML file of options of palpate identify, as wrench-frame = "tool"; the command line overrides it.'
-    preset: Annotated[Preset | None, QUIET] = None
-    """ur-rtde, franka or ros2: the columns or topics, units and frames of these drivers; --options overrides
-    it."""
-    save_options: Path | None = None
-    "Where to write the options of log, frame, arm and model, for --options."
-
-    def check(self) -> None:
-        """Check the path before any work is done."""
-        if self.save_options is not None:
-            check_place(self.save_options, "--save-options", ending=".toml")
-
-    def save(self, parts: Iterable[Any], command: str = "") -> None:
-        """Write the options, if requested.
-
-        Args:
-            parts: dataclasses of options.
-            command: whose options they are; options of a single call are not saved.
-        """
-        if self.save_options is not None:
-            once = _NEVER | _TYPED.get(command, set())
-            kept = {name: value for name, value in options_given(parts).items() if name not in once}
-            write_text(self.save_options, _toml(kept))
+def save_options(path: Path, parts: Iterable[Any], command: str) -> None:
+    """Write options that are of a cell, rather than of a single call of the command."""
+    once = _NEVER | _TYPED.get(command, set())
+    write_text(path, _toml({name: value for name, value in options_given(parts).items() if name not in once}))
 
 
 def options_given(parts: Iterable[Any]) -> dict[str, Any]:

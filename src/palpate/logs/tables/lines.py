@@ -23,7 +23,7 @@ _LINES, _LETTERS, _FEWEST = 1000, 500_000, 4
 """Of these, no more lines are parted, or no more letters, but always a header, its units and two rows."""
 COMMENTS = ("#", "%", "//", ";")
 """Beginnings of a comment line; a semicolon only if it is not the delimiter."""
-NO_READING = {"", "nan", "na", "n/a", "null", "none", "missing", "-", "--"}
+NO_READING = {"", "nan", "na", "n/a", "null", "none", "missing", "-", "--", "#n/a"}
 """Words that stand for no reading, in lower case."""
 
 _NO_TEXT = {

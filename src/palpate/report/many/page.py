@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -11,23 +12,27 @@ from typing import TYPE_CHECKING, Any
 from palpate.errors import InputError
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
+from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.identification.figure import LETTERS, WIDE
-from palpate.report.identification.page import HALF, NARROW, TONES, picture, split
-from palpate.report.identification.words import CALLED, Source, facts_of, full_number, interval
-from palpate.report.look.assets import TABLES, scripts
+from palpate.report.identification.page import HALF, TONES, split
+from palpate.report.identification.words import CALLED, Source, full_number, interval
 from palpate.report.many.table import (
     POINT,
     LogRow,
     failures,
+    faults,
     json_of,
+    notes,
     place,
     quantities,
     quantities_with_number,
     sentence,
-    show,
+    tables,
+    together,
 )
-from palpate.report.numbers import as_html, console_text, quantity
-from palpate.report.page import render
+from palpate.report.numbers import NONE, as_html, as_text, quantity
+from palpate.report.page import data_address
+from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -137,62 +142,41 @@ def page_of_logs(rows: Sequence[LogRow], pooled: Pooled) -> str:
     """The page as HTML."""
     source = rows[0].source if rows else Source("")
     point = pooled.working_point
-    return render(
-        "many.html",
-        "palpate.report.many",
-        "palpate.report.identification",
-        room="identify",
-        made=source.made,
-        scripts=scripts(*TABLES),
+    options = ", ".join(f"{name} {value}" for name, value in source.options.items())
+    digests = [(row.source.title, row.source.sha256 or NONE) for row in rows]
+    logs = replace(tables(rows, pooled, places=True)[0], title="Log by log")
+    answer = PageAnswer(
         title=f"{len(rows)} logs",
         sentence=sentence(rows, pooled),
-        failures=failures(rows),
-        place=place(rows, point) if point else "",
-        cards=[_card(name, own, pooled) for name, own in quantities(pooled).items()],
-        names=list(quantities(pooled)),
-        rows=[_log_row(row, pooled) for row in rows],
-        figures=[_figure(rows, pooled, name) for name in quantities_with_number(rows, pooled)],
-        json=json.dumps(json_of(rows, pooled), indent=1),
-        source=Source("", source.options, None, source.command, source.made),
-        file="",
-        options=", ".join(f"{printable(str(k))} {printable(str(v))}" for k, v in source.options.items()),
-        command=printable(source.command),
+        about=". ".join(filter(None, [f"Working points {place(rows, point)}" if point else "", options])),
+        alerts=warning_alerts(faults(rows)),
+        cards={"Together": [_card(name, own, pooled) for name, own in quantities(pooled).items()]},
+        tables=[logs],
+        pairs=[_figure(rows, pooled, name) for name in quantities_with_number(rows, pooled)],
+        folds=[("sha256 of each log", "", digests)],
+        source=("The same as JSON", json.dumps(json_of(rows, pooled), indent=1)),
     )
+    made = {"made": source.made} if source.made else {}
+    return answer_page(answer, room="identify", command=source.command, **made)
 
 
-def _card(name: str, own: PooledParameter, pooled: Pooled) -> dict[str, Any]:
-    p = own.parameter
-    return {
-        "name": "Stiffness" if name == POINT else name,
-        "called": "at the working point" if name == POINT else CALLED.get(name, ""),
-        "colour": _COLOURED.get(name, "other"),
-        "number": split(p),
-        "tone": TONES[p.verdict],
-        "verdict": str(p.verdict),
-        "interval": interval(p.ci95, p.unit),
-        "next": interval(own.prediction95, p.unit),
-        "between": "" if own.between is None else quantity(own.between, p.unit, digits=2),
-        "slopes": {covariate: interval(p.ci95, p.unit) for covariate, p in own.slopes.items()},
-        "count": f"{len(own.logs)} of {pooled.count}",
-        "reason": printable(p.reason),
-    }
-
-
-def _log_row(row: LogRow, pooled: Pooled) -> dict[str, Any]:
-    found = row.found
-    point = found.working_point if found else None
-    values = [row.value_of(name) for name in quantities(pooled)]
-    return {
-        "name": row.source.title,
-        "sha256": row.source.sha256,
-        "error": printable(row.error),
-        "cells": [full_number(p) if p is not None and p.value is not None else "–" for p in values],
-        "place": ", ".join(facts_of(found, point)) if found and point else "–",
-        "model": found.model if found else "–",
-        "tone": TONES[point.stiffness.verdict] if point else "fail" if found is None else "warn",
-        "verdict": str(point.stiffness.verdict) if point else "no contact" if found else "not identified",
-        "codes": ", ".join(found.codes) if found else "",
-    }
+def _card(name: str, own: PooledParameter, pooled: Pooled) -> Card:
+    p, number = own.parameter, split(own.parameter)
+    after = interval(own.prediction95, p.unit)
+    between = "" if own.between is None else f"between logs {quantity(own.between, p.unit, digits=2)}"
+    slopes = [f"by {covariate}: {interval(p.ci95, p.unit)}" for covariate, p in own.slopes.items()]
+    facts = [
+        f"next press {after}" if after else "",
+        between,
+        f"{len(own.logs)} of {pooled.count} logs",
+        *slopes,
+    ]
+    return Card(
+        "Stiffness at the working point" if name == POINT else ", ".join(filter(None, [name, CALLED.get(name)])),
+        number["text"] if p.value is not None else "", number["unit"], number["half"],
+        printable("; ".join(filter(None, [*facts, p.reason]))),
+        TONES[p.verdict], str(p.verdict), _COLOURED.get(name, ""),
+    )  # fmt: skip
 
 
 def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]:
@@ -202,28 +186,27 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
         f"Pooled: {full_number(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
     )
-    return picture(title, words, [one(rows, pooled, name, width) for width in (HALF, NARROW)])
-
-
-HEAD = ("pooled", "mean ± 95 %", "next press", "logs", "verdict", "why")
+    drawn = svg(one(rows, pooled, name, HALF))
+    return {"source": data_address(drawn, "image/svg+xml"), "caption": f"{title}. {words}"}
 
 
 def line(pooled: Pooled) -> str:
     """Each quantity with its verdict."""
-    values = [f"{name} {_value(own)} {own.parameter.verdict}" for name, own in quantities(pooled).items()]
+    values = [f"{row[0]} {row[1]} {row[-1]}" for row in together(pooled).rows]
     return printable(f"{pooled.count} logs; {', '.join(values) or 'nothing in common'}")
 
 
 def text(pooled: Pooled) -> str:
     """The output of `palpate identify` for many logs."""
-    return console_text(lambda console: show(_rows(pooled), pooled, console))
+    rows = _rows(pooled)
+    shown = [as_text(table.title, [table.head, *table.rows]) for table in tables(rows, pooled)]
+    return printable("\n".join([sentence(rows, pooled), *shown, *notes(rows, pooled)]))
 
 
 def html(pooled: Pooled) -> str:
     """The sentence, and a row a quantity."""
-    rows = [HEAD, *(_row(name, own, pooled) for name, own in quantities(pooled).items())]
-    failed = failures(_rows(pooled))
-    return as_html(sentence(_rows(pooled), pooled), rows, [failed] if failed else [])
+    rows, table = _rows(pooled), together(pooled)
+    return as_html(sentence(rows, pooled), [table.head, *table.rows], notes(rows, pooled))
 
 
 def draw(pooled: Pooled) -> Figure:
@@ -252,13 +235,3 @@ def _rows(pooled: Pooled) -> list[LogRow]:
         LogRow(Source(name, options, command=made), found, "" if found else "it was not identified")
         for name, found in zip(names, pooled.logs, strict=True)
     ]
-
-
-def _row(name: str, own: PooledParameter, pooled: Pooled) -> tuple[str, ...]:
-    p = own.parameter
-    after = interval(own.prediction95, p.unit) or "-"
-    return name, _value(own), after, f"{len(own.logs)} of {pooled.count}", str(p.verdict), p.reason
-
-
-def _value(own: PooledParameter) -> str:
-    return "-" if own.parameter.value is None else full_number(own.parameter)

@@ -1,4 +1,4 @@
-"""Many logs as a table: on a terminal, in a paper."""
+"""Many logs in a sentence and as tables: of every output, and of a paper."""
 
 from __future__ import annotations
 
@@ -10,18 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-
 from palpate.files import write_text
 from palpate.identification.causes import cause_of
 from palpate.identification.pooling import Pooled, PooledParameter, PooledPoint
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification.details import note
 from palpate.report.identification.words import (
-    STYLES,
     Source,
     as_json,
     facts_of,
@@ -33,8 +27,7 @@ from palpate.report.identification.words import (
     units_of,
 )
 from palpate.report.numbers import NONE, plain, quantity, si_prefix, with_half
-from palpate.report.page import CommandAnswer
-from palpate.report.terminal import bare_table
+from palpate.report.page import CommandAnswer, Table
 
 POINT = "working point"
 
@@ -141,100 +134,75 @@ def failures(rows: Sequence[LogRow]) -> str:
     return f"{count} of {len(rows)} logs could not be identified; their rows say why."
 
 
-_WIDE = 110
-"""Letters of a terminal that has room for force, depth and frequency of each log."""
-
-
-def answer_of(rows: Sequence[LogRow], pooled: Pooled, places: Sequence[str]) -> CommandAnswer:
-    """The answer of `palpate identify` for many logs, with the places of the written files."""
-
-    def display(console: Console) -> None:
-        for row in rows:
-            for text in unit_warnings(row.found) if row.found else ():
-                console.print(f"! {row.source.title}: {text}", style="yellow", soft_wrap=True)
-        show(rows, pooled, console)
-        for place in places:
-            console.print(place, soft_wrap=True)
-
+def answer_of(rows: Sequence[LogRow], pooled: Pooled) -> CommandAnswer:
+    """The answer of `palpate identify` for many logs."""
     files = [{"file": row.source.file, "sha256": row.source.sha256} for row in rows]
-    return CommandAnswer({"files": files, **json_of(rows, pooled)}, show=display)
+    json = {"files": files, **json_of(rows, pooled)}
+    doubts = [
+        f"! {row.source.title}: {text}" for row in rows if row.found for text in unit_warnings(row.found)
+    ]
+    return CommandAnswer(json, sentence(rows, pooled), "", tables(rows, pooled), notes(rows, pooled), doubts)
 
 
-def show(rows: Sequence[LogRow], pooled: Pooled, console: Console) -> None:
-    """Print what many logs give.
-
-    Args:
-        rows: one of each log.
-        pooled: what they say together.
-        console: where to.
-    """
-    console.print(Text(sentence(rows, pooled), style="bold"))
-    if failures(rows):
-        console.print(Text(failures(rows), style="yellow"))
-    console.print(_logs(rows, pooled, console.width >= _WIDE))
-    console.print(_together(pooled))
-    if slopes(pooled):
-        console.print(_dependences(pooled))
-    own = {name: whole.parameter for name, whole in quantities(pooled).items()}
-    for name, p in (own | slopes(pooled)).items():
-        if p.verdict is not Verdict.IDENTIFIED:
-            note(console, f"{name}:", p.reason, STYLES[p.verdict])
-    for row in rows:
-        if row.found is None:
-            note(console, f"{row.source.title}:", row.error, "red")
+def notes(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
+    """Why a pooled quantity is not identified, and why a log is not."""
+    own = {name: whole.parameter for name, whole in quantities(pooled).items()} | slopes(pooled)
+    reasons = [f"{name}: {p.reason}" for name, p in own.items() if p.verdict is not Verdict.IDENTIFIED]
+    return [*reasons, *faults(rows)]
 
 
-def _logs(rows: Sequence[LogRow], pooled: Pooled, wide: bool) -> Table:
-    """A row a log; where it belongs to only if there is room."""
+def faults(rows: Sequence[LogRow]) -> list[str]:
+    """How many logs could not be identified, and why each could not."""
+    errors = [f"{row.source.title}: {row.error}" for row in rows if row.found is None]
+    return [failures(rows), *errors] if errors else []
+
+
+def tables(rows: Sequence[LogRow], pooled: Pooled, *, places: bool = False) -> list[Table]:
+    """Each log, what is pooled, and how that depends on covariates; with places and models of the logs if asked."""
+    parts = [_logs(rows, pooled, places), together(pooled)]
+    return [*parts, *([_dependences(pooled)] if slopes(pooled) else [])]
+
+
+def _logs(rows: Sequence[LogRow], pooled: Pooled, places: bool) -> Table:
+    """A row a log: its quantities, and the verdict of its working point."""
     names = quantities_with_number(rows, pooled)
-    own = quantities(pooled)
-    units = [f"{'stiffness' if name == POINT else name}{_unit(own[name].parameter)}" for name in names]
-    table = bare_table("log", *units, *(["at"] if wide else []), "verdict", wrapped=("log", "at", "verdict"))
+    units = [f"{_title(name)}{_unit(quantities(pooled)[name].parameter)}" for name in names]
+    lines = []
     for row in rows:
-        point = row.found.working_point if row.found else None
-        cells = [_cell(row.value_of(name)) for name in names]
-        if wide:
-            cells.append(", ".join(facts_of(row.found, point)) if row.found and point else NONE)
-        table.add_row(row.source.title, *cells, _verdict(row))
-    return table
+        *place, verdict = _place_and_verdict(row)
+        numbers = (_cell(row.value_of(name)) for name in names)
+        lines.append((row.source.title, *numbers, *(place if places else ()), verdict))
+    return Table("", ("log", *units, *(("at", "model") if places else ()), "verdict"), lines)
 
 
-def _verdict(row: LogRow) -> Text:
-    """Of its working point."""
+def _place_and_verdict(row: LogRow) -> tuple[str, str, str]:
+    """Where a log's working point is, its model, and the point's verdict."""
     if row.found is None:
-        return Text("not identified", style="red")
+        return NONE, NONE, "not identified"
     point = row.found.working_point
     if point is None:
-        return Text("no contact" if not row.found.contacts else "no working point", style="yellow")
-    return Text(str(point.stiffness.verdict), style=STYLES[point.stiffness.verdict])
+        return NONE, row.found.model, "no working point" if row.found.contacts else "no contact"
+    return ", ".join(facts_of(row.found, point)), row.found.model, str(point.stiffness.verdict)
 
 
-def _together(pooled: Pooled) -> Table:
-    heads = ("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict")
-    table = bare_table(*heads, wrapped=("pooled", "verdict"))
+def together(pooled: Pooled) -> Table:
+    """Each quantity over all logs: mean, next press, deviation between logs, and the verdict."""
+    rows = []
     for name, own in quantities(pooled).items():
         p = own.parameter
-        table.add_row(
-            name,
-            NONE if p.value is None else full_number(p),
-            interval(own.prediction95, p.unit) or NONE,
-            _between(own),
-            f"{len(own.logs)} of {pooled.count}",
-            Text(str(p.verdict), style=STYLES[p.verdict]),
-        )
-    return table
+        mean = NONE if p.value is None else full_number(p)
+        between = NONE if own.between is None else quantity(own.between, p.unit, digits=2)
+        count = f"{len(own.logs)} of {pooled.count}"
+        rows.append((name, mean, interval(own.prediction95, p.unit) or NONE, between, count, str(p.verdict)))
+    return Table("", ("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict"), rows)
 
 
 def _dependences(pooled: Pooled) -> Table:
-    table = bare_table("dependence", "± 95 %", "verdict", wrapped=("dependence",))
-    for name, p in slopes(pooled).items():
-        number = interval(p.ci95, p.unit) if p.value is None else full_number(p)
-        table.add_row(name, number or NONE, Text(str(p.verdict), style=STYLES[p.verdict]))
-    return table
-
-
-def _between(own: PooledParameter) -> str:
-    return NONE if own.between is None else quantity(own.between, own.parameter.unit, digits=2)
+    rows = [
+        (name, (interval(p.ci95, p.unit) if p.value is None else full_number(p)) or NONE, str(p.verdict))
+        for name, p in slopes(pooled).items()
+    ]
+    return Table("", ("dependence", "± 95 %", "verdict"), rows)
 
 
 def _cell(p: Parameter | None) -> str:

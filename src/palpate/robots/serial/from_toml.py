@@ -21,7 +21,8 @@ from palpate.errors import InputError, unknown
 from palpate.files import read_bytes, read_table, read_text
 from palpate.robots.serial.chain import KinematicChain, spread_of
 from palpate.robots.serial.from_mujoco import arm_of
-from palpate.robots.serial.loading import check_inertia, load_mjcf
+from palpate.robots.serial.linear import check_inertia
+from palpate.robots.serial.loading import load_mjcf
 from palpate.robots.serial.serial_arm import SerialArm
 
 Triple = tuple[float, float, float]
