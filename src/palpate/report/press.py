@@ -16,7 +16,7 @@ from palpate.press.pressing import Asked
 from palpate.press.setting import Place
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page
+from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
@@ -182,8 +182,7 @@ def _alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
     """Failures first, then the notes of the press."""
     shown = alerts(summary)
     told = {alert_line(alert) for alert in shown}
-    others = [note for note in notes(summary) if note not in told]
-    return [*shown, *({"tone": "warn", "title": "", "text": note, "advice": ""} for note in others)]
+    return [*shown, *warning_alerts(note for note in notes(summary) if note not in told)]
 
 
 def notes(summary: dict[str, Any]) -> list[str]:

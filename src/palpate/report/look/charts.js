@@ -93,8 +93,7 @@ const palpate = (() => {
     grid: { stroke: () => token("grid"), width: 1 }, values: (_, list) => list.map(tick), ...more });
 
   /* A chart in `host`.
-     spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, text,
-     tone}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, kind, colour, of}] or [{..., kind: "band",
+     spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, colour}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, kind, colour, of}] or [{..., kind: "band",
      low, high}], where `of`, `low` and `high` name columns (of a line `within` does, its range, which is read with it), and a `silent` one has no place in the legend; `x_of` names that of x; log
      is "x", "y" or "xy". A series may have its own width, dash, alpha, or dots [px] in place of a line. */
   const chart = (host, spec, columns, group = new Group()) => {
@@ -147,13 +146,12 @@ const palpate = (() => {
       const i = nearest(x), parts = [`${figure(data[0][i], 5)} ${spec.unit || "s"}`];
       let k = 1;
       for (const one of spec.series) {
-        const digits = spec.digits || 4;
         if (one.kind === "band" && one.silent) k += 2;
-        else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i], digits)} to ${figure(data[k][i], digits)}`); k += 2; }
+        else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i])} to ${figure(data[k][i])}`); k += 2; }
         else if (one.silent) k++;
         else {
-          const ends = one.within && [one.within.low, one.within.high].map((name) => figure(there(columns[name], i), digits));
-          parts.push(`${one.label} ${figure(there(data[k++], i), digits)}${ends ? ` (${ends.join(" to ")})` : ""}`);
+          const ends = one.within && [one.within.low, one.within.high].map((name) => figure(there(columns[name], i)));
+          parts.push(`${one.label} ${figure(there(data[k++], i))}${ends ? ` (${ends.join(" to ")})` : ""}`);
         }
       }
       read.textContent = parts.join("  ·  ");
@@ -171,24 +169,12 @@ const palpate = (() => {
       const { ctx, bbox } = plot, dense = devicePixelRatio || 1;
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-      let free = -Infinity;
       for (const mark of self.marks) {
-        const at = plot.valToPos(mark.x, "x", true), failed = mark.tone === "fail";
+        const at = plot.valToPos(mark.x, "x", true);
         if (at < bbox.left - 1) continue;
-        ctx.strokeStyle = token(mark.colour || (failed ? "fail" : "quiet"));
+        ctx.strokeStyle = token(mark.colour);
         ctx.lineWidth = 1.25 * dense; ctx.setLineDash([3 * dense, 3 * dense]);
         ctx.beginPath(); ctx.moveTo(at, bbox.top); ctx.lineTo(at, bbox.top + bbox.height); ctx.stroke();
-        if (!mark.text || spec.wordless) continue;
-        ctx.font = `${failed ? 600 : 400} ${12 * dense}px sans-serif`;
-        ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
-        const wide = ctx.measureText(mark.text).width, beyond = at + wide + 10 * dense > bbox.left + bbox.width;
-        const from = beyond ? at - wide - 5 * dense : at + 5 * dense;
-        if (from < Math.max(free, bbox.left)) continue;
-        free = from + wide + 6 * dense;
-        ctx.setLineDash([]); ctx.lineJoin = "round"; ctx.lineWidth = 4 * dense; ctx.strokeStyle = token("paper");
-        ctx.fillStyle = token(failed ? "bad" : "quiet");
-        const y = bbox.top + bbox.height - 8 * dense;
-        ctx.strokeText(mark.text, from, y); ctx.fillText(mark.text, from, y);
       }
       ctx.restore();
     };
