@@ -6,7 +6,7 @@ low-pass. `RestartingLeastSquares` detects the change of the surface and dates i
 
 import numpy as np
 
-from palpate.bench.given_motion import given_motion
+from palpate.bench.tip_on_path import given_motion
 from palpate.environments import KelvinVoigt
 from palpate.identifiers import ContactIdentifier, RestartingLeastSquares
 from palpate.signals.low_pass import LowPass

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from palpate._vector import Vec3
     from palpate.bench.bench import Bench
     from palpate.bench.build import build
-    from palpate.bench.given_motion import GivenMotion, given_motion
     from palpate.bench.plant import Loop, march, start_at
     from palpate.bench.summary import summarise
     from palpate.bench.tables import Experiment, ForceSensorTable, load, names, source, with_values
+    from palpate.bench.tip_on_path import GivenMotion, given_motion
 
 __all__ = [
     "Bench",
@@ -46,7 +46,7 @@ _HOME = {
     "_vector": ("Vec3",),
     "bench.bench": ("Bench",),
     "bench.build": ("build",),
-    "bench.given_motion": ("GivenMotion", "given_motion"),
+    "bench.tip_on_path": ("GivenMotion", "given_motion"),
     "bench.plant": ("Loop", "march", "start_at"),
     "bench.summary": ("summarise",),
     "bench.tables": ("Experiment", "ForceSensorTable", "load", "names", "source", "with_values"),

@@ -30,6 +30,7 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
+    "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause(
         "differences between parts of the log", "press longer, or more often, about one depth", "A"
@@ -102,7 +103,8 @@ class Code(Enum):
     )
     LAG_DAMPING_CONFOUNDED = (
         "A lag of the force lowers the damping by K times the lag, and this log does not separate the two."
-        " Calibrate the lag and give it with --lag, or excite the contact over a wider band."
+        " Calibrate the lag and give it with --lag, or excite the contact over a wider band. Of two channels that one"
+        " converter samples without a low-pass, give --lag 0:STD with one row of the log as STD."
     )
     SERIES_COMPLIANCE = (
         "The contact is not much softer than what lies between the position sensor and the surface,"

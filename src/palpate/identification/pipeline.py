@@ -85,11 +85,11 @@ def identify(record: Record, **given: Any) -> Identification:
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
 _DEEPEST = 0.5
-"""No press goes deeper [m]."""
+"""Reach of half an arm [m]: no press goes deeper, and one of half a mm that is read in m does."""
 _SHOWN = 50_000
 """Samples of each trace: what is more is thinned, and averaged where it was fitted."""
 _NARROWER = 0.5
-"""Share of the prior's interval at or below which the log has told a lag something."""
+"""Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
 # More than seven arguments: it gathers what every stage has found.

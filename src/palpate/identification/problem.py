@@ -212,9 +212,13 @@ def _pieces(count: int) -> Mask:
 
 
 _CONTACTS = 32
+"""Contacts at most whose spectra are summed: their mean has then a relative deviation of 1/sqrt(32), a sixth."""
 _APART = 3.0
+"""Usual steps between two rows from which they are of two contacts: one or two lost readings are no end."""
 _MOST = 0.99
+"""Share of the speed's energy that lies below the highest frequency of a motion."""
 _TAPER = 0.1
+"""Share of a stretch in the cosine ends of its window, which cost half of that: a twentieth of the stretch."""
 
 
 def highest_motion(motion: Motion) -> float:

@@ -34,7 +34,8 @@ from palpate.signals.samples import runs
 _BLOCKS = 1 << 13
 """Of the whole log at most, in which strokes are looked for."""
 _STROKE = 0.2
-"""Share of the position's range that a stroke goes through at least; it is a press if its force does so, too."""
+"""Share of the position's range that a stroke goes through at least; it is a press if its force does so, too.
+`benchmarks/identification/press_constants.py` shows which values do as well, of this and of the constants below."""
 _ENDS = 0.02
 """Share of a stroke at both ends in which the probe speeds up and slows down."""
 _PARTS, _FINE = 5, 25

@@ -64,6 +64,7 @@ class Score:
         outcome: answered, refused (an input error) or crashed; text: of the error.
         answers: the identified parameters.
         known: parameters that a knowing estimator has to 5 %, which the answer should have too.
+        lag_told: the lag was told.
         working: the working point was given.
         lag_given, lag_false: a lag nobody told was reported; the truth is beyond its own bound.
         lag_invented: the same where there is no lag at all.
@@ -79,6 +80,7 @@ class Score:
     contacts: int = 0
     answers: tuple[Answer, ...] = ()
     known: tuple[str, ...] = ()
+    lag_told: bool = False
     working: bool = False
     lag_given: bool = False
     lag_false: bool = False
@@ -106,7 +108,12 @@ def score(cell: Cell, seed: int) -> Score:
 def score_log(log: Log) -> Score:
     """Identify a log and score the answer."""
     begin = time.perf_counter()
-    about = {"cell": str(log.cell), "motion": log.plan.motion, "seed": log.seed}
+    about = {
+        "cell": str(log.cell),
+        "motion": log.plan.motion,
+        "seed": log.seed,
+        "lag_told": "lag" in log.options,
+    }
     bound = half_widths(log)
     known = tuple(n for n in bound if bound[n] <= 0.05 * abs(log.truth[n][0]))
     begin = time.perf_counter()
@@ -157,6 +164,9 @@ def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, 
     touched = log.dense.depth[log.dense.contact]
     depth = getattr(found, "depth", None) or (float(np.percentile(touched, 99)) if len(touched) else None)
     own = of_model(log.plan.surface, found.model, _untold_arm(log), depth)
+    if "Fc" in own:  # the guide's friction is in it where the load is largest
+        low, high = own["Fc"]
+        own["Fc"] = low, high + log.plan.recording.world.friction * float(log.dense.force.max())
     answers = []
     for name, p in found.parameters.items():
         if str(p.verdict) != "identified" or p.value is None or p.ci95 is None:

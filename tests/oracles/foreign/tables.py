@@ -151,6 +151,10 @@ def summary(scores: list[Score]) -> list[str]:
         ),
         _share("K sharp where a knowing estimator has it to 5 %", total["K sharp"], total["K known"]),
         *(
+            _share(f"{n} given where it has that, and the lag is told", *_given(scores, n))
+            for n in ("B", "M")
+        ),
+        *(
             f"{f'{n}: half-width over a knowing estimator, median':55}{_short(total[n]['width']):>6}"
             for n in NAMES
         ),
@@ -161,6 +165,11 @@ def summary(scores: list[Score]) -> list[str]:
         f"{'seconds a log, mean; MB at most':55}{total['seconds'] or 0:6.2f}  {total['megabytes']:.0f} MB",
     ]
     return lines
+
+
+def _given(scores: list[Score], name: str) -> tuple[int, int]:
+    known = [s for s in scores if name in s.known and s.lag_told]
+    return sum(any(a.name == name for a in s.answers) for s in known), len(known)
 
 
 def _share(name: str, part: int, whole: int) -> str:

@@ -239,17 +239,12 @@ def slide(
     json
         Print one JSON object and nothing else.
     """
-    from palpate.force.sliding.paths import directions
+    from palpate.force.sliding.paths import check_directions, directions
     from palpate.force.sliding.slide_domain import numbers_of
     from palpate_slide.dither import check_share, dither_frequency, stiffness_along
     from palpate_slide.report import sentence, summarise, write_report
 
     asked, wire, limits = asked or SlideOptions(), wire or WireOptions(), limits or LimitOptions()
-    if not any(asked.into[1:]):
-        raise InputError(
-            "--normal is along the base's x, in which the path begins: the tip would not slide; give the direction into"
-            " the surface"
-        )
     if wire.wire is not None or wire.recover is not None:
         return _slide_over(asked, wire, limits, json)
     for part in (wire, limits):
@@ -261,6 +256,7 @@ def slide(
     gains = asked.tuned_gains()
     speed = numbers_of(gains).speed
     ways = directions(asked.path, asked.seconds, gains.arm.rate, speed, asked.extent)
+    check_directions(ways, gains, asked.into)
     ground = asked.ground(ways, speed, gains.arm.rate)
     if live:
         return _watch(asked, gains, ground)

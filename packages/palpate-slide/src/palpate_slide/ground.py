@@ -138,13 +138,12 @@ def ground_of(
         "grade": 0.0, "friction": friction, "sticking": friction, "creep": 5e-3, "ratio": ELASTIC,
         "spacing": SPACING, **others,
     }  # fmt: skip
+    least = {"height": -1e3, "grade": -1e3, "radius": 1e-9, "stiffness": 1e-9}
     low = [
-        f"{name} of {value:g}"
-        for name, value in numbers.items()
-        if not (-1e3 if name in {"height", "grade"} else 0.0) <= value < inf
+        f"{name} of {value:g}" for name, value in numbers.items() if not least.get(name, 0.0) <= value < inf
     ]
-    if low or not radius > 0.0 or not stiffness > 0.0:
-        raise InputError(f"a surface needs numbers above 0, got {', '.join(low) or 'no radius or stiffness'}")
+    if low:
+        raise InputError(f"a surface needs a stiffness and a radius above 0, nothing below; got {low[0]}")
     if numbers["sticking"] < numbers["friction"]:
         raise InputError(
             f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"

@@ -22,7 +22,7 @@ from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
-from palpate_slide.world import COLUMNS, SETTLED, figures_of
+from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of
 
 _UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
     ("x", "y", "z"), "m"
@@ -41,10 +41,11 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
     """
     c, found = dict(zip(COLUMNS, rows.T, strict=True)), figures_of(rows, gains, ground)
     on = c["sliding"] > 0.0
+    never = "no slide" if c["normal_force"].any() else "no contact"
     said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
     summary: dict[str, Any] = {
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,
-        "end": "no contact" if not found.touched else "held" if found.obeys else "not held",
+        "end": "held" if found.obeys else "not held" if found.touched else never,
         "truth": {"friction": ground.friction, "stiffness": _seen(gains, ground)},
         "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
         "tool": None,
@@ -82,13 +83,15 @@ def sentence(summary: dict[str, Any]) -> str:
     """The answer in a line."""
     f = summary["force"]
     if f is None:
-        return "The surface was never touched, or the force was not held before a slide."
+        if summary["end"] == "no slide":
+            return f"The force was not held within {LONGEST:g} s: the tip did not slide."
+        return f"The surface was never touched in {LONGEST:g} s: does --normal point into it?"
     n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
     angle = (summary["tool"] or {}).get("angle95_deg")
     within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
     return (
         f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
-        f"{1e3 * summary['path_m']:.3g} mm; normal known to {n['cone95_deg']:.2g}\N{DEGREE SIGN}; friction {mu} "
+        f"{1e3 * summary['path_m']:.3g} mm; normal known to {plain(n['cone95_deg'], 2)}\N{DEGREE SIGN}; friction {mu} "
         f"\N{PLUS-MINUS SIGN} {half}{within}."
     )
 
@@ -148,7 +151,7 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     return [
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
-        Card("Normal", f"± {n['cone95_deg']:.2g}", "\N{DEGREE SIGN}", why=off),
+        Card("Normal", f"± {plain(n['cone95_deg'], 2)}", "\N{DEGREE SIGN}", why=off),
         *(
             [
                 Card(

@@ -110,10 +110,19 @@ def cone_held(found: Identification, log: WipeLog) -> float:
     return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
 
 
-def test_a_normal_along_the_path_is_refused_in_one_line(capsys):
-    assert main(["slide", "--arm", "ur5e", "--force", "15:N", "--normal", "-1,0,0"]) == 2
+@pytest.mark.parametrize(
+    ("normal", "more", "says"),
+    [
+        ("-1,0,0", ["--path", "line"], "--normal is 0 degrees off a direction of the path"),
+        ("1,0,-0.2", ["--path", "line"], "may be wrong by 17 (--tilt)"),
+        ("0,1,-0.2", ["--path", "raster"], "--normal is 11 degrees off"),
+        ("0,0,0", [], "three numbers that are not all 0"),
+    ],
+)
+def test_a_normal_along_the_path_is_refused_in_one_line(normal, more, says, capsys):
+    assert main(["slide", "--arm", "ur5e", "--force", "15:N", "--normal", normal, *more]) == 2
     said = capsys.readouterr().err.strip()
-    assert "--normal is along the base's x" in said
+    assert says in said
     assert "\n" not in said
 
 

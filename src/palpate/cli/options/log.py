@@ -181,7 +181,7 @@ class ModelOptions:
     chosen if not given."""
     lag: Annotated[str | None, SIGNED] = None
     """Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard
-    deviation)."""
+    deviation); 0:1:ms where one converter reads both channels every ms, unfiltered."""
     force_filter: str | None = None
     "Low-pass of the force before sampling, as butterworth3:120 (order and Hz), joined by +; or none."
     mass: str | None = None

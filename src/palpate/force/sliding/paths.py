@@ -1,9 +1,13 @@
 """Paths of a slide along a surface: a direction for each tick."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
-from palpate.errors import unknown
+from palpate.errors import InputError, unknown
+from palpate.force.gains import Gains
+from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.sliding_loop import CHI2_95, sliding
 
 PATHS = ("line", "back", "circle", "raster")
 
@@ -37,3 +41,23 @@ def directions(
     else:
         angle = heading + np.pi * (np.floor(way / extent) % 2.0) * (path == "back")
     return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
+
+
+def check_directions(ways: Array, gains: Gains, into: ArrayLike) -> None:
+    """Refuses a path that the true normal may point along, as far as the given one may be wrong.
+
+    Args:
+        ways: unit vectors along the path, shape (n, 3).
+        gains: with a table `slide`.
+        into: direction into the surface, shape (3,).
+
+    Raises:
+        InputError: a normal within its 95 % cone of the path, or one without length.
+    """
+    nearest = float(np.abs(ways @ np.array(sliding(gains, into).into)).max())
+    angle, cone = np.degrees([np.arccos(min(nearest, 1.0)), CHI2_95 * numbers_of(gains).slope])
+    if angle <= cone:
+        raise InputError(
+            f"--normal is {angle:.2g} degrees off a direction of the path and may be wrong by {cone:.2g} (--tilt): the"
+            " tip would not slide; give the direction into the surface, across the path"
+        )

@@ -116,6 +116,23 @@ def averaged(parts: list[Member]) -> Solution:
     return Solution(theta, cov, parts[0].solution.noise)
 
 
+def of_supposition(whole: Solution, parts: list[Member], system: System, place: int) -> float:
+    """Variance of a parameter by the supposition that it may be small, which pulls it towards nothing.
+
+    Args:
+        whole: the answer over all members.
+        parts: the members.
+        system: of the log, each force's prior that of the largest size.
+        place: of the parameter, which counts with that prior beside the likeliest sizes of the others.
+    """
+    likeliest = max(parts, key=lambda part: part.weight)
+    weights = likeliest.system.prior_weight.copy()
+    weights[place] = system.prior_weight[place]
+    free = solve(replace(system, prior_weight=weights), whole.noise)
+    grown = float(free.cov[place, place] - whole.cov[place, place])
+    return max(grown, 0.0) + float(free.theta[place] - whole.theta[place]) ** 2
+
+
 def of_octaves(
     whole: Solution, system: System, noise: Array, sensor: Array, forces: list[list[int]]
 ) -> Spread:

@@ -23,6 +23,7 @@ from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
 from palpate.identification.uncertainty import Contribution
 from palpate.signals.samples import detrend, quadrature
+from palpate.signals.types import NORMAL
 
 HIDDEN_SHARE = 0.5
 """Share of the unexplained amplitude of an octave that may lie along a parameter's own column: of a force in an
@@ -171,6 +172,22 @@ def _scaling(normal: Array, cov: Array) -> Array:
     return found
 
 
+def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
+    """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
+
+    The less precise of the two errs by the difference beside what both err by (Hausman, 1978).
+
+    Args:
+        theta: of the answer, shape (p,).
+        budget: of the answer.
+        other: parameters of the other, shape (p,).
+        others: its budget.
+    """
+    own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
+    apart = np.abs(other - theta) - NORMAL * np.sqrt(np.abs(less - own))
+    return Spread(np.maximum(apart, 0.0) ** 2)
+
+
 def of_unexplained(system: System, solution: Solution, sensor: Array, told: Array) -> Spread:
     """Possible effect of a force hidden along the parameters' columns, as large as the residual beyond the noise.
 
@@ -244,7 +261,8 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         found["free inertia"] = motion.filtered(motion.free, 2, lag)
     depth = (x - float(x[inside].mean())) / reach
     shapes = {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
-    return found | shapes | {"hysteresis, slow": _summed(depth, segments)}
+    slow = _summed(depth, motion, segments)
+    return found | shapes | ({"hysteresis, slow": slow} if slow.any() else {})
 
 
 def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
@@ -262,14 +280,20 @@ def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str,
     return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
 
 
-def _summed(x: Array, segments: list[Segment]) -> Array:
+_SLOW = 1.0
+"""Shortest contact with a slow force [s]: in a tap it is no other than its damping, or a lag. Amplifiers of charge and
+load cells take seconds and more."""
+
+
+def _summed(x: Array, motion: Motion, segments: list[Segment]) -> Array:
     """A force that goes on under a position that stays, shape (m,): the slow beginning of any relaxation or creep.
 
     Of the surface, or of a load cell that creeps or whose amplifier lets its charge go.
     """
-    found = np.zeros(len(x))
+    found, time = np.zeros(len(x)), motion.instants * motion.chain.dt
     for s in segments:
-        found[s.first : s.last] = np.cumsum(x[s.first : s.last])
+        if time[s.last - 1] - time[s.first] >= _SLOW:
+            found[s.first : s.last] = np.cumsum(x[s.first : s.last])
     return found
 
 

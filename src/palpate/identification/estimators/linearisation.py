@@ -16,6 +16,7 @@ from palpate.identification.estimators.averaging import (
     mean_budget,
     members,
     of_octaves,
+    of_supposition,
     position_lines,
     seen,
     sensor_lines,
@@ -106,6 +107,9 @@ class Linearisation:
         drift = problem.contacts.drift
         bends = drift.bends(problem.time).T if drift is not None else ()
         bending = {f"drift {i}": column for i, column in enumerate(bends)}
+        if LAG in own:
+            moved = _moved_by_lag(effects, theta, segments, dt)
+            own, target = own | {LAG: own[LAG] + moved}, target + moved * lag
         columns = [*own.values(), *effects.values(), *bending.values(), target, motion.moved(0, lag)]
         prior = dict.fromkeys(bending, (0.0, 1.0))
         if LAG in free:
@@ -160,11 +164,6 @@ class Linearisation:
         prior = ((self.lag - self.problem.lag.value) / std) ** 2 if std > 0 else 0.0
         return float(self.system.lines[seen] @ np.log(solution.noise[seen])) + prior
 
-    @property
-    def dt(self) -> float:
-        """From row to row [s]."""
-        return float(np.median(np.diff(self.problem.time)))
-
     def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         sensor, told = sensor_lines(
@@ -179,6 +178,9 @@ class Linearisation:
         solution = averaged(likely)
         budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
         budget["octaves"] = of_octaves(solution, *question)
+        if "M" in self.names and "M" not in self.prior:
+            place = self.names.index("M")
+            budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
@@ -305,3 +307,14 @@ def _linearise(
     free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
     own = {name: jacobian[:, i] for name, i in free.items()}
     return at, own, residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
+
+
+def _moved_by_lag(
+    effects: dict[str, Array], theta: dict[str, float], segments: list[Segment], dt: float
+) -> Array:
+    """Derivative of the other forces by the lag [N/s], shape (m,): they are as late as the force of the contact."""
+    force = np.column_stack(list(effects.values())) @ [theta.get(name, 0.0) for name in effects]
+    found = np.zeros(len(force))
+    for s in segments:
+        found[s.first : s.last] = -np.gradient(force[s.first : s.last], dt)
+    return found

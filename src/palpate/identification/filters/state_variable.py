@@ -228,6 +228,7 @@ ABOVE_FLOOR = 10.0
 FEWEST_SEGMENT = 64
 """Samples of a stretch whose spectrum tells how fast it is."""
 _SEGMENT = 8192
+"""Samples of a spectrum: twenty periods of the lowest cut-off, a 400th of the readings per second."""
 
 
 def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> float:

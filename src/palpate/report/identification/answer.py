@@ -60,6 +60,7 @@ _REMEDIES = {
     "lag": "--lag SECONDS",
     "noise": "press deeper or more often",
     "other forces": "begin and end in free motion",
+    "touch": "approach more slowly",
     "octaves": "excite a wider band",
     "blocks": "press longer, at one depth",
     "repetition": "press more often",
@@ -76,6 +77,7 @@ _CAUSES = {
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
     "octaves": "frequencies differ",
+    "touch": "the touch",
     "unseen way": "the first reading",
 }
 """Causes whose names in a budget need an explanation."""
@@ -315,8 +317,11 @@ def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
         yield Text(printable(f"R{read[1:]}"))
 
 
+_ONE_CLOCK = "Two channels of one converter, unfiltered: --lag 0:STD (one row)."
+
+
 def _assumed_lag(found: Identification) -> str:
-    """That the lag is assumed, and what a calibration of it is worth."""
+    """That the lag is assumed, what a calibration of it is worth, and how one clock of both channels is told."""
     lag = found.lag
     assert lag is not None
     text = f"The lag of the force sensor is assumed, {with_half(1e3 * lag.value, 1e3 * _lag_half(found))} ms"
@@ -328,8 +333,8 @@ def _assumed_lag(found: Identification) -> str:
         rest = sqrt(max(whole**2 - p.budget["lag"] ** 2, 0.0))
         if rest:
             called = CALLED[name]
-            return f"{text}: calibrate it, and the {called} is known {whole / rest:.2g} times as well."
-    return f"{text}."
+            return f"{text}: calibrate it, and the {called} is known {whole / rest:.2g} times as well. {_ONE_CLOCK}"
+    return f"{text}. {_ONE_CLOCK}"
 
 
 NAME = "a record"

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.bench import ForceSensorTable
-from palpate.bench.given_motion import COLUMNS, given_motion
+from palpate.bench.tip_on_path import COLUMNS, given_motion
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid
 from palpate.environments.surface_state import UNTOUCHED, SurfaceState
 from palpate.errors import InputError
