@@ -16,6 +16,7 @@ from palpate.force.expected import (
 )
 from palpate.force.simulated_press import pressed, surface, world_of
 
+ARMS = ("ur5e", pytest.param("fr3", marks=pytest.mark.long))
 TOUCHES = 120
 """Of each arm; of 10 000 benchmarks/force/first_touches.py tells."""
 
@@ -40,7 +41,7 @@ def touches(name, low):
     return np.array(found).T
 
 
-@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize("name", ARMS)
 def test_touches_inside_the_domain_keep_what_is_said(name):
     settled, bound, _, over = touches(name, softest)
     # Of 120: what fails once in a hundred fails more than 5 times in 0.2 % of the tries, once in a thousand more than
@@ -49,7 +50,7 @@ def test_touches_inside_the_domain_keep_what_is_said(name):
     assert (over > OVERSHOOT).sum() <= 2
 
 
-@pytest.mark.parametrize("name", ["ur5e", "fr3"])
+@pytest.mark.parametrize("name", ARMS)
 def test_softer_ones_settle_within_the_time_that_they_take_to_rise_out_of_the_noise(name):
     settled, _, bound, over = touches(name, lambda gains: 100.0)
     assert (settled > bound).sum() <= 5

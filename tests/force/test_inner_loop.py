@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter
 
 from palpate.errors import InputError
 from palpate.force.arm import load_arm
@@ -18,15 +17,10 @@ TICK, FINE = 0.002, 10
 def answered(command, bandwidth, damping, delay):
     """Position at each tick, stepped exactly in tenths of a tick, which the delay is a whole number of."""
     w, h = 2.0 * np.pi * bandwidth, TICK / FINE
-    M = np.zeros((3, 3))
-    M[0, 1], M[1] = w, (-w, -2.0 * damping * w, w)
-    E, late = expm(h * M), round(delay / h)
-    x, found = np.array([command[0], 0.0]), np.empty(len(command))
-    for k in range(len(command)):
-        found[k] = x[0]
-        for j in range(k * FINE - late, (k + 1) * FINE - late):
-            x = E[:2, :2] @ x + E[:2, 2] * command[max(j, 0) // FINE]
-    return found
+    b, a, _ = cont2discrete(([w * w], [1.0, 2.0 * damping * w, w * w]), h)
+    late = round(delay / h)
+    fine = np.concatenate([np.zeros(late), np.repeat(command - command[0], FINE)])[: FINE * len(command)]
+    return command[0] + lfilter(b.ravel(), a, fine)[::FINE]
 
 
 def log(seed, n=2500, kind="steps", noise=1e-5, colour=0.0, **true):

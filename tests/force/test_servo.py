@@ -156,10 +156,10 @@ def test_a_bias_while_the_tip_gathers_speed_is_no_surface(gains, error):
 
 def pushed_log(inner, seed=0, noise=1e-5, push=15.0):
     """Steps in free motion, then a push, of one mass on its servo, integrated here; 500 Hz."""
-    rng, n, h = np.random.default_rng(seed), 6000, 1e-4
-    command = np.repeat(rng.uniform(-0.005, 0.005, 24), 250)
-    command[4500:] = command[4499]
-    force = push * np.clip(np.minimum(np.arange(n) - 4800, 5800 - np.arange(n)) / 250.0, 0.0, 1.0)
+    rng, n, h = np.random.default_rng(seed), 3000, 1e-4
+    command = np.repeat(rng.uniform(-0.005, 0.005, 12), 250)
+    command[2000:] = command[1999]
+    force = push * np.clip(np.minimum(np.arange(n) - 2150, 2850 - np.arange(n)) / 250.0, 0.0, 1.0)
     x = v = 0.0
     position, late = np.empty(n), round(inner.delay / h)
     for k in range(n):

@@ -203,3 +203,19 @@ def test_touches_that_are_too_short_are_touches():
     x = -2e-3 + 5e-3 * np.exp(-(((t - 2) / 0.15) ** 2))
     f = 3000 * np.maximum(x, 0) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
     assert sentence(identified(t, x, f)).startswith("The contacts in this log are too short: the longest")
+
+
+def test_a_lag_that_nobody_knows_does_not_widen_a_stiffness_that_rests_on_slow_motion():
+    """The most excited octave is known to 700 N/m behind a lag of 5 ± 15 ms, and the model's K to 10 N/m."""
+    rng, t = np.random.default_rng(0), np.arange(0, 14, 0.004)
+    tones = sum(np.sin(2 * np.pi * w * t + rng.uniform(0, 6)) for w in np.linspace(0.3, 8, 20))
+    x = (
+        -2e-3
+        + 3.6e-3 * (risen(t, 0.5, 1) - risen(t, 13, 0.7))
+        + 1.5e-4 * tones * (risen(t, 1.5, 0.5) - risen(t, 12.4, 0.5))
+    )
+    f = np.where(x > 0, np.maximum(5200 * x + 40 * np.gradient(x, t), 0), 0)
+    found = identified(t, x, f + 0.05 * rng.standard_normal(len(t)))
+    assert sentence(found).startswith("By the model kelvin-voigt the stiffness is 5")
+    assert in_range(found.parameters["K"], 5200, 5200)
+    assert found.parameters["K"].std < 30

@@ -137,8 +137,6 @@ def path_of(world: Wipe, t, rng):
 
 def wipe(world: Wipe) -> WipeLog:
     """The log of a world."""
-    from scipy.spatial.transform import Rotation
-
     rng = np.random.default_rng(world.seed)
     h = 1e-3
     n = round(world.seconds / h)
@@ -187,6 +185,16 @@ def wipe(world: Wipe) -> WipeLog:
         force = np.vstack([np.zeros((m, 3)), force, np.zeros((m, 3))])
         mu, speed, K = (np.pad(own, m, mode="edge") for own in (mu, speed, K))
         speed[:m], speed[-m:] = 0.0, 0.0
+    columns, every, into, tip = recorded(world, tip, into, force, rng)
+    inside = (force**2).sum(1) > 0
+    return WipeLog(columns, inside[every], into[every], mu[every], tip[every], speed[every], K[every], world)
+
+
+def recorded(world: Wipe, tip, into, force, rng):
+    """Columns of a log of a tip's places, normals and forces each millisecond, shape (n, 3); its rows; both turned."""
+    from scipy.spatial.transform import Rotation
+
+    h = 1e-3
     lies = Rotation.random(random_state=rng).as_matrix() if world.tilted else np.eye(3)
     tip, into, force = tip @ lies.T + rng.uniform(-0.5, 0.5, 3), into @ lies.T, force @ lies.T
     # The tool: its z into the surface, with an angle; it follows the normal, or stands.
@@ -216,10 +224,110 @@ def wipe(world: Wipe) -> WipeLog:
     columns |= {f"force_{c}": held[:, i] for i, c in enumerate("xyz")}
     columns |= {f"position_{c}": seen[:, i] for i, c in enumerate("xyz")}
     columns |= {f"quaternion_{c}": q[:, i] for i, c in enumerate("xyzw")}
-    inside = (force**2).sum(1) > 0
-    return WipeLog(columns, inside[every], into[every], mu[every], tip[every], speed[every], K[every], world)
+    return columns, every, into, tip
 
 
 def changed(world: Wipe) -> dict[str, object]:
     """The numbers of a world that are not the usual ones."""
     return {f.name: getattr(world, f.name) for f in fields(world) if getattr(world, f.name) != f.default}
+
+
+PRESSES = ("straight", "oblique", "hand", "taps", "sine", "held")
+"""A motion to a depth and back; the same askew; by a hand that wanders; at several places; a sine; no free motion."""
+MATERIALS = ("spring", "hardening", "relaxing")
+
+
+@dataclass(frozen=True)
+class Pressing(Wipe):
+    """A press on a plane: `radius`, `path`, `length`, `ripple` and `dither` do not count."""
+
+    kind: str = "straight"
+    material: str = "spring"
+    damping: float = 0.01  # B/K [s]
+    askew: float = 0.0  # angle between the motion and the normal
+    cycles: int = 3
+
+
+def any_press(seed: int, **given) -> Pressing:
+    """A press of the wide box."""
+    rng = np.random.default_rng([seed, 78])
+    wiped = any_wipe(seed, free=1.5, turns=False, weight=0.0)
+    kind = given.get("kind", str(rng.choice(PRESSES)))
+    own = {f.name: getattr(wiped, f.name) for f in fields(wiped)} | {
+        "kind": kind, "material": str(rng.choice(MATERIALS)), "damping": float(np.exp(rng.uniform(-7.0, -3.5))),
+        "askew": float(np.radians(rng.uniform(10.0, 60.0))) if kind == "oblique" else 0.0,
+        "cycles": int(rng.integers(1, 6)), "grain": float(np.exp(rng.uniform(np.log(1e-6), np.log(1e-5)))),
+        "noise": float(np.exp(rng.uniform(np.log(0.02), np.log(0.2)))),
+    }  # fmt: skip
+    return Pressing(**(own | given))
+
+
+def press(world: Pressing) -> WipeLog:
+    """The log of a press."""
+    rng = np.random.default_rng(world.seed)
+    h = 1e-3
+    n = round(world.seconds / h)
+    t = h * np.arange(n)
+    full = world.force / world.stiffness
+    turn = np.clip((t % (world.seconds / world.cycles)) / (world.seconds / world.cycles), 0.0, 1.0)
+    ramp = np.clip(np.minimum(turn - 0.15, 0.85 - turn) / 0.15, -1.0, 1.0)
+    lift = 5e-3 + 0.0 * t  # above the surface between the presses
+    depth = np.where(ramp > 0.0, full * ramp, lift * ramp)
+    along = np.zeros((n, 2))
+    direction = rng.uniform(0.0, 2 * np.pi)
+    side = np.array([np.cos(direction), np.sin(direction)])
+    slow = [np.convolve(rng.standard_normal(n + 800), np.hanning(800), "valid")[:n] for _ in range(3)]
+    slow = [s / s.std() for s in slow]
+    if world.kind == "oblique":
+        along = np.outer(depth * np.tan(world.askew), side)
+    elif world.kind == "hand":
+        depth = np.where(ramp > 0.0, full * ramp * (1.0 + 0.2 * slow[0]), depth)
+        along = 5e-4 * np.column_stack(slow[1:])
+    elif world.kind == "taps":
+        place = np.floor(t / (world.seconds / world.cycles))
+        at = np.interp(t, t[ramp <= -0.5] if (ramp <= -0.5).any() else t, 0.02 * place[ramp <= -0.5])
+        along = np.outer(at, side)
+    elif world.kind == "sine":
+        held = np.clip(np.minimum(t - 0.5, world.seconds - 0.5 - t) / 0.5, -1.0, 1.0)
+        wave = 0.6 + 0.35 * np.sin(2 * np.pi * world.dither_hz * t)
+        depth = np.where(held > 0.0, full * np.minimum(held * 2.0, 1.0) * wave, 5e-3 * held)
+    elif world.kind == "held":
+        depth = full * (0.6 + 0.15 * slow[0])
+    m = round(world.free / h) if world.kind != "held" else 0
+    depth = np.r_[
+        np.full(m, depth[0]) - np.linspace(0.02, 0.0, m), depth, depth[-1] - np.linspace(0.0, 0.02, m)
+    ]
+    along = np.vstack([np.repeat(along[:1], m, 0), along, np.repeat(along[-1:], m, 0)])
+    N = _normal_force(world, depth, h)
+    tip = np.column_stack([along, -depth])
+    vt = np.gradient(along, h, axis=0)
+    bend, friction = np.zeros(2), np.zeros((len(depth), 3))
+    for k in range(len(depth)):
+        most = max(world.mu * N[k] / (world.ratio * world.stiffness), 1e-12)
+        size = float(np.hypot(*vt[k]))
+        gone = np.exp(-size * h / most) if N[k] > 0.0 else 0.0
+        bend = bend * gone + (vt[k] / size * most * (1.0 - gone) if size > 0.0 and N[k] > 0.0 else 0.0)
+        friction[k, :2] = world.ratio * world.stiffness * bend
+    into = np.repeat(np.array([[0.0, 0.0, -1.0]]), len(depth), 0)
+    force = N[:, None] * into + friction
+    columns, every, into, tip = recorded(world, tip, into, force, rng)
+    one = np.ones(len(every))
+    speed = np.hypot(*vt[every].T)
+    return WipeLog(
+        columns, N[every] > 0.0, into[every], world.mu * one, tip[every], speed, world.stiffness * one, world
+    )
+
+
+def _normal_force(world: Pressing, depth, h):
+    """Of the surface's material, never below 0 [N]."""
+    d = np.maximum(depth, 0.0)
+    if world.material == "hardening":
+        d = d * np.sqrt(d / (world.force / world.stiffness))
+    N = world.stiffness * (d + world.damping * np.gradient(d, h))
+    if world.material == "relaxing":  # half as stiff again while it is fast: a Maxwell branch of 1 s
+        branch, gone = np.zeros(len(d)), np.exp(-h / 1.0)
+        steps = np.diff(d, prepend=d[0])
+        for k in range(1, len(d)):
+            branch[k] = branch[k - 1] * gone + 0.5 * world.stiffness * steps[k]
+        N = N + branch
+    return np.where(depth > 0.0, np.maximum(N, 0.0), 0.0)

@@ -97,9 +97,10 @@ def identify_contact(
     about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     record = replace(record, meta={**record.meta, "arm": about})
     found = with_arm(found, arm, tolerance, from_pose=in_space)
-    slid = _slide(whole, frame or ContactFrame(), arm, tolerance, calibration, found) if in_space else None
-    if slid is None:
-        return found, record
+    asked = frame or ContactFrame(), arm, tolerance, calibration
+    slid = _slide(whole, asked, found, record) if in_space else None
+    if slid is None or slid.slide is None:
+        return slid or found, record
     meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
     return slid, replace(record, meta=meta)
 
@@ -117,24 +118,14 @@ def _complete(arm: ArmDynamics, said: Mapping[str, Any]) -> ArmDynamics:
 
 def _slide(
     record: Record,
-    frame: ContactFrame,
-    arm: ArmDynamics,
-    tolerance: float,
-    calibration: float,
+    asked: tuple[ContactFrame, ArmDynamics, float, float],
     press: Identification,
+    along: Record,
 ) -> Identification | None:
-    """The identification of a slide, by `palpate-slide`; None of a press that shows its stiffness, and of no slide."""
-    K = press.parameters.get("K")
-    if K is not None and K.verdict is Verdict.IDENTIFIED:
-        return None
+    """The identification of a slide, by `palpate-slide`, or of a press without a K that may be a slide's; or None."""
     for entry in entry_points(group="palpate.slides"):
-        found: Identification | None = entry.load()(
-            signals_of(record, frame), frame, arm, tolerance, calibration
-        )
-        if found is not None and (
-            found.parameters["mu"].value is not None or Code.NO_CONTACT.word in press.codes
-        ):
-            return found
+        found: Identification | None = entry.load()(signals_of(record, asked[0]), *asked, press, along)
+        return found
     return None
 
 

@@ -28,6 +28,7 @@ from palpate.contact_frame.signals_in_base import (
     signals_of,
 )
 from palpate.errors import InputError
+from palpate.identification import Identification, Verdict
 from palpate.records import Record
 
 _LEAST = 0.3
@@ -248,3 +249,37 @@ def _about(
         "load_std_N": load.std,
         "line_of_action_off_m": line_misses_tcp(signals, freed.free, freed.inside, frame),
     }
+
+
+def residual_of_press(
+    press: Identification, about: dict[str, Any], time: Array, place: Array, velocity: Array, force: Array
+) -> Array:
+    """The force that a press leaves unexplained [N], shape (n, 3): along the normal by K, depth and speed, else whole.
+
+    Each contact, and free motion, begins from a force of its own. A K that is not identified is fitted here.
+
+    Args:
+        press: its contacts and K.
+        about: its normal and sign, as `project` gives them in `meta`.
+        time: [s], shape (n,).
+        place: of the tip in the base [m], shape (n, 3).
+        velocity: likewise [m/s].
+        force: in the base, of either sign [N], shape (n, 3).
+    """
+    n = np.array(about["normal"])
+    force = force if about["force_sign"] == "action" else -force
+    contact = np.zeros(len(time), int)
+    for i, (start, end) in enumerate(press.contacts):
+        contact[(time >= start) & (time <= end)] = i + 1
+    begins = np.equal.outer(contact, np.unique(contact)).astype(float)
+    depth, speed = (np.where(contact > 0, vectors @ n, 0.0) for vectors in (place, velocity))
+    K, along = press.parameters["K"], force @ n
+    left = force - np.outer(along, n)
+    columns = np.column_stack([begins, speed])
+    if K.verdict is Verdict.IDENTIFIED and K.value is not None:
+        along = along - K.value * depth
+    else:
+        columns = np.column_stack([columns, depth])
+    left -= begins @ np.linalg.lstsq(begins, left, rcond=None)[0]
+    found: Array = left + np.outer(along - columns @ np.linalg.lstsq(columns, along, rcond=None)[0], n)
+    return found

@@ -14,7 +14,7 @@ from palpate.identification.free_motion import FLAT, Drift, FreeMotion, MovingMa
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
 from palpate.identification.steady_press import SteadyPress, Stroke, steady_press, strokes_of
-from palpate.signals.samples import detrend, runs
+from palpate.signals.samples import GAUSSIAN, detrend, runs
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""
@@ -266,7 +266,7 @@ def _clear(force: Array, spans: list[tuple[int, int]], threshold: float, settlin
     if len(free) < _FEWEST:
         return False
     middle = float(np.median(free))
-    return threshold - middle > _CLEAR * 1.4826 * float(np.median(np.abs(free - middle)))
+    return threshold - middle > _CLEAR * GAUSSIAN * float(np.median(np.abs(free - middle)))
 
 
 def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
@@ -339,7 +339,7 @@ def _resting(force: Array, rest: float, peak: float) -> float:
 def _threshold(force: Array, rest: float, peak: float) -> float:
     """Clear of a share of the peak, and of the noise at rest, which what stays below that share tells."""
     free = np.abs(force[force < rest + ONSET * (peak - rest)] - rest)
-    noise = 1.4826 * float(np.median(free)) if len(free) else 0.0
+    noise = GAUSSIAN * float(np.median(free)) if len(free) else 0.0
     return rest + max(ONSET * (peak - rest), 5 * noise)
 
 
@@ -390,7 +390,7 @@ def _between_losses(
     rest, peak = levels
     force, position = sign * channels.force, channels.position
     free = force[air.way * position < air.way * air.limit] - rest
-    noise = 1.4826 * float(np.median(np.abs(free))) if len(free) else 0.0
+    noise = GAUSSIAN * float(np.median(np.abs(free))) if len(free) else 0.0
     delay, found = round(chain.delay / chain.dt), []
     for begin, end in spans:
         slope = (peak - rest) / (float(np.ptp(position[begin:end])) or np.inf)

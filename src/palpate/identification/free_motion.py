@@ -17,7 +17,7 @@ from palpate.identification.least_squares import Noise, noise_of
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
-from palpate.signals.samples import runs
+from palpate.signals.samples import GAUSSIAN, runs
 from palpate.signals.types import NORMAL
 
 Rows = Mask
@@ -266,7 +266,7 @@ def _slope(
     x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
     f = force[at] - _medians(force[at], stay)[stay]
     far = (
-        np.abs(f) > bound * 1.4826 * float(np.median(np.abs(f)))
+        np.abs(f) > bound * GAUSSIAN * float(np.median(np.abs(f)))
         if np.isfinite(bound)
         else np.zeros(len(f), bool)
     )

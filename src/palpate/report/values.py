@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from palpate.report.numbers import as_html, plain, quantity, quantity_between, write_figure, write_page
+from palpate.signals.types import NORMAL
 from palpate.text import in_python, printable
 
 __all__ = ["facts_of", "html", "line", "view_of", "write_figure", "write_page"]
@@ -79,7 +80,7 @@ def _octave(own: Any) -> Facts:
 
 
 def _estimate(estimate: Any) -> Facts:
-    halves = 1.96 * np.sqrt(np.clip(np.diag(estimate.covariance), 0.0, None))
+    halves = NORMAL * np.sqrt(np.clip(np.diag(estimate.covariance), 0.0, None))
     numbers = [
         (name, quantity(float(value), _LETTERS.get(name, "1"), float(half)))
         for name, value, half in zip(estimate.names, estimate.theta, halves, strict=True)
@@ -102,7 +103,7 @@ def _force_loop(loop: Any) -> Facts:
     known = (
         []
         if estimate is None
-        else [("stiffness", quantity(estimate.stiffness, "N/m", 1.96 * estimate.stiffness_std))]
+        else [("stiffness", quantity(estimate.stiffness, "N/m", NORMAL * estimate.stiffness_std))]
     )
     return [("", loop.phase), *known, ("trouble", loop.trouble or "none"), *_gains(loop.gains)]
 

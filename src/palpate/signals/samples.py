@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from palpate._jit import law
 from palpate.arrays import Array, Mask
 
+GAUSSIAN = 1.4826
+"""Standard deviation of Gaussian noise over its median absolute deviation."""
 _LONG_JUMP = 4.0
 """Times the sensor's own resolution from which a step is a jump."""
 _HELD_SHARE = 0.3

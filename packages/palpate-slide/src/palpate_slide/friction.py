@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.arm import ArmDynamics
+from palpate.contact_frame.projecting import residual_of_press
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded
 from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 from palpate.identification.result import LagFound, SlideFound
 from palpate.identification.uncertainty import student
+from palpate.records import Record
 from palpate_slide.from_log import (
     BLOCKS,
     SHAPE,
@@ -22,6 +24,7 @@ from palpate_slide.from_log import (
     SlideWindows,
     course_of,
     freed_of,
+    nearest,
     with_length,
 )
 
@@ -30,15 +33,14 @@ PAYLOAD = 20.0
 BY_CHANCE = 1e-3
 """How probable a dependence on speed may be by chance."""
 LACKS = 0.5
-"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain."""
+"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain: the column of mu in
+`benchmarks/force/sliding_logs.py` measures it."""
 CONTRARY = 0.05
 """Share of the windows in which friction may seem to push, against its noise."""
 ASKEW = np.radians(30.0)
 """Angle between the normal by the force and that of the path's own plane, at most."""
 PART = 2.5
 """Length of a part of a slide for which a stiffness is estimated [s]."""
-FAINT = 0.15
-"""Share of noise in the variance of the force's rate, above which it does not show a stiffness."""
 TANGENTIAL = (2.0 / 3.0 / SHAPE, SHAPE)
 """Tangential over normal stiffness of a contact: 2 (1 - nu)/(2 - nu) (Mindlin 1949), within `SHAPE`."""
 CHI2_95 = 2.4477
@@ -47,27 +49,27 @@ PLACES = 200
 """Places of the path in the answer."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coefficient:
-    """Friction with its interval, all speeds together and by class.
+class Coefficient(NamedTuple):
+    """Friction over the windows, the half-width of its 95 % interval, and by class of speeds.
 
-    Args:
-        value, half: mean over the windows, and half-width of its 95 % interval.
-        low, high: interval that holds it at all speeds.
-        table: speed of a class [m/s], mu and half-width, shape (j, 3); one row if friction does not depend on it.
+    The table's rows are speed [m/s], mu and half-width, shape (j, 3); one if friction does not depend on speed.
     """
 
     value: float
     half: float
-    low: float
-    high: float
     table: Array
 
 
 def slide_in(
-    signals: BaseSignals, frame: ContactFrame, arm: ArmDynamics, tolerance: float, calibration: float
+    signals: BaseSignals,
+    frame: ContactFrame,
+    arm: ArmDynamics,
+    tolerance: float,
+    calibration: float,
+    press: Identification,
+    along: Record,
 ) -> Identification | None:
-    """The identification of a slide; None of a log in which the tip does not slide.
+    """The identification of a slide; None of a press; that of the press without its K, where the log tells neither.
 
     Args:
         signals: wrench and pose over time.
@@ -75,43 +77,121 @@ def slide_in(
         arm: whose own stiffness is taken out of K, if it is known.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
         calibration: relative standard deviation of the scales of force and position together.
+        press: what the log says if it is one of a press.
+        along: the record along the normal of that press.
     """
     freed = freed_of(signals, frame)
     course = None if freed is None else course_of(signals, freed, frame)
+    claims = press.parameters["K"].verdict is Verdict.IDENTIFIED
+    again = freed is not None and course is None and freed.free.any() and claims
+    if again:  # what looks like free motion may be a slide, and its touch friction that begins
+        freed = freed_of(signals, frame, touches=False)
+        course = None if freed is None else course_of(signals, freed, frame)
     if freed is None or course is None:
         return None
     fit = _problem(course, freed, np.zeros(len(course.time), int), frame)
-    found, length, beside = with_length(fit)
+    fitted = fit, *with_length(fit)
+    better = advantage(course, fitted[1], fitted[2], freed, press, along.meta["contact_frame"])
+    certain = student(BLOCKS - 1)
+    if better < (certain if again else -certain):
+        return None
+    found = None
+    if (fitted[1].slips or not course.known) and not again and (better > certain or not claims):
+        found = _identification(signals, frame, arm, (tolerance, calibration), freed, course, fitted)
+    if claims:
+        return found or replace(press, parameters=press.parameters | {"K": _unclear(press.parameters["K"])})
+    mu = None if found is None else found.parameters["mu"]
+    shown = mu is not None and (mu.value is not None or (mu.ci95 is not None and better > certain))
+    return found if shown or Code.NO_CONTACT.word in press.codes else None
+
+
+def _identification(
+    signals: BaseSignals,
+    frame: ContactFrame,
+    arm: ArmDynamics,
+    wide: tuple[float, float],
+    freed: Unloaded,
+    course: SlideWindows,
+    fitted: tuple[Fit, SlideFit, float, Array],
+) -> Identification:
+    """That of a slide, with tolerance and calibration."""
+    fit, found, length, beside = fitted
     share, slips = course.share(length)
     rows = slips if found.slips else np.ones(len(slips), bool)
-    mu = _coefficient(course, freed, frame, (fit, found, length, beside), rows)
-    known = bool(freed.free.any()) or frame.payload is not None
-    if known:
-        K, parts = _stiffness(course, found, beside[:, 0], length, arm, tolerance, calibration)
+    mu = _coefficient(course, freed, frame, fitted, rows)
+    if course.known:
+        K, parts = _stiffness(course, found, beside[:, 0], length, arm, *wide)
     else:
-        K, parts = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_ZERO), np.zeros((0, 5))
+        K, parts = _nothing("N/m", _NO_ZERO), np.zeros((0, 5))
     normal, cone = _normals(course, fit, found, mu, share)
-    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), known, found.slips, tolerance)
-    warnings = () if known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),)
-    lag = LagFound(
-        USUAL_LAG + found.lag,
-        float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1])),
-        0.0,
-        "prior",
-    )
-    inside = np.flatnonzero(freed.inside)
-    start, end = (float(signals.time[i] - signals.time[0]) for i in (inside[0], inside[-1]))
+    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), course.known, wide[0])
+    std = float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1]))
+    inside = signals.time[freed.inside]
     return Identification(
         model="slide",
         parameters={"mu": own, "K": K},
-        contacts=((start, end),),
-        lag=replace(lag, bound=1.96 * lag.std),
+        contacts=((float(inside[0]), float(inside[-1])),),
+        lag=LagFound(USUAL_LAG + found.lag, std, 1.96 * std, "prior"),
         r2=float("nan"),
         rmse=float(np.sqrt(np.mean((found.angle[rows] * course.noise[rows]) ** 2))),
         n=int(rows.sum()),
-        warnings=warnings,
+        warnings=() if course.known else (Warn(Code.CONTACT_AT_START, _NO_ZERO),),
         slide=_answer(course, mu, own, normal, cone, parts, length),
     )
+
+
+def advantage(
+    course: SlideWindows,
+    found: SlideFit,
+    length: float,
+    freed: Unloaded,
+    press: Identification,
+    about: dict[str, Any],
+) -> float:
+    """How much more of the force a press leaves than a slide does, in standard deviations of the difference.
+
+    A press says that the force is a function of the depth along one direction, F = F_0 + n (K d + B d'), with its own
+    n, K and contacts. A slide says that the force goes on while the tip moves across it: |F| = F_0, at the angle of
+    friction to the motion. Each is compared with the force in newtons, in the same rows, where the tip moves across the
+    force and in free motion. Where the zero of the force is unknown, so is its size: a slide says its angle alone.
+    The deviation is that of a sum over parts of the log: Vuong's test (Econometrica 57, 1989), of models of which none
+    holds the other.
+
+    Args:
+        course: of the slide.
+        found: its parameters.
+        length: on which its friction relaxes [m].
+        freed: rows in free motion and in contact by the slide.
+        press: its K counts as it is, if it is identified; otherwise the best one does.
+        about: normal, sign and bias of the press, as `project` gives them.
+    """
+    s = course.smooth
+    free = np.interp(s.time, course.turns[0], freed.free.astype(float)) > 0.999
+    rows = np.flatnonzero(course.slides | free)[:: max(s.rows // 2, 1)]
+    slides = course.slides[rows]
+    F, angle, _ = (values[rows] for values in course.friction_angle(found, length))
+    size = np.linalg.norm(F, axis=1)
+    usual = size[slides].mean() if course.known else size
+    R = course.turns[1][nearest(course.turns[0], s.time[rows])]
+    read = s.force[rows] + freed.load.weight + R @ (freed.load.bias - np.array(about["bias_N"]))
+    by_slide = np.where(slides, (size - usual) ** 2 + (size * angle) ** 2, size**2)
+    by_press = np.sum(
+        residual_of_press(press, about, s.time[rows], s.place[rows], s.velocity[rows], read) ** 2, axis=1
+    )
+    # Both are normal with a variance of their own: the parts' log-likelihoods against each other.
+    one, other = (values / values.mean() for values in (by_press, by_slide))
+    parts = np.array([part.mean() for part in np.array_split(one - other, BLOCKS)])
+    ratio = np.log(by_press.mean() / by_slide.mean())
+    return float(np.sqrt(BLOCKS) * ratio / max(np.std(parts, ddof=1), 1e-300))
+
+
+def _nothing(unit: str, why: str) -> Parameter:
+    return Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, why)
+
+
+def _unclear(K: Parameter) -> Parameter:
+    why = "the tip may slide: force and motion fit a slide as well as a press; give --payload, or press at one place"
+    return replace(K, value=None, std=None, verdict=Verdict.NOT_IDENTIFIABLE, reason=why)
 
 
 _NO_ZERO = (
@@ -123,8 +203,7 @@ _NO_ZERO = (
 def _problem(course: SlideWindows, freed: Unloaded, classes: Array, frame: ContactFrame) -> Fit:
     """The least-squares problem, with what free motion leaves unknown of bias and weight."""
     usual = float(np.median(np.linalg.norm(course.force, axis=1)))
-    known = bool(freed.free.any()) or frame.payload is not None
-    bias = max(freed.load.std, 1e-3) if known else usual
+    bias = max(freed.load.std, 1e-3) if course.known else usual
     weight = freed.load.weight_std if freed.load.separable else PAYLOAD
     turns = float(np.abs(course.turned[1] - np.eye(3)).max()) > 0.02
     std = [
@@ -180,7 +259,7 @@ def _coefficient(
     whole = half(found.mu, np.sqrt(np.diag(found.covariance)[:1]), spread)
     value, wide = float(found.mu[0]), float(whole[0])
     one = np.array([[float(np.median(course.speed[rows])), value, wide]])
-    alike = Coefficient(value, wide, value - wide, value + wide, one)
+    alike = Coefficient(value, wide, one)
     classes = _classes(course.speed, rows)
     j = int(classes.max()) + 1
     if j == 1 or not found.slips:
@@ -201,21 +280,15 @@ def _coefficient(
     mean = float(weight @ by.mu)
     std = float(np.sqrt(weight @ by.covariance[:j, :j] @ weight))
     wide = float(half(np.array([mean]), np.array([std]), spread)[0])
-    return Coefficient(
-        mean, wide, float((by.mu - halves).min()), float((by.mu + halves).max()),
-        np.column_stack([speeds, by.mu, halves]),
-    )  # fmt: skip
+    return Coefficient(mean, wide, np.column_stack([speeds, by.mu, halves]))
 
 
-def _verdict(mu: Coefficient, wrong: str, known: bool, slips: bool, tolerance: float) -> Parameter:
+def _verdict(mu: Coefficient, wrong: str, known: bool, tolerance: float) -> Parameter:
     ends = (max(mu.value - mu.half, 0.0), mu.value + mu.half)
     if not known:
-        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, _NO_ZERO)
-    if not slips:
-        why = "the contact sticks along most of the path: slide farther one way"
-        return Parameter(None, None, None, "1", Verdict.NOT_IDENTIFIABLE, why)
+        return _nothing("1", _NO_ZERO)
     if wrong:
-        return Parameter(None, None, None, "1", Verdict.REJECTED, wrong)
+        return replace(_nothing("1", wrong), verdict=Verdict.REJECTED)
     speeds = "" if len(mu.table) == 1 else ", the mean; it depends on the speed"
     why = f"95 %: {ends[0]:.3g} to {ends[1]:.3g}{speeds}"
     good = mu.half <= tolerance * mu.value
@@ -279,7 +352,7 @@ def _stiffness(
     d|F|/dt cos(atan mu)/K, each side seen through the same window. A lag of the force adds the rate of that. The
     length of relaxation counts, as friction lags a force that changes.
     """
-    none = Parameter(None, None, None, "N/m", Verdict.NOT_IDENTIFIABLE, _NO_DITHER)
+    none = _nothing("N/m", _NO_DITHER)
     places: Array = np.zeros((0, 5))
     main = _dips(course, found, length)
     whole = _ratio(main, BLOCKS) if len(main.dip) >= 4 * BLOCKS else None
@@ -292,7 +365,8 @@ def _stiffness(
     spread = max(float("inf") if one is None else abs(one[0] / whole[0] - 1.0) for one in others)
     rows = []
     for i in np.unique(main.part):
-        own = main.of(main.part == i)
+        at = main.part == i
+        own = Dips(main.dip[at], main.columns[at], main.part[at], main.place[at], main.noise)
         one = _ratio(own, 8) if len(own.dip) > 32 else None
         if one is not None:
             K, half = _surface(one[0], float(np.hypot(one[1], spread * one[0])), arm, calibration)
@@ -307,16 +381,11 @@ def _stiffness(
     return Parameter(K, half / 1.96, (K - half, K + half), "N/m", Verdict.IDENTIFIED, why), places
 
 
-@dataclass(frozen=True, eq=False)
-class Dips:
-    """How fast the tip dips, and the rate of the force.
+class Dips(NamedTuple):
+    """How fast the tip dips, |v| (psi - atan mu c) [m/s], shape (n,), and the rate of the force.
 
-    Args:
-        dip: |v| (psi - atan mu c) [m/s], shape (n,).
-        columns: |v|, rate of the normal force [N/s], and its rate, shape (n, 3).
-        part: of the slide, shape (n,).
-        place: [m], shape (n, 3).
-        noise: variance of the rate by the sensor's noise [N^2/s^2].
+    The columns are |v|, rate of the normal force [N/s], and its rate, shape (n, 3); then parts of the slide, shape
+    (n,), places [m], shape (n, 3), and the variance of the rate by the sensor's noise [N^2/s^2].
     """
 
     dip: Array
@@ -325,25 +394,17 @@ class Dips:
     place: Array
     noise: float
 
-    def of(self, rows: Mask) -> Dips:
-        """Those of some rows."""
-        return Dips(self.dip[rows], self.columns[rows], self.part[rows], self.place[rows], self.noise)
-
 
 def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
     """The dips of a slide whose friction relaxes on a length [m]."""
     s = course.smooth
     speed = np.linalg.norm(s.velocity, axis=1)
     mu = float(found.mu[0])
-    share, slips = course.shares(length)
-    F = course.sign * s.force - _load_along(course, found)
-    along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(speed, 1e-12)
+    F, left, slips = course.friction_angle(found, length)
     size = np.linalg.norm(F, axis=1)
-    psi = np.arctan2(along, np.sqrt(np.maximum(size**2 - along**2, 1e-12)))
-    model = np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
     u = np.linspace(-1.0, 1.0, s.longer + 2)[1:-1]
     kernel = (1.0 - u**2) / np.sum(1.0 - u**2)  # least squares' slope is the rate seen through it
-    dip = np.convolve(np.where(slips, speed * (psi - model), 0.0), kernel, "same")
+    dip = np.convolve(np.where(slips, speed * left, 0.0), kernel, "same")
     carried = np.convolve(np.where(slips, speed, 0.0), kernel, "same")
     rate = np.einsum("ij,ij->i", F, course.sign * s.rate) / np.maximum(size, 1e-9) / np.sqrt(1.0 + mu**2)
     whole = np.convolve(slips, np.ones(s.longer), "same") > s.longer - 0.5
@@ -359,16 +420,6 @@ _NO_DITHER = (
 )
 
 
-def _load_along(course: SlideWindows, found: SlideFit) -> Array:
-    """Rest of bias and weight, on the grid, shape (n, 3)."""
-    s, b = course.smooth, found.load
-    turned = course.rotations_of(s.time)
-    off: Array = np.einsum("nij,j->ni", turned, b[:3])
-    if len(b) > 3:
-        off = off + b[3:] - turned @ course.rest.T @ b[3:]
-    return off
-
-
 def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:
     """1/slope of a dip over a rate, and the half-width of its interval [N/m]; None where noise makes the rate.
 
@@ -381,7 +432,7 @@ def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:
     rest = own[:, :-2]
     rate = columns[:, 1] - rest @ np.linalg.lstsq(rest, columns[:, 1], rcond=None)[0]
     faint = noise / max(float(np.mean(rate**2)), 1e-300)
-    if faint > FAINT:
+    if faint >= 1.0:
         return None
     theta = np.linalg.lstsq(own, dip, rcond=None)[0]
     split = np.array_split(np.arange(len(dip)), blocks)
@@ -423,7 +474,9 @@ def _answer(
     mean /= np.linalg.norm(mean)
     turns = float(np.degrees(np.arccos(np.clip(normal @ mean, -1.0, 1.0)).max()))
     wide = float(np.degrees(np.median(cone)))
-    if own.value is None:
+    if own.value is None and own.ci95 is not None:
+        first = f"The tip slides: mu is at most {own.ci95[1]:.3g}."
+    elif own.value is None:
         why = own.reason if own.reason.endswith("?") else f"{own.reason}."
         first = f"The tip slides, but the log does not give its friction: {why}"
     elif len(mu.table) > 1:

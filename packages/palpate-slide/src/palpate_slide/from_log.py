@@ -30,7 +30,8 @@ BLOCKS = 24
 LENGTHS = 3e-5 * 2.2 ** np.arange(9)
 """Of relaxation, that are tried first [m]."""
 SHAPE = 1.5
-"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's."""
+"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's. The column of K of slides
+in `benchmarks/force/sliding_logs.py` measures it."""
 CHORD, GRAINS = 3e-4, 40.0
 """Path in a window: at least so long [m], and so many deviations of the position's noise."""
 MOVES = 0.1
@@ -38,7 +39,7 @@ MOVES = 0.1
 RATE = 0.15
 """Window of the force's rate [s]: a dither is a hertz or two."""
 SLIDES = 0.6
-"""Sine of the angle between force and motion: above it the tip slides, below it presses."""
+"""Sine of the angle between force and motion, above which the tip may slide: the friction of 4/3 leans so far."""
 SHORTEST = 2e-3
 """Slide that is one [m]."""
 MOST = 1500
@@ -56,7 +57,7 @@ class Smooth:
         rows, longer: in a window, and in one of a rate.
         time: [s], shape (n,).
         place, velocity: [m], [m/s], shape (n, 3).
-        force, rate, bend: in the base without the load, as the sensor shows it [N]; its derivatives in the tool's axes,
+        force, rate: in the base without the load, as the sensor shows it [N]; its derivative in the tool's axes,
             turned into the base's, since a sensor is late in its own axes; shape (n, 3).
         grain, noise: standard deviation of a reading of the position [m] and of the force [N], of an axis.
         inside: rows in contact, shape (n,).
@@ -70,7 +71,6 @@ class Smooth:
     velocity: Array
     force: Array
     rate: Array
-    bend: Array
     grain: float
     noise: float
     inside: Mask
@@ -106,15 +106,15 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
         return found
 
     longer = max(rows, round(RATE / step) // 2 * 2 + 1)
-    rate, bend = (savgol_filter(force, longer, 2, deriv=k, delta=step, axis=0) for k in (1, 2))
-    at = signals.rotations[_nearest(time, grid)]
-    level, rate, bend = (np.einsum("nij,nj->ni", at, values) for values in (of(force, 0), rate, bend))
+    rate = savgol_filter(force, longer, 2, deriv=1, delta=step, axis=0)
+    at = signals.rotations[nearest(time, grid)]
+    level, rate = (np.einsum("nij,nj->ni", at, values) for values in (of(force, 0), rate))
     level -= freed.load.weight
     edge = np.convolve(inside, np.ones(rows), "same") > rows - 0.5
-    return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, bend, grain, noise, edge)
+    return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, grain, noise, edge)
 
 
-def _nearest(time: Array, at: Array) -> NDArray[np.intp]:
+def nearest(time: Array, at: Array) -> NDArray[np.intp]:
     """Rows that are nearest to some times, shape (n,)."""
     later = np.searchsorted(time, at).clip(1, len(time) - 1)
     found: NDArray[np.intp] = later - (at - time[later - 1] < time[later] - at)
@@ -122,12 +122,13 @@ def _nearest(time: Array, at: Array) -> NDArray[np.intp]:
 
 
 QUIET = 0.1
-"""Share of the contact's force within which a force in free motion stays."""
-ALONG = 0.7
-"""Cosine of the angle between the approach and the force after it, at least: a slide has less, or rests."""
+"""Share of the contact's force within which free motion stays; `benchmarks/force/sliding_logs.py` measures it
+by its rows with and without free motion."""
+ALONG = np.sqrt(0.5)
+"""Cosine of the angle between the approach and the force after it, at least: rather along it than across."""
 
 
-def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
+def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) -> Unloaded | None:
     """Rows in free motion and in contact of a slide, and the load by the first; None if the force is always alike.
 
     A slide's force does not follow the position, so that a press' contact detection does not see it. Here free motion
@@ -147,49 +148,44 @@ def freed_of(signals: BaseSignals, frame: ContactFrame) -> Unloaded | None:
     place = signals.place[there][n // 2 :][: len(mean)]
     rotations = signals.rotations[there][n // 2 :][: len(mean)]
     free = np.zeros(len(mean), bool)
-    for turned in (1, -1):
+    brief = max(round(0.2 / step), n)
+    for turned in (1, -1) if touches else ():
         own, at, R = mean[::turned], place[::turned], rotations[::turned]
-        level = np.median(own[: max(round(0.2 / step), 10)], axis=0)
+        level = np.median(own[:brief], axis=0)
         far = np.linalg.norm(own - level, axis=1)
-        limit = max(QUIET * float(np.quantile(far, 0.9)), chance)
-        left = np.flatnonzero(far > limit)
-        end = int(left[0]) if len(left) else 0
-        quiet = max(chance, 3.0 * float(np.median(far[: max(round(0.2 / step), 10)])))
+        usual = float(np.quantile(far, 0.9))
+        met = end = int(np.argmax(far > 0.5 * usual))
+        quiet = max(chance, min(3.0 * float(np.median(far[:brief])), QUIET * usual))
         while end and far[end] > quiet:
             end -= 1
-        if end * step < 0.2 or end < FEWEST:
+        if end < max(brief, FEWEST):
             continue
         after = R[end] @ (np.median(own[end : end + max(round(0.5 / step), n)], axis=0) - level)
-        came = at[end] - at[max(end - max(round(0.2 / step), n), 0)]
-        size = float(np.linalg.norm(came) * np.linalg.norm(after))
-        # A tip that rests in contact and then slides feels friction along its way at once, within its length.
-        moved = float(np.linalg.norm(at[: end + 1] - at[end], axis=1).max()) > SHORTEST
-        if not moved or abs(came @ after) < ALONG * size:
-            continue
-        free[::turned] |= np.arange(len(own)) < end - n
+        came, went = at[end] - at[end - brief], at[min(met + brief, len(at) - 1)] - at[met]
+        along = abs(came @ after) > ALONG * float(np.linalg.norm(came) * np.linalg.norm(after))
+        # The force comes on a shorter way than it stayed away on, and the tip does not turn back, as friction would.
+        away = float(np.linalg.norm(at[: end + 1] - at[end], axis=1).max())
+        if (
+            along
+            and away > max(SHORTEST, float(np.linalg.norm(at[met] - at[end])))
+            and came @ went > -0.5 * (came @ came)
+        ):
+            free[::turned] |= np.arange(len(own)) < end - n
     rows = np.flatnonzero(there)[n // 2 :][: len(mean)]
     whole = np.zeros(len(time), bool)
     whole[rows[free]] = True
-    if whole.sum() >= FEWEST:
-        read, at_rest = raw[whole], signals.rotations[whole]
-        weighs = not frame.gravity_compensated
-        load = (
-            load_of(read, at_rest, weighs=weighs)
-            if frame.payload is None
-            else known_load(read, at_rest, frame.payload)
-        )
+    whole &= whole.sum() >= FEWEST
+    read, at_rest = raw[whole], signals.rotations[whole]
+    if frame.payload is not None:
+        load = known_load(read, at_rest, frame.payload)
     else:
-        whole &= False
-        load = (
-            no_load()
-            if frame.payload is None
-            else known_load(raw[whole], signals.rotations[whole], frame.payload)
-        )
+        load = load_of(read, at_rest, weighs=not frame.gravity_compensated) if whole.any() else no_load()
     force = load.taken_off(raw, signals.rotations)
     size = np.linalg.norm(load.taken_off(mean, rotations), axis=1)
     usual = float(np.median(size[~free])) if (~free).any() else 0.0
     inside = np.zeros(len(time), bool)
-    inside[rows[~free & (size > 0.3 * usual)]] = True
+    known = whole.any() or frame.payload is not None
+    inside[rows[~free & ((size > 0.3 * usual) | (not known))]] = True
     return Unloaded(force, there, inside, whole, load)
 
 
@@ -209,10 +205,11 @@ class SlideWindows:
     Args:
         time, speed: [s], [m/s], shape (m,).
         place, way: [m], direction of the motion, shape (m, 3).
-        force, rate, bend: as of `Smooth`, from the tip on the surface, shape (m, 3).
+        force, rate: as of `Smooth`, from the tip on the surface, shape (m, 3).
         turned: rotation of the tool, and that against the middle of the free rows, shape (m, 3, 3).
         rows: of the smooth signals.
-        smooth, moves: whence the windows are, and where the tip moves on.
+        smooth, moves, slides: whence the windows are, and where the tip moves on, and across the force.
+        known: whether the zero of the force is, by free motion or a payload file.
         turns, rest: times and rotations of the log's rows, and the tool's rotation in free motion.
         sign: of the sensor's reading against the force on the surface.
         noise: standard deviation of psi times the force [N], shape (m,).
@@ -225,11 +222,12 @@ class SlideWindows:
     way: Array
     force: Array
     rate: Array
-    bend: Array
     turned: tuple[Array, Array]
     rows: NDArray[np.intp]
     smooth: Smooth
     moves: Mask
+    slides: Mask
+    known: bool
     turns: tuple[Array, Array]
     rest: Array
     sign: float
@@ -249,9 +247,18 @@ class SlideWindows:
         found, slips = self.shares(length)
         return found[self.rows], slips[self.rows]
 
-    def rotations_of(self, time: Array) -> Array:
-        """Rotations of the tool at times, shape (n, 3, 3)."""
-        return self.turns[1][_nearest(self.turns[0], time)]
+    def friction_angle(self, found: SlideFit, length: float) -> tuple[Array, Array, Mask]:
+        """On the grid: force on the surface [N], shape (n, 3); residual of psi but for the spring [rad]; slip."""
+        s, b = self.smooth, found.load
+        turned = self.turns[1][nearest(self.turns[0], s.time)]
+        F = self.sign * s.force - np.einsum("nij,j->ni", turned, b[:3])
+        if len(b) > 3:
+            F -= b[3:] - turned @ self.rest.T @ b[3:]
+        along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(np.linalg.norm(s.velocity, axis=1), 1e-12)
+        psi = np.arctan2(along, np.sqrt(np.maximum(np.einsum("ij,ij->i", F, F) - along**2, 1e-12)))
+        share, slips = self.shares(length)
+        mu = float(found.mu[0])
+        return F, psi - np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1])), slips
 
 
 def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> SlideWindows | None:
@@ -272,19 +279,20 @@ def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Sli
     work = float(np.einsum("ij,ij->", s.force[moves], s.velocity[moves]))
     sign = {"action": 1.0, "reaction": -1.0, None: 1.0 if work >= 0.0 else -1.0}[frame.force_sign]
     across = np.linalg.norm(np.cross(s.force, way), axis=1)
-    slides = moves & (across > SLIDES * size)
+    known = bool(freed.free.any()) or frame.payload is not None
+    slides = moves & ((across > SLIDES * size) | (not known))
     path = float(speed[slides].sum() * s.step)
     if path < SHORTEST or path < 0.5 * float(speed[moves].sum() * s.step):
         return None
     rows = np.flatnonzero(slides)
     rows = rows[:: max(s.rows // 2, len(rows) // MOST, 1)]
-    rotations = signals.rotations[_nearest(signals.time, s.time[rows])]
+    rotations = signals.rotations[nearest(signals.time, s.time[rows])]
     rest = signals.rotations[freed.free].mean(axis=0) if freed.free.any() else rotations.mean(axis=0)
     force = s.noise * np.sqrt(2.25 / s.rows)
     noise = np.hypot(force, size[rows] * blur / speed[rows])
     return SlideWindows(
         s.time[rows], speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
-        sign * s.bend[rows], (rotations, rotations @ rest.T), rows, s, moves,
+         (rotations, rotations @ rest.T), rows, s, moves, slides, known,
         (signals.time, signals.rotations), rest, sign, noise, path,
     )  # fmt: skip
 
@@ -365,7 +373,7 @@ class Fit:
         along = np.einsum("ij,ij->i", F, c.way)
         size = np.linalg.norm(F, axis=1)
         level = np.sqrt(np.maximum(size**2 - along**2, 1e-12))
-        rate = np.einsum("ij,ij->i", F, c.rate + lag * c.bend) / np.maximum(size, 1e-9)
+        rate = np.einsum("ij,ij->i", F, c.rate) / np.maximum(size, 1e-9)
         return np.arctan2(along, level), rate / c.speed, F
 
     def residuals(self, x: Array, share: Array) -> Array:

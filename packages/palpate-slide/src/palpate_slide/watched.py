@@ -15,13 +15,7 @@ from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.sliding_loop import Z_95
 from palpate_live.pressing import WatchedArm
 from palpate_live.stability import OfArm
-from palpate_live.view import (
-    AT,
-    LONGEST,
-    OVER,
-    Happened,
-    Slider,
-)
+from palpate_live.view import AT, LONGEST, OVER, Happened, Slider
 from palpate_live.view import COLUMNS as SHOWN
 from palpate_slide.ground import Ground
 from palpate_slide.jointed_arm import HeldTip, JointedArm, JointedSlide

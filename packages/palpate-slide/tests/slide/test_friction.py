@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from oracles.wiped_surface import Wipe, WipeLog, any_wipe, wipe
+from oracles.wiped_surface import Wipe, WipeLog, any_press, any_wipe, press, wipe
 from palpate.cli import main
 from palpate.contact_frame import ContactFrame, identify_contact
 from palpate.identification import Identification, Verdict
@@ -26,6 +26,15 @@ def found_in(log: WipeLog, **frame) -> Identification:
     )[0]
 
 
+def cone_held(found: Identification, log: WipeLog) -> float:
+    """Share of the path whose cone holds the normal."""
+    places = found.slide.values["places"]
+    at = np.array([[p[axis] for axis in "xyz"] for p in places])
+    true = log.normal[log.inside][cKDTree(log.place[log.inside]).query(at)[1]]
+    off = np.arccos(np.clip(np.einsum("ij,ij->i", [p["normal"] for p in places], true), -1.0, 1.0))
+    return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
+
+
 @pytest.mark.parametrize("action", [True, False])
 def test_friction_and_sign_are_those_of_the_world(action):
     log = wipe(replace(WORLD, action=action))
@@ -36,6 +45,7 @@ def test_friction_and_sign_are_those_of_the_world(action):
     assert mu.ci95[1] - mu.ci95[0] < 0.04
     normal = log.normal[log.inside].mean(0)
     assert normal / np.linalg.norm(normal) @ found.slide.values["normal"]["mean"] > np.cos(np.radians(2.0))
+    assert cone_held(found, log) >= 0.95  # cones of half the width hold 92 and 94 %
 
 
 def test_a_speed_on_which_friction_depends_is_a_table():
@@ -62,6 +72,30 @@ def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
     found = found_in(wipe(any_wipe(215, free=1.5)))  # one length gives 42 % too much, known to 10 %
     assert found.parameters["mu"].verdict is Verdict.IDENTIFIED
     assert found.parameters["K"].verdict is Verdict.NOT_IDENTIFIABLE
+
+
+@pytest.mark.parametrize(
+    "seed", [12118, 12132]
+)  # of a bowl and a plane: a press would have K at 259 and 3054 N/m
+def test_a_slide_without_free_motion_is_no_press_with_a_stiffness(seed):
+    found = found_in(wipe(any_wipe(seed, free=0.0)))
+    assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
+
+
+@pytest.mark.parametrize(
+    "seed", [102, 103]
+)  # askew by 53 degrees on what relaxes, and by a hand that wanders
+def test_a_press_that_moves_along_the_surface_is_no_slide(seed):
+    found = found_in(press(any_press(seed)))
+    assert found.slide is None
+    assert found.parameters["K"].verdict is Verdict.IDENTIFIED
+
+
+def test_a_lubricated_surface_has_no_friction_that_is_said():
+    found = found_in(wipe(any_wipe(15010, free=1.5, mu=0.0, stribeck=0.0)))
+    low, high = found.parameters["mu"].ci95
+    assert low == 0.0 < high < 0.02
+    assert found.slide.sentence.startswith("The tip slides: mu is at most")
 
 
 def test_a_press_is_no_slide():
@@ -99,15 +133,6 @@ def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatc
     assert answer["parameters"]["mu"]["verdict"] == "identified"
     assert {"friction", "by_speed", "normal", "places", "stiffness"} <= set(answer["slide"])
     assert "The tip slides" in (tmp_path / "page.html").read_text()
-
-
-def cone_held(found: Identification, log: WipeLog) -> float:
-    """Share of the path whose cone holds the normal."""
-    places = found.slide.values["places"]
-    at = np.array([[p[axis] for axis in "xyz"] for p in places])
-    true = log.normal[log.inside][cKDTree(log.place[log.inside]).query(at)[1]]
-    off = np.arccos(np.clip(np.einsum("ij,ij->i", [p["normal"] for p in places], true), -1.0, 1.0))
-    return float(np.mean(np.degrees(off) < [p["cone95_deg"] for p in places]))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array
 from palpate.identification.filters.sensor_path import PositionNoise
 from palpate.signals.low_pass import LowPass
-from palpate.signals.samples import convolve
+from palpate.signals.samples import GAUSSIAN, convolve
 
 ORDER = 5
 _LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
@@ -199,7 +199,7 @@ def white_noise(signal: Array) -> float:
     if not len(differences):
         return 0.0
     gain = float(np.sqrt(12870))  # root of the sum of the squared weights of an eighth difference
-    return float(1.4826 * np.median(np.abs(differences)) / gain)
+    return float(GAUSSIAN * np.median(np.abs(differences)) / gain)
 
 
 def block_means(signal: Array, size: int) -> Array:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.state_variable import ORDER
 from palpate.identification.result import Identification, Traces
+from palpate.signals.samples import GAUSSIAN
 
 _SHORTEST = 16
 """Rows of a stretch: with fewer, a Hann window leaves less than an octave between its own width and Nyquist's."""
@@ -168,7 +169,7 @@ def over_noise(found: Identification, traces: Traces) -> float | None:
     quiet = traces.force[_free(found, traces)]
     if len(quiet) < _FEWEST_TESTED:
         return None
-    noise = 1.4826 * float(np.median(np.abs(quiet - np.median(quiet))))
+    noise = GAUSSIAN * float(np.median(np.abs(quiet - np.median(quiet))))
     return found.rmse / noise if noise > 0 else None
 
 

@@ -292,12 +292,17 @@ def behind_the_arm(found: Identification) -> bool:
 
 
 def by_the_model(found: Identification) -> bool:
-    """Whether a model of one constant stiffness knows it, and the working point does not."""
+    """Whether a model of one constant stiffness knows it, and the working point does not, or by the lag's prior alone.
+
+    A lag moves the storage of an octave with its frequency; the model's K rests on the slowest motion as well.
+    """
     K, point = found.parameters.get("K"), found.working_point
     constant = found.model in ("kelvin-voigt", "kelvin-voigt-mass")
     if K is None or point is None or not constant or K.verdict is not Verdict.IDENTIFIED:
         return False
-    return point.stiffness.verdict is not Verdict.IDENTIFIED
+    own = point.stiffness
+    late = point.source == "octave" and next(iter(own.budget), "") == "lag" != next(iter(K.budget), "")
+    return own.verdict is not Verdict.IDENTIFIED or (late and (K.std or 0.0) < (own.std or 0.0))
 
 
 def no_contact_in(log: str, found: Identification) -> str:

@@ -10,6 +10,7 @@ from palpate.report.answer import Card
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import CommandAnswer, Table
+from palpate.signals.types import NORMAL
 from palpate.text import printable
 
 
@@ -211,7 +212,7 @@ def thesis_table(summary: dict[str, Any]) -> Table:
             label,
             plain(found["thesis"][name]),
             plain(found["raw"][name]),
-            with_half(found["matched"][name], 1.96 * found["matched_std"][name]),
+            with_half(found["matched"][name], NORMAL * found["matched_std"][name]),
             *([] if own is None else [_own(own[name], found["identifier_std"][name])]),
             plain(ratio.get(name)),
             plain(truth[name]["value"]) if name in truth else NONE,
@@ -231,4 +232,4 @@ def _own(value: float | None, std: float | None) -> str:
     """Estimates of the experiment's own identifier."""
     if value is None or std is None:
         return plain(value)
-    return with_half(value, 1.96 * std)
+    return with_half(value, NORMAL * std)
