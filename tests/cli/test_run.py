@@ -331,7 +331,7 @@ def test_a_full_disk_leaves_nothing(mine, done, capsys, monkeypatch):
         path.write_bytes(b"half a rec")
         raise OSError(28, "No space left on device", str(path))
 
-    monkeypatch.setattr(palpate.logs, "write_record", full)
+    monkeypatch.setattr("palpate.logs.tables.parquet.write_record", full)
     assert "No space left" in refused(capsys, "mine.toml", "--out", "results")
     nothing_but(mine.parent, "mine.toml")
 

@@ -8,7 +8,7 @@ from bench.quick import quick
 from palpate.bench import build, summarise
 from palpate.identification import identify
 from palpate.records import Record
-from palpate.report.run.page import Content, run_page
+from palpate.report.run.page import run_page
 from palpate.report.run.table import notes, tables
 
 
@@ -59,8 +59,8 @@ def test_the_page_says_whether_the_truth_is_in_the_interval_at_either_end(record
     two_rows = Record({name: c[:2] for name, c in record.columns.items()}, record.units, record.meta)
     for known, place in ((5200.0, "inside"), (5189.0, "outside"), (5211.0, "outside")):
         truth = {"K": {"value": known, "unit": "N/m"}}
-        told = {**summary, "truth": truth, "command": "palpate run", "seed": 0}
-        text = run_page(two_rows, Content("a run", "", "", told, found, "", "0" * 64))
+        told = {**summary, "truth": truth, "command": "palpate run", "seed": 0, "not_identified": ""}
+        text = run_page(two_rows, told, found, "", "0" * 64)
         assert text.count(f"{place} the interval") == 1
         assert "side the interval" not in text.replace(f"{place} the interval", "")
 

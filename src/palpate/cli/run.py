@@ -146,7 +146,6 @@ def _draw(
     drawn: FigureOptions,
 ) -> None:
     """Figures, page and film of a run."""
-    about = record.meta["experiment"]
     if "loop" in record.meta:
         from palpate.report.run.figures import write_one_direction
 
@@ -154,12 +153,11 @@ def _draw(
         return
     from palpate.report.identification.words import sha256_of
     from palpate.report.run.figures import draw
-    from palpate.report.run.page import Content, run_page
+    from palpate.report.run.page import run_page
 
     draw(record, folder, drawn.endings, drawn.dpi)
-    sha256, why = sha256_of(folder / RECORD), summary["not_identified"]
-    content = Content(about["title"], about["about"], source, summary, found, why, sha256)
-    write_text(folder / "report.html", run_page(record, content))
+    page = run_page(record, summary, found, source, sha256_of(folder / RECORD))
+    write_text(folder / "report.html", page)
     if len(record) > 1:
         from palpate.report.run.film import film
 

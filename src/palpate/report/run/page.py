@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from palpate.bench.summary import CONTACT
@@ -33,106 +33,80 @@ _PACKAGE = "palpate.report.run"
 _STILL = ("force", "identification")
 
 
-@dataclass(frozen=True)
-class Content:
-    """Content of the page.
+def run_page(
+    record: Record, summary: dict[str, Any], found: Identification | None, source: str, sha256: str
+) -> str:
+    """The page as HTML.
 
     Args:
-        title, about: of the experiment.
-        source: its file.
+        record: of the run.
         summary: as `summary.json` has it.
         found: what `palpate identify` says of the record; None where it says nothing.
-        why: why not.
+        source: the experiment's file.
         sha256: of `record.parquet`.
     """
-
-    title: str
-    about: str
-    source: str
-    summary: dict[str, Any]
-    found: Identification | None
-    why: str
-    sha256: str
-
-
-def run_page(record: Record, content: Content) -> str:
-    """The page as HTML."""
-    summary = content.summary
-    contact = summary["force"] is not None
-    worth = len(record) > 2
+    contact, worth, experiment = summary["force"] is not None, len(record) > 2, record.meta["experiment"]
+    why = printable(summary["not_identified"])
     return render(
         "run.html",
         _PACKAGE,
         room="run",
-        title=printable(content.title),
-        about=printable(content.about),
+        title=printable(experiment["title"]),
+        about=printable(experiment["about"]),
         sentence=sentence(summary),
         alerts=alerts(summary),
-        cards=_cards(content),
-        surface=_surface(content),
-        identified_by=_identified_by(content),
+        cards=[asdict(card) for card in (*force_cards(summary), _stiffness(found, why))] if contact else [],
+        surface=[] if found is None else _surface(found, summary["truth"]),
+        identified_by=_identified_by(found, why),
         thesis=thesis_table(summary) if contact else None,
         motors=motors(summary),
         facts=force_rows(summary) if contact else [],
-        source=content.source,
+        source=source,
         charts=data(_shown(record)) if worth else "",
         pictures=_pictures(record) if worth else [],
         scripts=(*scripts(*CHARTS, *ARM, *TABLES), text_of("run.js", _PACKAGE))
         if worth
         else scripts(*TABLES),
         command=summary["command"],
-        origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {content.sha256}")],
+        origin=[("seed", str(summary["seed"])), ("record.parquet", f"sha256 {sha256}")],
     )
 
 
-def _cards(content: Content) -> list[dict[str, str]]:
-    if content.summary["force"] is None:
-        return []
-    return [*(asdict(card) for card in force_cards(content.summary)), _stiffness(content)]
-
-
-def _card(name: str, number: str, unit: str = "", **more: str) -> dict[str, str]:
-    return asdict(Card(name, number, unit, **more))
-
-
-def _stiffness(content: Content) -> dict[str, str]:
+def _stiffness(found: Identification | None, why: str) -> Card:
     """By `palpate identify`: at the working point, or else of the model."""
-    if content.found is None:
-        return _card("Stiffness", "", why=content.why, colour="K", tone="none", verdict="not identified")
-    point = content.found.working_point
-    own = content.found.parameters.get("K") or (point.stiffness if point else None)
+    if found is None:
+        return Card("Stiffness", why=why, colour="K", tone="none", verdict="not identified")
+    point = found.working_point
+    own = found.parameters.get("K") or (point.stiffness if point else None)
     if own is None:
-        return _card("Stiffness", "", why="nothing is touched", colour="K", tone="none", verdict="")
+        return Card("Stiffness", why="nothing is touched", colour="K", tone="none")
     number = split(own)
-    known = own.value is not None
-    return _card(
+    text, reason = number["text"] if own.value is not None else "", printable(own.reason)
+    return Card(
         "Stiffness",
-        number["text"] if known else "",
+        text,
         number["unit"],
-        half=number["half"],
-        why=printable(own.reason),
-        colour="K wide",
-        tone=TONES[own.verdict],
-        verdict=str(own.verdict),
+        number["half"],
+        reason,
+        TONES[own.verdict],
+        str(own.verdict),
+        "K wide",
     )
 
 
-def _identified_by(content: Content) -> str:
-    if content.found is None:
-        return f"palpate identify gives no answer for this record: {printable(content.why)}."
+def _identified_by(found: Identification | None, why: str) -> str:
+    if found is None:
+        return f"palpate identify gives no answer for this record: {why}."
     return (
-        f"By palpate identify of record.parquet, as the model {content.found.model}; on the bench the truth is known. "
+        f"By palpate identify of record.parquet, as the model {found.model}; on the bench the truth is known. "
         "The charts are of an estimator on line, which assumes a spring, a damper and a mass."
     )
 
 
-def _surface(content: Content) -> list[dict[str, str]]:
+def _surface(found: Identification, truth: dict[str, Any]) -> list[dict[str, str]]:
     """Identified parameters beside the truth."""
-    if content.found is None:
-        return []
-    truth = content.summary["truth"]
     rows = []
-    for name, p in content.found.parameters.items():
+    for name, p in found.parameters.items():
         known = truth.get(name, {}).get("value")
         off = "–"
         if known is not None and p.value is not None and p.ci95 is not None:
