@@ -87,14 +87,26 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
         return ()
     steady = [_steady(x, a, b, least) for a, b in pairwise(_turns(x, _STROKE * reach))]
     ends = [own for own in steady if own is not None]
-    whole, made = np.diff(x[_turns(x, least)]), np.array([x[b] - x[a] for a, b in ends])
-    if not any(
-        0 < _SHARE * way[way > 0].sum() <= own[own > 0].sum() for way, own in ((whole, made), (-whole, -made))
-    ):
+    legs, whole = np.diff(x[_turns(x, _STROKE * reach)]), np.diff(x[_turns(x, least)])
+    made = np.array([x[b] - x[a] for a, b in ends])
+    if not any(_goes_in_strokes(sign * made, sign * legs, sign * whole) for sign in (1, -1)):
         return ()
     dt = size * channels.dt
     start = channels.start + (size - 1) / 2 * channels.dt
     return tuple(Stroke(start + a * dt, start + b * dt, 1 if x[b] > x[a] else -1) for a, b in ends)
+
+
+def _goes_in_strokes(made: Array, legs: Array, whole: Array) -> bool:
+    """Whether a motion goes one way in strokes, comes back at any speed, and does little else.
+
+    Args:
+        made: ways of the strokes, (n,) [m].
+        legs: ways between large turns, at any speed, (m,) [m].
+        whole: ways between all turns above the noise, (k,) [m].
+    """
+    strokes = float(made[made > 0].sum())
+    there, back = float(whole[whole > 0].sum()), float(-legs[legs < 0].sum())
+    return 0 < _SHARE * there <= strokes and strokes + back >= _SHARE * float(np.abs(whole).sum())
 
 
 def _turns(x: Array, least: float) -> list[int]:

@@ -30,7 +30,7 @@ _SHORT = 8
 
 
 def line(value: Any) -> str:
-    """One line: `<Parameter: 5242 ± 62 N/m, identified>`."""
+    """One line: `<Parameter: 5238 ± 50 N/m, identified>`."""
     told = ", ".join(f"{name} {text}" if name else text for name, text in facts_of(value) if name != "why")
     return in_python(printable(f"<{type(value).__name__}: {told}>"))
 
