@@ -125,7 +125,14 @@ def test_the_contract_of_json(log, capsys):
     assert found["options"]["position"] == "position_mm:mm"
     assert set(found["fit"]) == {"r2", "rmse_N", "n"}
     assert set(found["lag_s"]) == {"value", "std", "bound", "kind"}
-    assert set(found["working_point"]) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source"}
+    assert set(found["working_point"]) == {
+        "stiffness",
+        "force_N",
+        "depth_m",
+        "frequency_Hz",
+        "source",
+        "each",
+    }
     assert set(found["working_point"]["stiffness"]) == FIELDS | {"prediction95"}
     assert set(found["dynamic_stiffness"][0]) == {
         "Hz",
@@ -152,7 +159,7 @@ def test_the_sentence_the_table_and_the_figure(log, capsys):
     assert "figure: press.identify.png" in printed
     picture = log.parent / "press.identify.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert re.match(r"\d+ ± \d+ N/m stiffness ✓ identified press.csv at ", printed)
+    assert re.match(r"\d+ ± \d+ N/m stiffness by the model kelvin-voigt ✓ identified press.csv at ", printed)
     assert printed.index("To narrow it: ") < printed.index("95 % verdict") < printed.index("One contact, ")
 
 
@@ -167,7 +174,7 @@ def test_the_uncertainty_budget_follows_the_answer(log, capsys):
 def test_all_evidence_is_a_flag_away(log, capsys):
     assert main(["identify", str(log), *OWN, "--no-figure", "--verbose"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert printed.startswith("The stiffness is ")
+    assert printed.startswith("By the model kelvin-voigt the stiffness is ")
     order = ("its uncertainty is mostly due to", "working point:", "value ± 95 %", "low-excitation:")
     assert sorted(order, key=printed.index) == [*order]
 

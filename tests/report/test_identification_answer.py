@@ -50,7 +50,8 @@ def test_a_parameter_without_a_number_has_its_bound_its_cause_and_a_remedy():
     found = OUTCOMES["not_identifiable"]()
     (row,) = (line for line in printed(found) if line.startswith("M "))
     assert "? not identified" in row
-    assert next(iter(found.parameters["M"].budget)) in row
+    assert next(iter(found.parameters["M"].budget)) == "other forces"
+    assert "drift or friction" in row
 
 
 def test_a_rejected_parameter_has_a_reason_and_no_number():
