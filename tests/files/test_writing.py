@@ -27,7 +27,9 @@ def a_png(path):
 
 
 def a_page(path):
-    write_text(path, answer_page(PageAnswer(title="T", sentence="S", about="A"), room="record", command="palpate"))
+    write_text(
+        path, answer_page(PageAnswer(title="T", sentence="S", about="A"), room="record", command="palpate")
+    )
 
 
 def a_record(path):
