@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from touches import Key, resumed
 
-from palpate.bench.build import build
 from palpate.bench.force_input import COLUMNS
+from palpate.bench.from_experiment import build
 from palpate.bench.tables import load, with_values
 from palpate.environments.surface import alone, join
 from palpate.force.law import CautiousState

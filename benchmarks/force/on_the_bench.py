@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from touches import Key, resumed
 
-from palpate.bench.build import build
+from palpate.bench.from_experiment import build
 from palpate.bench.tables import load, with_values
 
 CONTROLLERS = ("foam-cautious", "foam-hybrid", "foam-pi", "foam-neural")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate._vector import Mat3, Vec3
-from palpate.bench.build import build
+from palpate.bench.from_experiment import build
 from palpate.bench.summary import summarise
 from palpate.bench.tables import load, with_values
 from palpate.controllers.cautious_press import without_last_joint

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.bench import names, summarise, with_values
-from palpate.bench.build import FILES, build_any, load_any, parse_any
+from palpate.bench.from_experiment import FILES, build_any, load_any, parse_any
 from palpate.bench.one_direction import OneDirection
 from palpate.errors import InputError
 from palpate.force.simulated_press import ENCODER

@@ -9,7 +9,7 @@ import pytest
 from bench.quick import quick
 from own_parts import HEAD, Normal, Push, controller
 from palpate.bench import build, with_values
-from palpate.bench.build import check_parts
+from palpate.bench.from_experiment import check_parts
 from palpate.bench.tables import parse
 from palpate.cli import main
 from palpate.errors import InputError, PartError

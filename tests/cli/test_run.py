@@ -18,8 +18,8 @@ from cli import asked
 from cli.asked import References
 from palpate.bench import bench as running
 from palpate.bench import names, simulation, source
-from palpate.bench.build import FILES as EXPERIMENTS
 from palpate.bench.force_input import COLUMNS
+from palpate.bench.from_experiment import FILES as EXPERIMENTS
 from palpate.cli import main
 from palpate.logs import read_record
 

@@ -15,7 +15,7 @@ from palpate.files import MADE, check_place, fresh_folder, ours, whole, with_aut
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.page import page
+from palpate.report.answer import PageAnswer, answer_page
 
 
 def names(folder):
@@ -27,7 +27,9 @@ def a_png(path):
 
 
 def a_page(path):
-    write_text(path, page(title="T", about="A", tables=[], figures={}, command="palpate"))
+    write_text(
+        path, answer_page(PageAnswer(title="T", sentence="S", about="A"), room="record", command="palpate")
+    )
 
 
 def a_record(path):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from palpate._jit import law, part
     from palpate._vector import Vec3
     from palpate.bench.bench import Bench
-    from palpate.bench.build import build
+    from palpate.bench.from_experiment import build
     from palpate.bench.plant import Loop, march, start_at
     from palpate.bench.summary import summarise
     from palpate.bench.tables import Experiment, ForceSensorTable, load, names, source, with_values
@@ -45,7 +45,7 @@ _HOME = {
     "_jit": ("law", "part"),
     "_vector": ("Vec3",),
     "bench.bench": ("Bench",),
-    "bench.build": ("build",),
+    "bench.from_experiment": ("build",),
     "bench.tip_on_path": ("GivenMotion", "given_motion"),
     "bench.plant": ("Loop", "march", "start_at"),
     "bench.summary": ("summarise",),

@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from palpate.bench.build import build
 from palpate.bench.force_input import COLUMNS
+from palpate.bench.from_experiment import build
 from palpate.bench.plant import compiled_march, start_at
 from palpate.bench.tables import load, with_values
 

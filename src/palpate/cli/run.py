@@ -58,7 +58,7 @@ def run(
         Of the noise; the same seed gives the same numbers.
     """
     known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or FigureOptions()
-    from palpate.bench.build import FILES, load_any, parse_any
+    from palpate.bench.from_experiment import FILES, load_any, parse_any
 
     if known.list_:
         print_names(FILES, lambda one: load_any(one).title)
@@ -176,7 +176,7 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
 
 
 def _record(screen: Console, asked: _RunRequest, interrupted: Callable[[], bool]) -> Record:
-    from palpate.bench.build import build_any, check_parts
+    from palpate.bench.from_experiment import build_any, check_parts
 
     experiment = asked.experiment
     try:

@@ -8,7 +8,7 @@ from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
 from palpate.bench import build, load, with_values
 from palpate.bench.bench import Bench
-from palpate.bench.build import check_parts
+from palpate.bench.from_experiment import check_parts
 from palpate.controllers.controller import controller as registered
 from palpate.errors import InputError
 from palpate.robots.arm3 import Arm3

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench.build import build, check_parts
 from palpate.bench.force_input import COLUMNS as ROW
 from palpate.bench.force_input import StopCondition
+from palpate.bench.from_experiment import build, check_parts
 from palpate.bench.summary import CONTACT, LOST
 from palpate.bench.tables import Experiment, with_values
 from palpate.environments import SurfaceState

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from palpate.bench import with_values
-from palpate.bench.build import AnyExperiment
+from palpate.bench.from_experiment import AnyExperiment
 from palpate.errors import InputError
 from palpate_studies.study import StudyParameter, flat
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from palpate.bench.build import AnyExperiment, build_any, load_any
+from palpate.bench.from_experiment import AnyExperiment, build_any, load_any
 from palpate.bench.toml_parts import ROLES
 from palpate.errors import InputError, PluginError, unknown
 from palpate.plugins import Plugin, is_plugin, plugin

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.bench import Experiment, build
-from palpate.bench.build import AnyExperiment, build_any, check_parts
+from palpate.bench.from_experiment import AnyExperiment, build_any, check_parts
 from palpate.bench.speed import cores
 from palpate.bench.summary import DONE, NO_CONTACT
 from palpate.errors import InputError, PluginError

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import msgspec
 
 import palpate
-from palpate.bench.build import AnyExperiment, build_any
+from palpate.bench.from_experiment import AnyExperiment, build_any
 from palpate.bench.speed import cores
 from palpate.errors import InputError
 from palpate.logs.tables.parquet import write_parquet

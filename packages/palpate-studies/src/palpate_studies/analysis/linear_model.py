@@ -8,8 +8,8 @@ import numpy as np
 from palpate._vector import ZERO3, Vec3
 from palpate.arrays import Array
 from palpate.bench.bench import Bench
-from palpate.bench.build import build
 from palpate.bench.force_input import COLUMNS, SequenceState
+from palpate.bench.from_experiment import build
 from palpate.bench.plant import Loop, LoopState, start_at
 from palpate.bench.summary import CONTACT
 from palpate.bench.tables import Experiment
