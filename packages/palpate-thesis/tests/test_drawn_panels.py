@@ -76,7 +76,8 @@ def test_levels_moments_and_stretches_are_told_from_lines():
     (panel,) = panels_of(figure)
     spec = panel["spec"]
     assert [one["label"] for one in spec["series"]] == ["force", "desired", ""]
-    assert panel["columns"][spec["series"][1]["of"]][0] == 0.5
+    level = panel["columns"][spec["series"][1]["of"]]
+    assert (level["o"], np.ptp(codes(level))) == (0.5, 0)
     assert spec["marks"] == [{"x": 1.0, "colour": "fail"}]
     stretches = {colour: (low, high) for low, high, colour in spec["shades"]}
     assert stretches["measured"] == pytest.approx((2.0, 3.0))

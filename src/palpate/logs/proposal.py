@@ -114,8 +114,12 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
 
 
 def _same(own: ColumnStatistics, other: ColumnStatistics) -> bool:
-    """Whether a column repeats another's numbers."""
-    return np.array_equal(own.values, other.values, equal_nan=True)
+    """Whether a column repeats another's numbers, and its name is of the same quantity: 1 N/mm has them, too."""
+    quantity = [
+        [bool(re.search(NAMES[kind], c.name, re.IGNORECASE)) for kind in ("position", "force")]
+        for c in (own, other)
+    ]
+    return quantity[0] == quantity[1] and np.array_equal(own.values, other.values, equal_nan=True)
 
 
 def _stem(column: ColumnStatistics) -> str:
