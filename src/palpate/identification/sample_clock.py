@@ -53,13 +53,15 @@ def sample_clock_of(values: Array) -> SampleClock:
     A channel that changes in nearly every row is taken to be as fast as the log.
     """
     changed = np.flatnonzero(np.diff(values)) + 1
+    every = np.arange(len(values))
+    in_every_row = SampleClock(every.astype(np.float64), every, 0.0, 1.0)
     if len(changed) < _FEWEST or len(changed) > _EVERY_ROW * len(values):
-        return _in_every_row(len(values))
+        return in_every_row
     counted = [_number(changed, *beat) for beat in _beats(changed)]
     even = [grid for grid in (_even(number, changed, period) for number, period in counted) if grid]
     as_fast = np.bincount(np.diff(changed)).argmax() == 1
     if not even and as_fast:  # and often the same twice
-        return _in_every_row(len(values))
+        return in_every_row
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
@@ -80,10 +82,6 @@ class _Grid:
     period: float
     room: float
     spread: float
-
-
-def _in_every_row(count: int) -> SampleClock:
-    return SampleClock(np.arange(count, dtype=np.float64), np.arange(count), 0.0, 1.0)
 
 
 def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
@@ -113,14 +111,11 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     lines = {best, strongest(mean - _PER_LINE, min(mean + _PER_LINE, size - 1))}
     if first <= size - best <= last:
         lines.add(size - best)
-    return [_beat(at, size, spectrum, own[0]) for at in sorted(lines)]
-
-
-def _beat(at: int, size: int, spectrum: NDArray[np.complex128], first: int) -> tuple[float, float]:
-    """Period of a line, and a place in the middle of a row that it makes of the changes from row `first` on."""
-    angle = float(np.angle(spectrum[min(at, size - at)])) / (2 * np.pi)
-    period = size / at
-    return period, first + period * (angle if at > size // 2 else -angle)
+    found = []
+    for at in sorted(lines):
+        angle, period = float(np.angle(spectrum[min(at, size - at)])) / (2 * np.pi), size / at
+        found.append((period, own[0] + period * (angle if at > size // 2 else -angle)))
+    return found
 
 
 def _near(far: NDArray[np.intp]) -> int:
@@ -165,11 +160,8 @@ def _farthest(
 
     Of its constraints, two a change, only those are taken that were violated most in their part of the log.
 
-    Args:
-        goal: what of phase, period and room is made smallest; the room is at least 0 where it is no part of it.
-        count: number of each sample from the middle of the log, shape (m,).
-        changed: the row that shows it, shape (m,).
-        begin: phase and period to begin with.
+    `goal` is what of phase, period and room is made smallest; the room is at least 0 where it is no part of it. `count`
+    is the number of each sample from the middle of the log, `changed` the row that shows it, both of shape (m,).
     """
     from scipy.optimize import linprog
 
@@ -197,8 +189,6 @@ def _farthest(
     return (phase, period), room
 
 
-Rows = Mask
-
 _FEWEST_AT_LIMIT = 8
 _RUN = 3
 """Equal readings in a row that count as standing still."""
@@ -206,7 +196,7 @@ _STEPS = 4.0
 """Steps of the reading's own resolution that the force should have changed by meanwhile, were it not at its limit."""
 
 
-def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | None = None) -> Rows:
+def at_limit(force: Array, place: Array, levels: Iterable[float], among: Mask | None = None) -> Mask:
     """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
 
     The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
@@ -238,7 +228,7 @@ _FLANK = 0.4
 """Share of that by which it does so in the quarter next to either end: a straight line has 0.25, half a sine 0.6."""
 
 
-def past_end(position: Array, force: Array) -> Rows:
+def past_end(position: Array, force: Array) -> Mask:
     """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
 
     A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
