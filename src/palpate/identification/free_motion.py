@@ -133,8 +133,8 @@ def free_motion_of(
         for x in (position, -position):
             white = white_noise(x)
             stays = [own for share in _SHARES if (own := _stays_in(x < _limit(x, share)))]
-            slopes = [own for stay in stays if (own := _slope(force, x, stay, white, np.inf)) is not None]
-            found.append(max((abs(own) - doubt for own, doubt in slopes), default=0.0))
+            slopes = [_slope(force, x, stay, white, np.inf) for stay in stays]
+            found.append(max((abs(own[0]) - own[1] for own in slopes if own is not None), default=0.0))
         return max(found)
 
     found = [0.0, 0.0]

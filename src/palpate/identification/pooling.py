@@ -31,9 +31,9 @@ _EXACT = 1e-12
 """Share of the spread of the values below which a stated variance counts as none."""
 _ALONE = 4.0
 """Degrees of freedom of a single effect's own variance, which nothing repeats."""
-POOLED = ("K", "B", "M", "E")
+_POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
-BY_CHANCE = ("noise", "repetition", "blocks")
+_BY_CHANCE = ("noise", "repetition", "blocks")
 """Causes whose errors are independent from log to log. The others are errors common to all logs of one rig and one
 motion (the lag, a calibration, a force that the model lacks): no number of logs makes them smaller."""
 _ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
@@ -233,11 +233,16 @@ def pool(
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
     beside = _Covariates.of(covariates or {}, len(logs))
-    own = {
-        name: _pool([_one(found, name) for found in logs], tolerance, beside)
-        for name in POOLED
-        if any(found is not None and name in found.parameters for found in logs)
-    }
+    own = {}
+    for name in _POOLED:
+        given = [  # a parameter, and the model that gives it its meaning
+            (log.parameters[name], "" if name == "E" else _ALIKE.get(log.model, log.model))
+            if log is not None and name in log.parameters
+            else None
+            for log in logs
+        ]
+        if any(given):
+            own[name] = _pool(given, tolerance, beside)
     return Pooled(own, _point(logs, tolerance, beside), tuple(logs), tuple(names))
 
 
@@ -275,28 +280,13 @@ def _point(
     logs: Sequence[Identification | None], tolerance: float, beside: _Covariates
 ) -> PooledPoint | None:
     points = [found.working_point if found else None for found in logs]
-    there = [point for point in points if point is not None]
-    if not there:
+    if not any(points):
         return None
     stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance, beside)
-    used = [p for i in stiffness.logs if (p := points[i]) is not None] or there
-
-    def range_of(values: list[float]) -> Interval:
-        return min(values), max(values)
-
-    return PooledPoint(
-        stiffness,
-        range_of([p.force_N for p in used]),
-        range_of([p.depth_m for p in used]),
-        range_of([p.frequency_Hz for p in used]),
-    )
-
-
-def _one(found: Identification | None, name: str) -> tuple[Parameter, str] | None:
-    """A log's parameter and the model that gives it its meaning."""
-    if found is None or name not in found.parameters:
-        return None
-    return found.parameters[name], "" if name == "E" else _ALIKE.get(found.model, found.model)
+    used = [p for i in stiffness.logs or range(len(points)) if (p := points[i]) is not None]
+    forces, depths, frequencies = zip(*((p.force_N, p.depth_m, p.frequency_Hz) for p in used), strict=True)
+    ranges = ((min(own), max(own)) for own in (forces, depths, frequencies))
+    return PooledPoint(stiffness, *ranges)
 
 
 @dataclass(frozen=True)
@@ -314,7 +304,7 @@ class _Given:
         if p.value is None or p.ci95 is None or p.verdict is Verdict.REJECTED:
             return None
         half = (p.ci95[1] - p.ci95[0]) / 2
-        alike = [part for cause, part in p.budget.items() if cause not in BY_CHANCE]
+        alike = [part for cause, part in p.budget.items() if cause not in _BY_CHANCE]
         shared = min(float(np.hypot.reduce([0.0, *alike])), half)
         return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
 
@@ -333,15 +323,12 @@ def _pool(
         few = f"{len(used)} of {len(own)} logs give{'s' * (len(used) == 1)} it a number; pooling takes two or more"
         if beside.names:
             few += f", and with {', '.join(beside.names)} {least} in which each of these varies by itself"
-        none = Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, few)
-        return PooledParameter(none, None, None, tuple(used))
+        return PooledParameter(Parameter.unknown(kind[0], few), None, None, tuple(used))
     values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
     numbers = beside.numbers[list(used)]
     mean, alike = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
-    prediction = None
-    if mean.next_half is not None:
-        again = float(np.hypot(mean.next_half, alike))
-        prediction = mean.value - again, mean.value + again
+    again = None if mean.next_half is None else float(np.hypot(mean.next_half, alike))
+    prediction = None if again is None else (mean.value - again, mean.value + again)
     of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
     freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
@@ -352,12 +339,10 @@ def _pool(
     together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
     slopes = {}
     for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
-        scaled = (
-            alike * abs(slope / mean.value) if mean.value else 0.0
-        )  # an error common to all logs is of the scale
+        common = alike * abs(slope / mean.value) if mean.value else 0.0  # such an error is of the scale
         parts = {
             "between logs": Contribution(std, mean.freedom),
-            "common to all logs": Contribution.within(scaled),
+            "common to all logs": Contribution.within(common),
         }
         slopes[name] = _judge(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
     at = dict(zip(beside.names, numbers.mean(axis=0).tolist(), strict=True))

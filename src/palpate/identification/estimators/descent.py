@@ -68,14 +68,10 @@ class Descent:
         """The linear parameters that fit best at these nonlinear ones and this lag."""
         columns = np.column_stack(self.model.columns(self.motion, nonlinear, lag))
         rows, targets = self.known.rows(self.model.linear)
-        theta = (
-            solve(np.vstack([columns, rows]), np.concatenate([self.force, targets]))
-            if len(rows)
-            else solve(columns, self.force)
-        )
+        theta = solve(np.vstack([columns, rows]), np.concatenate([self.force, targets]))
         residuals = self.force - columns @ theta
         rss = float(residuals @ residuals)
-        against = float(np.sum((targets - rows @ theta) ** 2)) if len(rows) else 0.0
+        against = float(np.sum((targets - rows @ theta) ** 2))
         if LAG in self.known.known:
             value, weight = self.known.known[LAG]
             against += (weight * (lag - value)) ** 2
@@ -97,14 +93,14 @@ class Descent:
             return point
         damping = 1e-3
         for _ in range(_ROUNDS):
-            slopes = self._slopes(point, outer)
-            jacobian, residuals = self._with_known(np.column_stack([point.columns, slopes]), point, outer)
-            step = _damped_step(jacobian, residuals, len(point.theta), damping)
+            jacobian = np.column_stack([point.columns, self._slopes(point, outer)])
+            rows, targets = self.known.rows((*self.model.linear, *(own.name for own in outer)))
+            now = np.array([*point.theta, *(point.nonlinear.get(own.name, point.lag) for own in outer)])
+            residuals = np.concatenate([point.residuals, targets - rows @ now])
+            step = _damped_step(np.vstack([jacobian, rows]), residuals, len(point.theta), damping)
             trial = self.at(*_move(point, outer, step[len(point.theta) :]))
             gain = 1 - trial.cost / point.cost if point.cost else 0.0
-            if (
-                gain > -_ROUNDING
-            ):  # the gradient has more digits than the cost: what is rounding of it is taken
+            if gain > -_ROUNDING:  # the gradient has more digits than the cost: its rounding is taken
                 point, damping = trial, max(damping / 10, _UNDAMPED)
                 if gain < _CONVERGED and damping <= _UNDAMPED:
                     break
@@ -121,19 +117,6 @@ class Descent:
             if own.logarithmic:
                 slopes[:, i] /= point.nonlinear[own.name]
         return np.column_stack([point.columns, slopes])
-
-    def _with_known(
-        self, jacobian: Array, point: Point, outer: Sequence[NonlinearParameter]
-    ) -> tuple[Array, Array]:
-        """The rows of what is known beforehand under those of the log."""
-        names = (*self.model.linear, *(parameter.name for parameter in outer))
-        rows, targets = self.known.rows(names)
-        if not len(rows):
-            return jacobian, point.residuals
-        now = np.array(
-            [*point.theta, *(point.nonlinear.get(parameter.name, point.lag) for parameter in outer)]
-        )
-        return np.vstack([jacobian, rows]), np.concatenate([point.residuals, targets - rows @ now])
 
     def _slopes(self, point: Point, outer: Sequence[NonlinearParameter]) -> Array:
         """Derivatives of the predicted force by each parameter in its own scale, shape (n, len(outer))."""
@@ -162,12 +145,7 @@ def slope_of_lag(
 ) -> Array:
     """Derivative of the predicted force by the lag [N/s], shape (n,): of a sum of the position's derivatives the next.
 
-    Args:
-        model: which.
-        motion: the position.
-        theta: its linear parameters.
-        lag: of the force [s].
-        nonlinear: its nonlinear parameters, if it has any.
+    `theta` are the model's linear parameters, `lag` is that of the force [s].
     """
     if model.of_position and isinstance(motion.chain, Chain):
         parts = [theta.get(n, 0.0) * motion.moved(k + 1, lag) for n, k in model.derivatives.items()]
@@ -182,18 +160,11 @@ def slope_of_lag(
 def linearised(
     model: Model, motion: Motion, force: Array, nonlinear: dict[str, float], lag: float
 ) -> tuple[dict[str, float], Array, Array]:
-    """A model about its nonlinear parameters and a lag, and the linear ones that fit best there.
-
-    Args:
-        model: which.
-        motion: the position.
-        force: filtered, at the motion's rows, shape (n,).
-        nonlinear: parameters, by name.
-        lag: of the force [s].
+    """A model about its nonlinear parameters and a lag [s], and the linear ones that fit best there.
 
     Returns:
-        All parameters by name, the lag last; the predicted force's derivatives by them, shape (n, p); what the model
-        leaves of the force, shape (n,).
+        All parameters by name, the lag last; the predicted force's derivatives by them, shape (n, p); residuals of the
+        force at the motion's rows, shape (n,).
     """
     descent = Descent(model, motion, force)
     point = descent.at(nonlinear, lag)
@@ -208,9 +179,8 @@ def names_of(model: Model) -> tuple[str, ...]:
 
 def _lag_parameter(motion: Motion, lag: Lag) -> NonlinearParameter:
     limit = 3 * lag.std
-    return NonlinearParameter(
-        LAG, (lag.value,), lag.value - limit, lag.value + limit, 0.02 / motion.chain.rate
-    )
+    step = 0.02 / motion.chain.rate
+    return NonlinearParameter(LAG, (lag.value,), lag.value - limit, lag.value + limit, step)
 
 
 def _damped_step(jacobian: Array, residuals: Array, linear: int, damping: float) -> Array:

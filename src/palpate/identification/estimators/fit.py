@@ -46,34 +46,19 @@ class Fit:
         return student(self.noise.effective - len(self.names))
 
     def with_cause(self, cause: str, effect: Array) -> Fit:
-        """The same with one more cause of error, as of an `Answer`; a covariance keeps no names of causes.
-
-        Args:
-            cause: its name.
-            effect: standard deviation of each parameter by it, shape (p,).
-        """
+        """The same with one more cause of error, as of an `Answer`; a covariance keeps no names of causes."""
         return replace(self, cov=self.cov + np.outer(effect, effect))
 
     def through(self, jacobian: Array, theta: Array) -> Fit:
-        """Functions of the parameters instead, as of an `Answer`.
-
-        Args:
-            jacobian: their derivatives by the parameters, shape (p, p).
-            theta: their values, shape (p,).
-        """
+        """Functions of the parameters instead, as of an `Answer`."""
         return replace(self, theta=theta, cov=jacobian @ self.cov @ jacobian.T)
 
 
 def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | None = None) -> Fit:
-    """Fit a model.
+    """Fit a model to a filtered force, at the motion's rows, shape (n,).
 
-    Args:
-        model: which.
-        motion: the position.
-        force: filtered, at the motion's rows, shape (n,).
-        lag: what is known about it; if it is not known, it is looked for within its prior, and its uncertainty is part
-            of every interval.
-        start: where that search begins [s]; the prior's value if not given.
+    A lag that is not known is looked for within its prior from `start` [s] on (the prior's value if not given), and its
+    uncertainty is part of every interval.
     """
     descent, point = _search(model, motion, force, lag, start)
     jacobian = descent.jacobian(point)
@@ -91,14 +76,7 @@ def fit(model: Model, motion: Motion, force: Array, lag: Lag, start: float | Non
 
 
 def nonlinear_fit(model: Model, motion: Motion, force: Array, lag: Lag) -> dict[str, float]:
-    """The nonlinear parameters of a model by least squares, by name.
-
-    Args:
-        model: which.
-        motion: the position.
-        force: filtered, at the motion's rows, shape (n,).
-        lag: what is known about it.
-    """
+    """The nonlinear parameters of a model, by name, by least squares on a filtered force, shape (n,)."""
     return _search(model, motion, force, lag)[1].nonlinear
 
 
