@@ -42,16 +42,20 @@ _OVERSAMPLED = 16.0
 class Contacts:
     """The contacts of a log.
 
-    Args: spans: first and past-the-last sample of each contact, in filtered samples. bonded: the probe never leaves the
-    surface (or pulls on it): the whole log is one contact. force_sign, position_sign: +1 or -1, what to multiply the
-    channels with so that both grow into the surface. resting, threshold: force without contact, 0 for a bonded one, and
-    that above which contact is counted; both after the sign [N]. warnings: what was found. clear: whether the force out
-    of contact keeps well below that threshold: the contacts of mere noise are its peaks, and what is left out of
-    contact reaches up to them. Not for a bonded one: it has no such force. signed: whether it is known which way each
-    channel counts: as told, as it is, or turned round by what a stretch out of contact shows. payload: mass that the
-    force has in free motion, counted into the surface; None if it has none. drift: of the force, straight lines of
-    which were taken out; None if the log shows none. press: at constant speed, of a log that is little else; None of
-    another.
+    Args:
+        spans: first and past-the-last sample of each contact, in filtered samples.
+        bonded: the probe never leaves the surface (or pulls on it): the whole log is one contact.
+        force_sign, position_sign: +1 or -1, what to multiply the channels with so that both grow into the surface.
+        resting: force without contact, after the sign [N]; 0 for a bonded contact.
+        threshold: force above which contact is counted, after the sign [N].
+        warnings: what was found.
+        clear: whether the force out of contact keeps well below that threshold. The contacts of mere noise are its
+            peaks, and what is left out of contact reaches up to them. Not for a bonded one: it has no such force.
+        signed: whether it is known which way each channel counts: as told, as it is, or turned round by what a stretch
+            out of contact shows.
+        payload: mass that the force has in free motion, counted into the surface; None if it has none.
+        drift: of the force, straight lines of which were taken out; None if the log shows none.
+        press: at constant speed, of a log that is little else; None of another.
     """
 
     spans: tuple[tuple[int, int], ...]
@@ -131,11 +135,8 @@ def _with_press(
     channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
 ) -> Contacts:
     """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
-    seen = (
-        contacts
-        if contacts.spans
-        else _never_left(channels, channels.force, channels.position, options, strokes)
-    )
+    whole = channels, channels.force, channels.position, options, strokes
+    seen = contacts if contacts.spans else _never_left(*whole)
     lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
     signs = seen.position_sign, seen.force_sign
     press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
