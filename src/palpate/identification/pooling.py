@@ -289,60 +289,49 @@ def _point(
     return PooledPoint(stiffness, *ranges)
 
 
-@dataclass(frozen=True)
-class _Given:
-    """One log's number: value, 95 % half-widths by what it errs by itself and with all logs, and what it is."""
-
-    value: float
-    own: float
-    shared: float
-    kind: tuple[str, str]
-
-    @classmethod
-    def of(cls, p: Parameter, meaning: str) -> _Given | None:
-        """None for a parameter without a number, or one that is rejected."""
-        if p.value is None or p.ci95 is None or p.verdict is Verdict.REJECTED:
-            return None
-        half = (p.ci95[1] - p.ci95[0]) / 2
-        alike = [part for cause, part in p.budget.items() if cause not in _BY_CHANCE]
-        shared = min(float(np.hypot.reduce([0.0, *alike])), half)
-        return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
-
-
 def _pool(
     own: Sequence[tuple[Parameter, str] | None], tolerance: float, beside: _Covariates
 ) -> PooledParameter:
     """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
-    given = {i: found for i, pair in enumerate(own) if pair is not None and (found := _Given.of(*pair))}
+    kinds, numbers_of = (
+        {},
+        {},
+    )  # of each log: unit and model; value, half-widths of its own and common to all logs
+    for i, (p, meaning) in ((i, pair) for i, pair in enumerate(own) if pair is not None):
+        if p.value is not None and p.ci95 is not None and p.verdict is not Verdict.REJECTED:
+            half = (p.ci95[1] - p.ci95[0]) / 2
+            alike = [part for cause, part in p.budget.items() if cause not in _BY_CHANCE]
+            common = min(float(np.hypot.reduce([0.0, *alike])), half)
+            kinds[i] = p.unit, meaning
+            numbers_of[i] = p.value, float(np.sqrt(half**2 - common**2)), common
     unit = next((pair[0].unit for pair in own if pair is not None), "1")
-    kinds = [found.kind for found in given.values()]
-    kind = max(kinds, key=kinds.count, default=(unit, ""))
-    used = {i: found for i, found in given.items() if found.kind == kind}
+    kind = max(kinds.values(), key=[*kinds.values()].count, default=(unit, ""))
+    used = {i: numbers_of[i] for i, own_kind in kinds.items() if own_kind == kind}
     least = 2 + len(beside.names)
     if len(used) < least or not beside.vary(tuple(used)):
         few = f"{len(used)} of {len(own)} logs give{'s' * (len(used) == 1)} it a number; pooling takes two or more"
         if beside.names:
             few += f", and with {', '.join(beside.names)} {least} in which each of these varies by itself"
         return PooledParameter(Parameter.unknown(kind[0], few), None, None, tuple(used))
-    values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
+    values, halves, shared = np.array([*used.values()]).T
     numbers = beside.numbers[list(used)]
-    mean, alike = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
-    again = None if mean.next_half is None else float(np.hypot(mean.next_half, alike))
+    mean, common = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
+    again = None if mean.next_half is None else float(np.hypot(mean.next_half, common))
     prediction = None if again is None else (mean.value - again, mean.value + again)
     of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
     freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
         "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), freedom),
         "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
-        "common to all logs": Contribution.within(alike),
+        "common to all logs": Contribution.within(common),
     }
     together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
     slopes = {}
     for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
-        common = alike * abs(slope / mean.value) if mean.value else 0.0  # such an error is of the scale
+        scaled = common * abs(slope / mean.value) if mean.value else 0.0  # such an error is of the scale
         parts = {
             "between logs": Contribution(std, mean.freedom),
-            "common to all logs": Contribution.within(common),
+            "common to all logs": Contribution.within(scaled),
         }
         slopes[name] = _judge(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
     at = dict(zip(beside.names, numbers.mean(axis=0).tolist(), strict=True))

@@ -65,23 +65,13 @@ def sample_clock_of(values: Array) -> SampleClock:
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
-    grid = max(even, key=lambda grid: grid.period)  # with the fewest samples that no change shows
-    first = int(np.ceil((-0.5 - grid.phase) / grid.period))
-    last = int(np.floor((len(values) - 1 - grid.phase) / grid.period))
-    instants = grid.phase + np.arange(first, last + 1) * grid.period
-    rows = np.ceil(instants - grid.room * 1e-6).astype(np.intp)
+    period, phase, room, spread = max(even, key=lambda grid: grid[0])  # with the fewest samples that no change shows
+    first = int(np.ceil((-0.5 - phase) / period))
+    last = int(np.floor((len(values) - 1 - phase) / period))
+    instants = phase + np.arange(first, last + 1) * period
+    rows = np.ceil(instants - room * 1e-6).astype(np.intp)
     kept = (rows >= 0) & (rows < len(values))
-    return SampleClock(instants[kept], rows[kept], grid.spread, grid.period)
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """Instants phase + number * period; `room`: how far they stand from the ends of their rows at least; in rows."""
-
-    phase: float
-    period: float
-    room: float
-    spread: float
+    return SampleClock(instants[kept], rows[kept], spread, period)
 
 
 def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
@@ -138,8 +128,10 @@ def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[ND
         reach *= 2
 
 
-def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> _Grid | None:
-    """The grid whose instants stand farthest from the ends of their rows; None if no grid has one in each.
+def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> tuple[float, ...] | None:
+    """Period and phase of the even grid of the samples, room and standard deviation of the phase; in rows.
+
+    Its instants stand farthest from the ends of their rows, by the room at least; None if no grid has one in each.
 
     Phase and period of all that have form a polygon. What is not known of the phase is how far the polygon reaches,
     where the phase is that in the middle of the log.
@@ -150,7 +142,7 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
     if room <= _ROOM:
         return None
     reach = [_farthest((way, 0.0, 0.0), count, changed, best)[0][0] for way in (1.0, -1.0)]
-    return _Grid(best[0] - best[1] * middle, best[1], room, (reach[1] - reach[0]) / np.sqrt(12))
+    return best[1], best[0] - best[1] * middle, room, (reach[1] - reach[0]) / np.sqrt(12)
 
 
 def _farthest(
