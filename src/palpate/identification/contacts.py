@@ -144,11 +144,7 @@ def _with_press(
 
 
 def _find_contacts(
-    channels: Channels,
-    chain: Chain,
-    air: FreeMotion | None,
-    options: Options,
-    strokes: tuple[Stroke, ...],
+    channels: Channels, chain: Chain, air: FreeMotion | None, options: Options, strokes: tuple[Stroke, ...]
 ) -> Contacts:
     """Find the stretches in contact.
 

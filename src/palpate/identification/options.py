@@ -180,11 +180,7 @@ def _check_numbers(o: Options) -> None:
         raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
     if o.lag is not None and not isfinite(o.lag):
         raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
-    deviations = {
-        "calibration": o.calibration,
-        "lag's std": o.lag_std,
-        "series stiffness' std": o.series_std,
-    }
+    deviations = {"calibration": o.calibration, "lag's std": o.lag_std, "series stiffness' std": o.series_std}
     for name, value in deviations.items():
         if not (isfinite(value) and value >= 0):
             raise InputError(f"the {name} must be 0 or more, got {value:g}")

@@ -65,7 +65,9 @@ def sample_clock_of(values: Array) -> SampleClock:
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
-    period, phase, room, spread = max(even, key=lambda grid: grid[0])  # with the fewest samples that no change shows
+    period, phase, room, spread = max(
+        even, key=lambda grid: grid[0]
+    )  # with the fewest samples that no change shows
     first = int(np.ceil((-0.5 - phase) / period))
     last = int(np.floor((len(values) - 1 - phase) / period))
     instants = phase + np.arange(first, last + 1) * period

@@ -48,11 +48,7 @@ class Member:
 
 
 def members(
-    system: System,
-    noise: Array,
-    sensor: Array,
-    forces: list[list[int]],
-    use: Mask | None = None,
+    system: System, noise: Array, sensor: Array, forces: list[list[int]], use: Mask | None = None
 ) -> list[Member]:
     """Hypotheses and their weights, which add up to one.
 
@@ -209,12 +205,7 @@ def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives:
 
 
 def sensor_lines(
-    problem: Problem,
-    segments: list[Segment],
-    octaves: Octaves,
-    use: Mask,
-    system: System,
-    solution: Solution,
+    problem: Problem, segments: list[Segment], octaves: Octaves, use: Mask, system: System, solution: Solution
 ) -> tuple[Array, Array]:
     """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
 
