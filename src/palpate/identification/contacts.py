@@ -213,11 +213,10 @@ def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
 
 def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     """The same with the force in free motion level from one stay to the next."""
-    rows: Array = np.arange(len(channels.force), dtype=np.float64)
-    raw = channels.raw
-    first = (raw.start - channels.start) / channels.dt
-    at: Array = first + np.arange(len(raw.held_force), dtype=np.float64) * (raw.dt / channels.dt)
-    raw = replace(raw, held_force=raw.held_force - air.drift(at))
+    raw, rows = channels.raw, np.arange(len(channels.force), dtype=np.float64)
+    first, held = (raw.start - channels.start) / channels.dt, raw.held_force
+    at: Array = first + np.arange(len(held), dtype=np.float64) * (raw.dt / channels.dt)
+    raw = replace(raw, held_force=held - air.drift(at))
     warnings, moved = channels.warnings, float(np.ptp(air.levels))
     if moved > air.noise:  # less is not seen in the log
         text = f"in free motion the force changes by {moved:.3g} N during the log; the change is removed as a drift"
@@ -257,8 +256,7 @@ def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:
 
 
 def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
-    out = np.ones(count, bool)
-    out[:begin] = False
+    out = np.arange(count) >= begin
     for first, last in spans:
         out[first:last] = False
     return out
@@ -274,11 +272,11 @@ def _orient(
     """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
     sign, way, level, threshold = levels
     signed = options.force_sign in (None, int(sign))
-    out = _outside(len(position), spans, 0)
-    inside = ~out
-    reach = float(np.ptp(position[inside])) or 1.0
-    deep = inside & (sign * force > np.median(sign * force[inside]))
     if not way:
+        out = _outside(len(position), spans, 0)
+        inside = ~out
+        reach = float(np.ptp(position[inside])) or 1.0
+        deep = inside & (sign * force > np.median(sign * force[inside]))
         apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
         if abs(apart) < ONSET * reach:
             apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])

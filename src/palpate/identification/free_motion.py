@@ -265,11 +265,7 @@ by `benchmarks/identification/free_motion_constants.py`."""
 
 @dataclass(frozen=True)
 class MovingMass:
-    """A mass seen in free motion [kg]: negative if more than the tool's inertia was taken out before.
-
-    Args:
-        mass, std: [kg].
-    """
+    """A mass seen in free motion, and its deviation [kg]: negative if too much inertia was taken out before."""
 
     mass: float
     std: float

@@ -146,8 +146,7 @@ class PooledParameter:
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
-        own = self.parameter.to_json()
-        return own | {
+        return self.parameter.to_json() | {
             "prediction95": list(self.prediction95) if self.prediction95 else None,
             "between_std": self.between,
             "logs": list(self.logs),
@@ -199,9 +198,8 @@ class Pooled(Result):
     @property
     def found(self) -> bool:
         """Whether there is anything with a number."""
-        own = [p.parameter.value for p in self.parameters.values()]
-        point = self.working_point.stiffness.parameter.value if self.working_point else None
-        return any(value is not None for value in (*own, point))
+        point = [self.working_point.stiffness] if self.working_point else []
+        return any(p.parameter.value is not None for p in (*self.parameters.values(), *point))
 
     def to_json(self) -> dict[str, Any]:
         """The plain values under `pooled` of `palpate identify --json` for many logs."""

@@ -54,14 +54,8 @@ class DynamicStiffness(Readable):
 
     def to_json(self) -> dict[str, float]:
         """Plain values that JSON can hold."""
-        return {
-            "Hz": self.frequency,
-            "storage": self.storage,
-            "storage_half": self.storage_half,
-            "loss": self.loss,
-            "loss_half": self.loss_half,
-            "blocks": self.blocks,
-        }
+        names = ("storage", "storage_half", "loss", "loss_half", "blocks")
+        return {"Hz": self.frequency} | {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -81,12 +75,7 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class Tangent:
-    """Slope of force over depth in loading, at one force.
-
-    Args:
-        force: [N].
-        slope: there [N/m].
-    """
+    """Slope of force over depth in loading [N/m], at one force [N]."""
 
     force: float
     slope: Measurement
@@ -174,13 +163,7 @@ class WorkingPoint(Readable):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well one of the models fits the same filtered force.
-
-    Args:
-        model: what it is called.
-        r2, rmse: of the fit.
-        note: what speaks for or against it.
-    """
+    """How well one of the models fits the same filtered force, by its name, and what speaks for or against it."""
 
     model: str
     r2: float
@@ -311,8 +294,7 @@ class Identification(Result):
     @property
     def found(self) -> bool:
         """Whether there is anything with a number."""
-        numbers = [parameter.value for parameter in self.parameters.values()]
-        return self.working_point is not None or any(value is not None for value in numbers)
+        return self.working_point is not None or any(p.value is not None for p in self.parameters.values())
 
     @property
     def resonance(self) -> tuple[float, float] | None:

@@ -159,11 +159,9 @@ def _erlang(order: int, tau: Array) -> Array:
 
 def _erlang_cdf(order: int, tau: Array) -> Array:
     """Step response of `order` unit lags in a row."""
-    total = np.zeros_like(tau)
-    term = np.ones_like(tau)
-    for k in range(order):
-        if k:
-            term = term * tau / k
+    total, term = np.ones_like(tau), np.ones_like(tau)
+    for k in range(1, order):
+        term = term * tau / k
         total += term
     return 1.0 - total * np.exp(-tau)
 
@@ -173,8 +171,7 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     from scipy.linalg import solve_banded
 
     decay = np.exp(-dt / time_constant)
-    b1 = 1 - time_constant / dt * (1 - decay)
-    b0 = time_constant / dt * (1 - decay) - decay
+    b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
     driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
     found: Array = solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven)
     return found
@@ -201,9 +198,8 @@ def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
     from scipy.signal import butter, cont2discrete, lfilter
 
     for order, cutoff in low_pass.sections:
-        numerator, denominator, _ = cont2discrete(
-            butter(order, 2 * np.pi * cutoff * dt, analog=True), 1.0, method="foh"
-        )
+        analog = butter(order, 2 * np.pi * cutoff * dt, analog=True)
+        numerator, denominator, _ = cont2discrete(analog, 1.0, method="foh")
         signal = lfilter(numerator.ravel(), denominator, signal - signal[0]) + signal[0]
     return signal
 
