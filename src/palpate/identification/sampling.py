@@ -151,11 +151,8 @@ def _without_spikes(force: Array, rounding: float, warnings: list[Warn]) -> Arra
     spikes = rows[at[beyond > _ALONE * np.maximum(np.ptp(near, axis=1), 2 * usual)]]
     if not len(spikes):
         return force
-    text = (
-        f"{len(spikes)} readings of the force stand alone, far from those beside them (first: row"
-        f" {spikes[0] + 1}); they are bridged"
-    )
-    warnings.append(Warn(Code.MISSING_SAMPLES, text))
+    far = f"{len(spikes)} readings of the force stand alone, far from those beside them"
+    warnings.append(Warn(Code.MISSING_SAMPLES, f"{far} (first: row {spikes[0] + 1}); they are bridged"))
     force = force.copy()
     force[spikes] = np.nan
     return force
@@ -218,9 +215,9 @@ def _check(time: Array, position: Array, force: Array) -> None:
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
-    if _rate(time) > _FASTEST:
+    if (rate := _rate(time)) > _FASTEST:
         raise InputError(
-            f"there are {_rate(time):.3g} rows a second, faster than any sensor; is the unit of time right?"
+            f"there are {rate:.3g} rows a second, faster than any sensor; is the unit of time right?"
         )
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
@@ -232,9 +229,8 @@ def _check(time: Array, position: Array, force: Array) -> None:
                 f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
             )
         if np.ptp(seen) == 0:
-            raise InputError(
-                f"the {name} is {seen[0]:.6g} in every row; is it the right column, and did anything move?"
-            )
+            still = f"the {name} is {seen[0]:.6g} in every row"
+            raise InputError(f"{still}; is it the right column, and did anything move?")
 
 
 def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
