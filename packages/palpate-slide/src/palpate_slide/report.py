@@ -110,7 +110,8 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     columns = {name: column for name, column in columns.items() if not np.isnan(column).all()}
     units = {name: _UNITS.get(name, "1") for name in columns}
-    write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
+    about = {"command": summary["command"], "wrench_frame": "base"}
+    write_record(Record(columns, units, about), folder / RECORD)
     charts = _charts(rows, gains, summary)
     style.save(figure_of(charts), folder / "slide.png")
     shown = panels(charts)
