@@ -324,6 +324,28 @@ def test_several_presses_foretell_the_next():
     assert 5500 < high < 7000
 
 
+@pytest.mark.parametrize("play", [0.0, 5e-5])
+def test_play_before_the_position_sensor_is_in_the_interval_of_an_octave(play):
+    """Steps of 0.6 mm: over 0.55 mm that are read the force is a tenth stiffer, and only its friction says so."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0, 12, DT)
+    target = np.where(time < 0.5, -5e-4, 7e-4 + 3e-4 * np.sign(np.sin(2 * np.pi * 0.7 * time)))
+    x, read = np.empty_like(time), np.empty_like(time)
+    speed, at = 0.0, target[0]
+    back = at
+    for i, to in enumerate(target):
+        speed += DT * (900 * (to - at) - 60 * speed)
+        at += DT * speed
+        back = min(max(back, at - play / 2), at + play / 2)
+        x[i], read[i] = at, back
+    force = 3000 * np.maximum(x, 0) + rng.normal(0, 0.01, len(x))
+    found = identify(record(time, read + rng.normal(0, 2e-7, len(x)), force), lag=0.0).working_point
+    low, high = found.stiffness.ci95
+    assert found.source == "octave"
+    assert low < 3000 < high
+    assert high - low < (1500 if play else 60)
+
+
 def test_the_json_of_all_of_it():
     """Contract 7's words."""
     said = identify(pressed(), lag=0.0).to_json()

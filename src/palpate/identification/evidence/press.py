@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -202,20 +203,24 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
-def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
+def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | None = None) -> Evidence:
     """Dynamic stiffness, press and working point of the surface.
 
     Args:
         problem: of the log.
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
-        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
+        answer: with the forces beside the contact; None if nothing is known of them.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         return (), None, None
     lag = problem.lag
-    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
+    at = problem.motion.instants
+    friction = (
+        [np.interp(at, answer.problem.motion.instants, own) for own in answer.friction.T] if answer else []
+    )
+    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std, friction)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
@@ -231,7 +236,7 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
         headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
-    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
+    return spectrum, press, working_point(whole, spectrum, options, unit, answer.hidden if answer else 0.0)
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
