@@ -144,7 +144,7 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     if shown is None or predicted is None:
         return found
     own, slope = predicted
-    common = "calibration", "friction"  # of the answer, too
+    common = "calibration", "friction", "loadings"  # of the answer, too
     parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause not in common}
     along = found.cov @ slope
     power = float(slope @ along)
