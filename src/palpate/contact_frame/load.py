@@ -17,8 +17,6 @@ the normal the two cosines cancel up to d^2; where the tool moves along the surf
 they leave an error of s d.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """A simulated arm, read and moved as a real one."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from typing import Any

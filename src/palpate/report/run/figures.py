@@ -1,7 +1,5 @@
 """Charts of a run: of its figures and of its page alike."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

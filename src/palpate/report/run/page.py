@@ -1,9 +1,7 @@
 """The page of a run: the answer and what failed first, charts to touch, and the thesis' own columns below."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palpate.bench.summary import CONTACT
 from palpate.identification.result import Identification
@@ -20,10 +18,6 @@ from palpate.report.run.table import alerts, force_cards, force_rows, motors, se
 from palpate.report.style import svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
-
-if TYPE_CHECKING:
-    pass
-
 
 ROWS = 4000
 """Of the record that lie in the page, the peaks of the measured force among them."""
