@@ -35,8 +35,7 @@ a shell: `palpate --help`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from palpate import views
-from palpate.lazy import importer
+from palpate import lazy
 
 if TYPE_CHECKING:
     from palpate.calls import identify, identify_log, pool, read_log
@@ -73,7 +72,7 @@ __all__ = [
 ]
 
 
-views.report = lambda: import_module("palpate.report.values")
+lazy.report = lambda: import_module("palpate.report.values")
 
 
 _HOMES = {
@@ -82,7 +81,7 @@ _HOMES = {
     "identification": ("Identification",),
     "records": ("Record",),
 }
-_import_name = importer(__name__, _HOMES)
+_import_name = lazy.importer(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> Any:

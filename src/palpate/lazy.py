@@ -1,9 +1,12 @@
-"""Names of a package that are imported when they are first used, so that its import costs next to nothing."""
+"""Imports at the first use: a package's names, so that its import costs next to nothing, and the report of values."""
 
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
+
+report: Callable[[], Any]
+"""Imports the module that shows values (`line`, `html`, `view_of`, `write_figure`, `write_page`); set by `palpate`."""
 
 
 def importer(package: str, homes: Mapping[str, tuple[str, ...]]) -> Callable[[str], Any]:
