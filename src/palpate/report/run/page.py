@@ -60,7 +60,7 @@ def run_page(
         motors=motors(summary),
         facts=force_rows(summary) if contact else [],
         source=source,
-        charts=data(_shown(record)) if worth else "",
+        charts=data(_chart_data(record)) if worth else "",
         pictures=_pictures(record) if worth else [],
         scripts=(*scripts(*CHARTS, *ARM, *TABLES), text_of("run.js", _PACKAGE))
         if worth
@@ -136,7 +136,7 @@ def _pictures(record: Record) -> list[dict[str, str]]:
     ]
 
 
-def _shown(record: Record) -> dict[str, Any]:
+def _chart_data(record: Record) -> dict[str, Any]:
     """Data of the charts and the arm, in plain values."""
     charts, window = charts_of(record), window_of(record)
     rows = rows_shown(record["force_measured"], ROWS, record["t"] > window[0])
