@@ -253,13 +253,13 @@ class _Covariates:
 
     @classmethod
     def of(cls, given: Mapping[str, ArrayLike], count: int) -> _Covariates:
-        columns = {name: np.asarray(values, np.float64) for name, values in given.items()}
-        for name, column in columns.items():
+        found = cls((), np.empty((count, 0)))
+        for name, values in given.items():
+            column = np.asarray(values, np.float64)
             if column.shape != (count,) or not np.isfinite(column).all():
                 raise InputError(f"the covariate {name} must be a number for each of the {count} logs")
-        found = cls(tuple(columns), np.column_stack([np.empty((count, 0)), *columns.values()]))
-        for i, name in enumerate(columns):
-            if not cls(found.names[: i + 1], found.numbers[:, : i + 1]).vary(range(count)):
+            found = cls((*found.names, name), np.column_stack([found.numbers, column]))
+            if not found.vary(range(count)):
                 raise InputError(
                     f"the covariate {name} is the same in all {count} logs, or a combination of others; leave it out"
                 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,29 +73,14 @@ def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None
 _FEWEST = 6
 
 
-@dataclass(frozen=True)
-class Unloading:
-    """Results of the unloadings.
+def _unloading_of(
+    problem: Problem, lag: float, segments: list[Segment]
+) -> tuple[Array, float | None, tuple[float, float] | None]:
+    """The unloadings of a log, the lag of the force taken out [s].
 
-    Args:
-        curve: depth [m] and force [N] on that of the deepest contact, shape (2, n); empty if there is none.
-        loss: share of the work put into it that does not come back; None without a unloading.
-        late: by how much the force is read after the position, if it gives back more work than it took, and the
-            half-width of that [s]; None if it does not, or if the contacts do not agree on it.
-    """
-
-    curve: Array
-    loss: float | None
-    late: tuple[float, float] | None
-
-
-def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloading:
-    """The unloadings of a log.
-
-    Args:
-        problem: of the log.
-        lag: of the force behind the position, taken out [s].
-        segments: of its rows, one at least.
+    Returns:
+        Depth [m] and force [N] on that of the deepest contact, shape (2, n), empty if there is none; the share of the
+        work put into it that does not come back, and by how much the force is read late, both as in `Press`.
     """
     motion = problem.motion
     depth, speed, force, time = motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time
@@ -103,12 +88,12 @@ def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloa
     own = slice(s.first, s.last)
     turn = _turn(depth[own])
     if turn is None:
-        return Unloading(np.empty((2, 0)), None, None)
+        return np.empty((2, 0)), None, None
     rows = [slice(s.first, s.last) for s in segments if _turn(depth[s.first : s.last]) is not None]
     late = _late([(depth[r], speed[r], force[r], time[r]) for r in rows])
     x, f = depth[own], force[own]
     into, back = _works(x, f)
-    return Unloading(np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late)
+    return np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late
 
 
 def _turn(x: Array) -> int | None:
@@ -122,10 +107,8 @@ def _ends(x: Array) -> tuple[int, int]:
     """The rows between which a contact goes in and out over the same depths."""
     top = int(np.argmax(x))
     start = max(float(x[0]), float(x[top:].min()))
-    beyond = x[top:] <= start
-    return int(np.argmax(x[: top + 1] >= start)), top + (
-        int(np.argmax(beyond)) if beyond.any() else len(x) - 1 - top
-    )
+    beyond = np.flatnonzero(x[top:] <= start)
+    return int(np.argmax(x[: top + 1] >= start)), top + int(beyond[0]) if len(beyond) else len(x) - 1
 
 
 def _works(x: Array, f: Array) -> tuple[float, float]:
@@ -170,14 +153,14 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     loading = max(loadings, key=lambda loading: len(loading.depth))
     later = read_later(problem, lag, segments, loadings)
     slopes = (slope_between(loadings, later, level) for level in _LEVELS)
-    back = unloading_of(problem, lag, segments)
+    unloading, loss, late = _unloading_of(problem, lag, segments)
     return Press(
         tuple(Tangent(own.force, own.stiffness) for own in slopes if own and own.stiffness.known_to(1.0)),
         few_points(np.stack([loading.depth, loading.force])),
-        few_points(back.curve),
-        back.loss,
+        few_points(unloading),
+        loss,
         relaxation(problem, lag, segments, slope_between(loadings, later)),
-        back.late,
+        late,
     )
 
 
