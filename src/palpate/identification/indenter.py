@@ -130,9 +130,7 @@ def with_modulus(
     check_poisson(poisson)
     units = (found.traces.force_unit, found.traces.position_unit) if found.traces else ("N", "m")
     if units != ("N", "m"):
-        raise InputError(
-            f"an indenter needs force in N and position in m, this log has {units[0]} and {units[1]}"
-        )
+        raise InputError(f"an indenter needs force in N and position in m, not {units[0]} and {units[1]}")
     modulus = _modulus(found.press, indenter, poisson, tolerance)
     return replace(found, parameters={"E": modulus, **found.parameters})
 
