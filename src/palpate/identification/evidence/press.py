@@ -52,10 +52,8 @@ def relaxation(
 def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
     """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
 
-    Args:
-        force: less what the position gives back meanwhile, shape (n,) [N].
-        doubt: what is not known of that [N].
-        time: shape (n,) [s].
+    The force, shape (n,) [N], is less what the position gives back meanwhile, of which `doubt` is not known [N]; the
+    time has the shape (n,) [s].
     """
     from scipy.optimize import isotonic_regression
 
@@ -123,10 +121,7 @@ def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, flo
     """Lateness of the force by the work that it gives back beyond what it took.
 
     A force that is read T late does less work in loading and unloading, by T times the integral of F' x'; no passive
-    surface gives back more than it takes.
-
-    Args:
-        contacts: depth, speed, force and time of each, shape (n,).
+    surface gives back more than it takes. Of each contact, depth, speed, force and time have the shape (n,).
     """
     late = []
     for x, v, f, t in contacts:
@@ -165,12 +160,9 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
 
 
 def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
-    """A press at constant speed, with the lost work and the relaxation that its log shows.
+    """A press at constant speed, with the lost work and the relaxation that the filtered contact shows, if it does.
 
-    Args:
-        steady: its strokes' tangents and curves.
-        seen: the press by the filtered contact, if that shows one.
-        origin: position of the surface [m].
+    The curves of its strokes count from the position of the surface [m].
     """
     known = [own for own in (*steady.others, steady.headline) if own.stiffness.known_to(1.0)]
     tangents = [Tangent(own.force, own.stiffness) for own in known]
@@ -218,13 +210,7 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
-    """Stiffness at a working point by another force at the same rows [N/m]; None if it shows none.
-
-    Args:
-        problem: of the log.
-        force: as a model foretells it, shape (m,).
-        point: an octave, or the press.
-    """
+    """Stiffness at a working point by another force, shape (m,), at the same rows [N/m]; None if it shows none."""
     problem = replace(problem, force=force)
     segments = segments_of(problem.motion.rows, problem.spans)
     if point.source == "press":
