@@ -98,8 +98,7 @@ class FreeMotion:
 
     def drift(self, rows: Array) -> Array:
         """Drift of the free-motion force at some rows, relative to its middle [N]: straight lines between stays."""
-        found: Array = np.interp(rows, self.stays, self.levels) - self.rest
-        return found
+        return np.asarray(np.interp(rows, self.stays, self.levels) - self.rest)
 
     def among(self, position: Array) -> list[tuple[int, int]]:
         """First and past-the-last row of each stay in it, of a position of shape (n,)."""

@@ -166,8 +166,7 @@ class SensorPath:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the position's first sample."""
-        found: Array = self.instants[rows] * self.dt
-        return found
+        return np.asarray(self.instants[rows] * self.dt)
 
     def force_gain(self, frequency: Array) -> Array:
         """Of the amplitude of the readings' own noise: they are taken as they are."""
