@@ -75,11 +75,9 @@ class Contacts:
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
     """Find the contacts with the widest filter, choose the filter from them, and find them again with it.
 
-    Raises:
-        InputError: a cut-off that the readings are too rare for.
+    A cut-off that the readings are too rare for is an `InputError`.
     """
-    cutoff = options.cutoff
-    highest = FASTEST * channels.rate
+    cutoff, highest = options.cutoff, FASTEST * channels.rate
     if cutoff is not None and cutoff > 2 * highest:
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
@@ -101,16 +99,14 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
     around = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)  # its rise and fall, too
-    chosen = cutoff or choose_cutoff(
-        channels.position[around], channels.force[around], channels.dt, channels.rate
-    )
+    own = channels.position[around], channels.force[around]
+    chosen = cutoff or choose_cutoff(*own, channels.dt, channels.rate)
     if chosen > 0.9 * highest:
         return channels, chain, contacts
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = _find_contacts(fewer, narrow, air, options, strokes)
-    again = replace(again, drift=drift, press=contacts.press)
+    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=contacts.press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 

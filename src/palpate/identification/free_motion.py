@@ -70,8 +70,7 @@ class Drift:
         at = np.clip(np.searchsorted(self.times, times) - 1, 0, len(apart) - 1)
         share = np.clip((times - self.times[at]) / apart[at], 0.0, 1.0)
         order = np.pi * np.arange(1, _BENDS + 1)
-        found: Array = (walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order
-        return found
+        return np.asarray((walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order)
 
 
 @dataclass(frozen=True)

@@ -199,8 +199,7 @@ def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, redu
     before = (found_at / (c * reduced)) ** (1 / p)
     least = 1e-3 * float(np.abs(depth).max())  # a touch found too late leaves a force at no depth
     at = np.maximum(np.interp(force, rising, depth) + before, least)
-    found: Array = slope / (p * c * at ** (p - 1))
-    return found
+    return np.asarray(slope / (p * c * at ** (p - 1)))
 
 
 def _beyond_hertz(strain: float) -> float:

@@ -92,8 +92,7 @@ def random_effects(values: Array, variances: Array, covariates: Array | None = N
     offsets = np.empty((n, 0)) if covariates is None else covariates - covariates.mean(axis=0)
     spans = offsets.std(axis=0)
     design = np.column_stack([np.ones(n), offsets / spans])
-    freedom = n - design.shape[1]
-    between = _between(y, own, design)
+    freedom, between = n - design.shape[1], _between(y, own, design)
     weight = 1 / (own + between)
     theta, inverse = _least_squares(y, weight, design)
     excess = max(float(weight @ (y - design @ theta) ** 2) / freedom, 1.0)
@@ -225,8 +224,8 @@ def pool(
         covariates: by name, one number of each log, such as its temperature: the dependence on each is pooled, too.
 
     Raises:
-        InputError: as many names, or numbers of a covariate, as there are logs are wanted; a covariate is not finite,
-            or does not vary by itself.
+        InputError: there are not as many names, or numbers of a covariate, as logs; a covariate is not finite, or does
+            not vary by itself.
     """
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")

@@ -191,15 +191,11 @@ _STEPS = 4.0
 
 
 def at_limit(force: Array, place: Array, levels: Iterable[float], among: Mask | None = None) -> Mask:
-    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
+    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,), `among` those that count.
 
-    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
-
-    Args:
-        force: of one axis [N], shape (n,).
-        place: of the probe [m], shape (n,) or (n, 3); NaN where there is no reading.
-        levels: the forces that may be an end of the range [N].
-        among: rows that count, shape (n,); all if not given.
+    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution. The
+    force of one axis [N] has the shape (n,), the place of the probe [m] (n,) or (n, 3), NaN where there is no reading;
+    `levels` are the forces that may be an end of the range [N].
     """
     stuck = np.zeros(len(force), bool)
     rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
@@ -226,11 +222,7 @@ def past_end(position: Array, force: Array) -> Mask:
     """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
 
     A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
-    goes on and comes back.
-
-    Args:
-        position: of one axis [m], shape (n,).
-        force: of the same rows [N], shape (n,).
+    goes on and comes back. Position [m] and force [N] have the shape (n,).
     """
     rise = np.sign(float(np.cov(position, force)[0, 1]))
     noise = float(np.median(np.abs(np.diff(force, 2)))) / 1.65  # of a normal distribution: 6^0.5 times 0.674

@@ -85,8 +85,7 @@ class Channels:
     @property
     def time(self) -> Array:
         """Of each sample [s], shape (n,)."""
-        time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
-        return time
+        return np.asarray(self.start + np.arange(len(self.position), dtype=np.float64) * self.dt)
 
 
 def channels_of(record: Record) -> Channels:

@@ -40,8 +40,7 @@ def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
     variance = np.asarray(variance, np.float64)
     total = variance.sum(axis=0)
     loss = ((variance / np.where(total > 0, total, 1.0)) ** 2 / np.asarray(freedom)).sum(axis=0)
-    found: Array = 1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0)
-    return found
+    return np.asarray(1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0))
 
 
 def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
@@ -53,8 +52,7 @@ def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
 
     whole, together = np.asarray(variance, np.float64).sum(axis=0), effective_freedom(variance, freedom)
     coverage = np.where(together < 0.99 * _MOST_FREEDOM, stdtrit(together, 0.975), NORMAL)
-    found: Array = coverage * np.sqrt(whole)
-    return found
+    return np.asarray(coverage * np.sqrt(whole))
 
 
 class Contribution(NamedTuple):

@@ -191,8 +191,7 @@ def _damped_step(jacobian: Array, residuals: Array, linear: int, damping: float)
     gram = jacobian.T @ jacobian / np.outer(scale, scale)
     gram[np.arange(linear, len(scale)), np.arange(linear, len(scale))] += damping
     vector = jacobian.T @ residuals / scale
-    step: Array = np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale
-    return step
+    return np.asarray(np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale)
 
 
 def _move(point: Point, outer: Sequence[NonlinearParameter], step: Array) -> tuple[dict[str, float], float]:

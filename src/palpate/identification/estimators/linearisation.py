@@ -205,8 +205,9 @@ class Linearisation:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
         own = solution.theta * [name in self.model.derivatives for name in self.names]
         by_position = np.einsum("i,oij,j->o", own, self._position_noise(), own)
-        found: Array = np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
-        return found
+        return np.asarray(
+            np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
+        )
 
     def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).

@@ -171,8 +171,7 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     decay = np.exp(-dt / time_constant)
     b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
     driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
-    found: Array = solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven)
-    return found
+    return np.asarray(solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven))
 
 
 def white_noise(signal: Array) -> float:
