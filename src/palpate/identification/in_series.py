@@ -53,11 +53,7 @@ class SeriesSpring:
 
         With what is seen as K_a + B_a s + M_a s^2: K = K_a r, B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k + K m/k,
         r = k/(k - K_a). The covariance goes through the derivatives of these. The next orders make B and M too large by
-        m omega^2/k of each at most, which is their half-width by this cause.
-
-        Args:
-            seen: through the spring.
-            band: frequency below which the probe moved [Hz].
+        m omega^2/k of each at most, which is their half-width by this cause; below `band` [Hz] the probe moved.
         """
         theta, names = seen.theta, seen.names
         self._check(float(theta[names.index("K")]))
@@ -124,23 +120,18 @@ class SeriesSpring:
 
     def press(self, seen: Press) -> Press:
         """The press over the depth of the surface alone."""
-        tangent = [
-            Tangent(t.force, self.slope(t.slope)) for t in seen.tangent if t.stiffness < self.stiffness
-        ]
+        softer = (t for t in seen.tangent if t.stiffness < self.stiffness)
         curves = []
         for curve in (seen.loading, seen.unloading):
             own = curve.copy()
             if own.size:
                 own[0] -= (own[1] - own[1][0]) / self.stiffness
             curves.append(own)
-        return replace(seen, tangent=tuple(tangent), loading=curves[0], unloading=curves[1])
+        tangent = tuple(Tangent(t.force, self.slope(t.slope)) for t in softer)
+        return replace(seen, tangent=tangent, loading=curves[0], unloading=curves[1])
 
     def _check(self, apparent: float) -> None:
-        """Two springs in series are softer than either.
-
-        Raises:
-            InputError: the log is as stiff as what is said to be in series with the surface.
-        """
+        """Two springs in series are softer than either; an `InputError` if not."""
         if abs(apparent) >= self.stiffness:
             raise InputError(
                 f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g}"

@@ -256,6 +256,11 @@ class Parameter(Readable):
             value, half / NORMAL, ends, unit, verdict, reason, budget=budget, contributions=contributions
         )
 
+    @classmethod
+    def unknown(cls, unit: str, reason: str) -> Parameter:
+        """A parameter that the log says nothing of, and why."""
+        return cls(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
+
     def without_number(
         self,
         reason: str,

@@ -22,8 +22,7 @@ from palpate.identification.estimators.averaging import (
     sensor_lines,
 )
 from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
-from palpate.identification.estimators.descent import linearised, slope_of_lag
-from palpate.identification.estimators.fit import nonlinear_fit
+from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
     Octaves,
     Segment,
