@@ -157,8 +157,6 @@ _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
 _FOLLOWED = 0.5
 """Share of a stroke's force that a smooth curve of the position follows, of a contact."""
-_TOUCHED = 0.2
-"""Share of the largest range of the force above which a stroke is a press, too, if not one of those that are named."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
 _DEGREES = (2, 4, 6, 8)
@@ -254,7 +252,8 @@ def steady_press(
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
-    The tangents are of the loadings; of the unloadings, where the log has no other stroke.
+    The tangents are of the loadings; of the unloadings, where the log has no loading at any speed: a surface that
+    relaxes or yields gives back at another slope than it took.
 
     Args:
         channels: as logged.
@@ -267,11 +266,15 @@ def steady_press(
     every = curves_of(channels, strokes, signs, drift)
     deepest = max((own.span for own in every), default=0.0)
     curves = [own for own in every if own.span > deepest / 2]
-    named = [own for own in curves if own.loads] or curves
+    named = [own for own in curves if own.loads]
+    force = block_means(signs[1] * channels.force[channels.valid], -(-len(channels.force) // _BLOCKS))
+    if not named and (np.diff(force[_turns(force, deepest / 2)]) > deepest / 2).any():
+        return None
+    named = named or curves
     headline = slopes_at(named, WINDOW, lag, rest)
     if headline is None or headline.explained < _FOLLOWED:
         return None
-    beside = [own for own in every if own.loads is named[0].loads and own.span > _TOUCHED * deepest]
+    beside = [own for own in every if own.loads is named[0].loads and own.span > _STROKE * deepest]
     if len(beside) > len(named):  # at a force that all reach
         headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
