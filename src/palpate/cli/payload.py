@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
-
 from palpate.cli._program import print_result
+from palpate.cli.options import options
 from palpate.cli.options.common import WRITTEN, CellOptions, FileOptions, ReportOption
 from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, si
@@ -23,8 +21,7 @@ if TYPE_CHECKING:
 _ENDINGS = (".toml", ".script", ".json", ".yaml")
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class PayloadOutput(ReportOption, FileOptions):
     """Where the payload is written, and a load file that is compared with it."""
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.text import Text
 
 from palpate.files import SIGNATURE
 from palpate.text import OPTION
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-    from rich.console import Console
 
 
 @dataclass(frozen=True)
@@ -109,3 +112,15 @@ def png(path: Path) -> str:
 def data_address(data: bytes, kind: str) -> str:
     """Anything as the source of an image that lies in the page itself; `kind` is its media type."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def print_hanging(lines: Iterable[Text], console: Console) -> None:
+    """Print lines; on a terminal, and in a text of Python's, a long one goes on under its own beginning."""
+    narrow = console.is_terminal or console.file is not sys.stdout
+    for line in lines:
+        indent = line.cell_len - len(line.plain.lstrip())
+        if narrow and line.cell_len > console.width > indent + 20:
+            for part in line[indent:].wrap(console, console.width - indent):
+                console.print(Text(" " * indent).append(part))
+        else:
+            console.print(line, soft_wrap=True)

@@ -1,7 +1,5 @@
 """The report of a press: tables, a film, figures, one page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -11,8 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Group, Parameter
-
+from palpate.cli.options import options
 from palpate.cli.options.common import (
     QUIET,
     FigureOptions,
@@ -51,8 +50,7 @@ _SHOWN = 3
 """Tables that the terminal shows: the factors, the settings, the results of the runs. The page has all metrics."""
 
 
-@Parameter(name="*", group=Group("A cluster", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("A cluster", 1)
 class ClusterOptions:
     """A cluster for the runs, in place of this machine's cores."""
 

@@ -1,7 +1,5 @@
 """A run's summary as tables, for the terminal and for the page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
