@@ -173,8 +173,8 @@ class LimitOptions:
     "Total duration, as 20:s."
 
 
-def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, of: str) -> None:
-    """Refuse options of the other kind of arm.
+def only(part: Any, of: str) -> None:
+    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
 
     Raises:
         InputError: one was given; it is named.

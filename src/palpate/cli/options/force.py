@@ -133,7 +133,12 @@ class SlideTuningOptions(SlideLimits):
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return self.gains_with(gains, self.radius.si) if self.slide else gains
+        from palpate.cli.press import only
+
+        if self.slide:
+            return self.gains_with(gains, self.radius.si)
+        only(self, "a slide; add --slide")
+        return gains
 
 
 @options("Signals of the logs", 4)
