@@ -79,12 +79,7 @@ _UNKNOWN = {"octave": "blocks", "press": "curvature"}
 
 
 def cause_of(name: str | None, source: str = "") -> Cause:
-    """The cause of that name.
-
-    Args:
-        name: in a budget; None if there is no budget.
-        source: of the working point, `octave` or `press`.
-    """
+    """The cause of that name in a budget; without a budget, that of a working point's source, `octave` or `press`."""
     if name is None:
         return _CAUSES[_UNKNOWN[source]] if source in _UNKNOWN else NOISE
     return _CAUSES.get(name, Cause(name, NOISE.remedy))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from palpate.cli.options import options, values
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, options
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -133,7 +133,12 @@ class SlideTuningOptions(SlideLimits):
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return self.gains_with(gains, self.radius.si) if self.slide else gains
+        from palpate.cli.press import only
+
+        if self.slide:
+            return self.gains_with(gains, self.radius.si)
+        only(self, "a slide; add --slide")
+        return gains
 
 
 @options("Signals of the logs", 4)

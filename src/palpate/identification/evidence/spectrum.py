@@ -274,15 +274,7 @@ def _at_octave(octave: DynamicStiffness, problem: Problem, segments: list[Segmen
 
 
 def point_of(found: Slopes, source: str, problem: Problem, options: Options, unit: str) -> WorkingPoint:
-    """The working point of a stiffness, with a verdict.
-
-    Args:
-        found: at the force that is named.
-        source: octave or press.
-        problem: of the log.
-        options: with the tolerance and the calibration.
-        unit: of a stiffness.
-    """
+    """The working point of a stiffness at the force that is named, of an octave or the press, with a verdict."""
     value, again = found.stiffness.value, found.again
     interval = None if again is None else (value - again, value + again)
     own, each = _judge(found.stiffness, options, unit), found.each if source == "press" else ()
