@@ -9,7 +9,7 @@ import pytest
 from foreign.bound import columns_of, half_widths
 from foreign.logs import CELLS, Cell, make_log
 from foreign.motions import tracked
-from foreign.scoring import judged, score
+from foreign.scoring import WORKING_POINT, judged, score
 from foreign.surfaces import SURFACES, Surface, random_surface, touch
 from foreign.tables import markdown, tables
 from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
@@ -196,6 +196,14 @@ def test_no_answer_is_wrong_on_these_logs_again(cell):
     assert found.outcome == "answered"
     assert found.working
     assert [answer.name for answer in found.answers if answer.wrong] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "seed"), [("tissue/payload", 990), ("plastic/saturation", 970)])
+def test_a_steady_unloading_after_loadings_in_steps_is_no_press_at_constant_speed(name, seed):
+    """The slope of the unloading was given for that of the loadings."""
+    point = next(a for a in score(Cell(*name.split("/")), seed).answers if a.name == WORKING_POINT)
+    assert point.holds
 
 
 @pytest.mark.long
