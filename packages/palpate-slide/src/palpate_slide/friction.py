@@ -86,7 +86,7 @@ def slide_in(
         course = None if freed is None else course_of(signals, freed, frame)
     if freed is None or course is None:
         return None
-    fit = _problem(course, freed, np.zeros(len(course.time), int), frame)
+    fit = _problem(course, freed, np.zeros(len(course.speed), int), frame)
     fitted = fit, *with_length(fit)
     better = advantage(course, fitted[1], fitted[2], freed, press, along.meta["contact_frame"])
     certain = student(BLOCKS - 1)
@@ -202,13 +202,10 @@ def _problem(course: SlideWindows, freed: Unloaded, classes: Array, frame: Conta
     usual = float(np.median(np.linalg.norm(course.force, axis=1)))
     bias = max(freed.load.std, 1e-3) if course.known else usual
     weight = freed.load.weight_std if freed.load.separable else PAYLOAD
-    turns = float(np.abs(course.turned[1] - np.eye(3)).max()) > 0.02
-    std = [
-        USUAL_LAG_STD,
-        *[bias] * 3,
-        *([max(weight, 1e-3)] * 3 if turns and not frame.gravity_compensated else []),
-    ]
-    return Fit(course, classes, np.array(std), 0.0)
+    turns = float(np.abs(course.turned @ course.rest.T - np.eye(3)).max()) > 0.02
+    weighs = turns and not frame.gravity_compensated
+    std = [USUAL_LAG_STD, *[bias] * 3, *[max(weight, 1e-3)] * 3 * weighs]
+    return Fit(course, classes, np.array(std))
 
 
 def _classes(speed: Array, rows: Mask) -> Array:
@@ -238,10 +235,8 @@ def _coefficient(
     share, slips = course.share(length)
     t = student(BLOCKS - 1)
     spread = float(np.abs(beside[:, 1] - found.mu[0]).max())
-    if (
-        len(found.load) > 3 and not freed.load.separable
-    ):  # with a weight that turns, or without: both answers count
-        still = Fit(course, fit.classes, fit.prior[:4], fit.lag).solve(share, slips)
+    if len(found.load) > 3 and not freed.load.separable:  # with a weight that turns, or without: both count
+        still = Fit(course, fit.classes, fit.prior[:4]).solve(share, slips)
         spread = float(np.hypot(spread, still.mu[0] - found.mu[0]))
     # What the model leaves beyond the noise is as slow as the path, and may be of friction as a whole.
     size = np.linalg.norm(course.force[rows], axis=1)
@@ -496,11 +491,7 @@ def _answer(
     ends = [mu.value - mu.half, mu.value + mu.half]
     table = [dict(zip(("speed_m_s", "mu", "half"), row, strict=True)) for row in mu.table.tolist()]
     keys = ("x", "y", "z", "stiffness", "half")
-    at, normals, cones = (
-        course.place[::every].tolist(),
-        normal[::every].tolist(),
-        np.degrees(cone[::every]).tolist(),
-    )
+    shown = (values[::every].tolist() for values in (course.place, normal, np.degrees(cone)))
     values: dict[str, Any] = {
         "friction": {"value": mu.value, "ci95": ends} if known else None,
         "by_speed": table if known else [],
@@ -510,7 +501,7 @@ def _answer(
         "stiffness": [dict(zip(keys, row, strict=True)) for row in parts.tolist()],
         "places": [
             {"x": p[0], "y": p[1], "z": p[2], "normal": n, "cone95_deg": c}
-            for p, n, c in zip(at, normals, cones, strict=True)
+            for p, n, c in zip(*shown, strict=True)
         ],
     }
     return SlideFound(first, tuple(facts), values)

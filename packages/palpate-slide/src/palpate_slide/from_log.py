@@ -206,10 +206,10 @@ class SlideWindows:
     """Windows of a slide, every second half of one.
 
     Args:
-        time, speed: [s], [m/s], shape (m,).
+        speed: [m/s], shape (m,).
         place, way: [m], direction of the motion, shape (m, 3).
         force, rate: as of `Smooth`, from the tip on the surface, shape (m, 3).
-        turned: rotation of the tool, and that against the middle of the free rows, shape (m, 3, 3).
+        turned: rotation of the tool, shape (m, 3, 3).
         rows: of the smooth signals.
         smooth, moves, slides: whence the windows are, and where the tip moves on, and across the force.
         known: whether the zero of the force is, by free motion or a payload file.
@@ -219,13 +219,12 @@ class SlideWindows:
         path: [m].
     """
 
-    time: Array
     speed: Array
     place: Array
     way: Array
     force: Array
     rate: Array
-    turned: tuple[Array, Array]
+    turned: Array
     rows: NDArray[np.intp]
     smooth: Smooth
     moves: Mask
@@ -252,16 +251,28 @@ class SlideWindows:
 
     def friction_angle(self, found: SlideFit, length: float) -> tuple[Array, Array, Mask]:
         """On the grid: force on the surface [N], shape (n, 3); residual of psi but for the spring [rad]; slip."""
-        s, b = self.smooth, found.load
+        s = self.smooth
         turned = self.turns[1][nearest(self.turns[0], s.time)]
-        F = self.sign * s.force - np.einsum("nij,j->ni", turned, b[:3])
-        if len(b) > 3:
-            F -= b[3:] - turned @ self.rest.T @ b[3:]
-        along = np.einsum("ij,ij->i", F, s.velocity) / np.maximum(np.linalg.norm(s.velocity, axis=1), 1e-12)
-        psi = np.arctan2(along, np.sqrt(np.maximum(np.einsum("ij,ij->i", F, F) - along**2, 1e-12)))
+        F = self.sign * s.force - self.load_on(turned, found.load)
+        way = s.velocity / np.maximum(np.linalg.norm(s.velocity, axis=1), 1e-12)[:, None]
         share, slips = self.shares(length)
-        mu = float(found.mu[0])
-        return F, psi - np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1])), slips
+        return F, lean(F, way) - friction_that_acts(found.mu[0], share), slips
+
+    def load_on(self, turned: Array, load: Array) -> Array:
+        """What is left of bias and weight [N] as of `SlideFit`, on a tool that is turned so, shape (n, 3)."""
+        off: Array = turned @ load[:3]
+        return off if len(load) == 3 else off + load[3:] - turned @ self.rest.T @ load[3:]
+
+
+def lean(force: Array, way: Array) -> Array:
+    """Angle of forces from the planes across unit vectors [rad], shape (n,), of both in rows, shape (n, 3)."""
+    along = np.einsum("ij,ij->i", force, way)
+    return np.arctan2(along, np.sqrt(np.maximum(np.einsum("ij,ij->i", force, force) - along**2, 1e-12)))
+
+
+def friction_that_acts(mu: Array, share: Array) -> Array:
+    """Angle of friction along the motion [rad], shape (n,), by its shares as of `SlideWindows.shares`."""
+    return np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1]))
 
 
 def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> SlideWindows | None:
@@ -294,8 +305,8 @@ def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Sli
     force = s.noise * np.sqrt(2.25 / s.rows)
     noise = np.hypot(force, size[rows] * blur / speed[rows])
     return SlideWindows(
-        s.time[rows], speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
-         (rotations, rotations @ rest.T), rows, s, moves, slides, known,
+        speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
+        rotations, rows, s, moves, slides, known,
         (signals.time, signals.rotations), rest, sign, noise, path,
     )  # fmt: skip
 
@@ -358,35 +369,25 @@ class Fit:
         course: its windows.
         classes: of its speeds, shape (m,), from 0.
         prior: standard deviation of lag and load, shape (4,) or (7,).
-        lag: mean of the prior of the lag [s].
     """
 
     course: SlideWindows
     classes: Array
     prior: Array
-    lag: float
 
     def psi(self, lag: float, load: Array) -> tuple[Array, Array, Array]:
         """Angle of the force from the plane across the motion, spring's regressor, and force, shape (m,) and (m, 3)."""
         c = self.course
-        off = np.einsum("nij,j->ni", c.turned[0], load[:3])
-        if len(load) > 3:
-            off = off + load[3:] - c.turned[1] @ load[3:]
-        F = c.force + lag * c.rate - off
-        along = np.einsum("ij,ij->i", F, c.way)
-        size = np.linalg.norm(F, axis=1)
-        level = np.sqrt(np.maximum(size**2 - along**2, 1e-12))
-        rate = np.einsum("ij,ij->i", F, c.rate) / np.maximum(size, 1e-9)
-        return np.arctan2(along, level), rate / c.speed, F
+        F = c.force + lag * c.rate - c.load_on(c.turned, load)
+        rate = np.einsum("ij,ij->i", F, c.rate) / np.maximum(np.linalg.norm(F, axis=1), 1e-9)
+        return lean(F, c.way), rate / c.speed, F
 
     def residuals(self, x: Array, share: Array) -> Array:
         """Of psi, over its noise."""
         j = len(x) - 1 - len(self.prior)
         psi, spring, F = self.psi(x[j + 1], x[j + 2 :])
         mu = x[:j][self.classes]
-        model = np.arctan(mu * share[:, 0] / np.sqrt(1.0 + mu**2 * share[:, 1])) + x[j] * spring / np.sqrt(
-            1.0 + mu**2
-        )
+        model = friction_that_acts(mu, share) + x[j] * spring / np.sqrt(1.0 + mu**2)
         left: Array = (psi - model) * np.linalg.norm(F, axis=1) / self.course.noise
         return left
 
@@ -395,22 +396,15 @@ class Fit:
         classes = int(self.classes.max()) + 1
         enough = bool(np.bincount(self.classes[slips], minlength=classes).min() >= 2 * BLOCKS)
         rows = slips | (not enough)
-        psi = self.psi(self.lag, np.zeros(len(self.prior) - 1))[0]
-        x = np.r_[
-            np.full(classes, np.tan(np.median(psi[rows]))), 0.0, self.lag, np.zeros(len(self.prior) - 1)
-        ]
-        center = np.r_[np.zeros(classes + 1), self.lag, np.zeros(len(self.prior) - 1)]
+        psi = self.psi(0.0, np.zeros(len(self.prior) - 1))[0]
+        x = np.r_[np.full(classes, np.tan(np.median(psi[rows]))), np.zeros(1 + len(self.prior))]
         inverse = np.r_[np.zeros(classes + 1), 1.0 / self.prior]
         step = np.r_[np.full(classes, 1e-4), 1e-7, 1e-4, np.full(len(self.prior) - 1, 1e-3)]
         alike = 1.0
         for _ in range(15):
             r = self.residuals(x, share)[rows]
-            J = np.column_stack(
-                [
-                    (self.residuals(x + e, share)[rows] - r) / h
-                    for e, h in zip(np.diag(step), step, strict=True)
-                ]
-            )
+            beside = [self.residuals(x + e, share)[rows] for e in np.diag(step)]
+            J = (np.column_stack(beside) - r[:, None]) / step
             scale = max(1.4826 * float(np.median(np.abs(r))), 1.0)
             w = np.minimum(1.0, 3.0 * scale / np.maximum(np.abs(r), 1e-12)) / scale**2
             sums = [float(np.sum(w[b] * r[b])) for b in np.array_split(np.arange(len(r)), BLOCKS)]
@@ -419,7 +413,7 @@ class Fit:
             )
             w = w / alike  # residuals that go together count once against the priors
             A = J.T @ (w[:, None] * J) + np.diag(inverse**2)
-            move = -np.linalg.solve(A, J.T @ (w * r) + inverse**2 * (x - center))
+            move = -np.linalg.solve(A, J.T @ (w * r) + inverse**2 * x)
             x = x + move
             x[:classes] = np.clip(x[:classes], -5.0, 5.0)
             if np.all(np.abs(move) < 0.01 * step):
@@ -440,7 +434,7 @@ class Fit:
         """Sum of squares over all rows, those that stick among them, and of the priors."""
         x = np.r_[found.mu, found.compliance, found.lag, found.load]
         r = self.residuals(x, share) / scale
-        far = np.r_[found.lag - self.lag, found.load] / self.prior
+        far = np.r_[found.lag, found.load] / self.prior
         return float(np.sum(np.minimum(r**2, 9.0)) + far @ far)
 
 

@@ -50,11 +50,8 @@ def heights_of(path: Path, scale: float, reach: float) -> Array:
     if 2 * half + 1 > MOST:
         raise InputError(f"a path on a mesh may reach {MOST * SPACING / 2 - MARGIN:.2g} m, got {reach:.2g} m")
     grid = np.full((2 * half + 1, 2 * half + 1), -np.inf)
-    _raster(
-        np.ascontiguousarray((points - [*(low + high)[:2] / 2, 0.0]) / SPACING + [half, half, 0.0]),
-        faces,
-        grid,
-    )
+    points = (points - [*(low + high)[:2] / 2, 0.0]) / SPACING + [half, half, 0.0]
+    _raster(np.ascontiguousarray(points), faces, grid)
     _check(path, grid, half)
     heights = SPACING * (grid - grid[half, half])
     return np.stack([heights, *np.gradient(heights, SPACING)])

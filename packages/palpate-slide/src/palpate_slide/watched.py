@@ -71,15 +71,8 @@ class WatchedSlide(WatchedArm):
     def reset(self, seed: int | None = None) -> None:
         """To the beginning, the sliders where they stand."""
         self.state.begin(seed)
-        self._run = JointedSlide(
-            self._at,
-            self._gains,
-            self._surface,
-            self._direction,
-            self._into,
-            self.state.seed or 0,
-            tool=self._tool,
-        )
+        asked = self._at, self._gains, self._surface, self._direction, self._into, self.state.seed or 0
+        self._run = JointedSlide(*asked, tool=self._tool)
         self._run.loop.desired = self.state.values["force"]
         self._k, self._angle, self._own = 0, 0.0, np.zeros(len(COLUMNS))
 
