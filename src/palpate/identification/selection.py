@@ -89,9 +89,8 @@ def _descent(start: Linearisation) -> tuple[Linearisation, float]:
             step = step / 2
         if np.all(np.abs(step) <= rests):
             break
-        local = Linearisation.of(
-            start.problem, start.model, start.segments, best.moved(theta, step), best.use
-        )
+        about = best.moved(theta, step)
+        local = Linearisation.of(start.problem, start.model, start.segments, about, best.use)
     return best, least
 
 
@@ -113,13 +112,9 @@ def _starts(local: Linearisation) -> list[Linearisation]:
         here = held(other.system, other.searched)
         misfits.append(other.misfit(here))
         tried.append(dict(zip(other.names, here.theta.tolist(), strict=True)))
-    return [
-        Linearisation.of(problem, local.model, local.segments, tried[i], local.use)
-        for i, (before, own, after) in enumerate(
-            zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
-        )
-        if own < before and own <= after
-    ]
+    beside = zip(tried, misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
+    least = [about for about, before, own, after in beside if own < before and own <= after]
+    return [Linearisation.of(problem, local.model, local.segments, about, local.use) for about in least]
 
 
 def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:

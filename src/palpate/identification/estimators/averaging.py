@@ -146,9 +146,8 @@ def _mean(weight: Array, spreads: list[Spread]) -> Spread:
     """Of the variances, and of their degrees of freedom as each adds to it."""
     variance = np.stack([own.variance for own in spreads]) * weight[:, None]
     whole = variance.sum(axis=0)
-    loss = sum(
-        (own / spread.each for own, spread in zip(variance, spreads, strict=True)), np.zeros(len(whole))
-    )
+    losses = (own / spread.each for own, spread in zip(variance, spreads, strict=True))
+    loss = sum(losses, np.zeros(len(whole)))
     return Spread(whole, np.where(loss > 0, whole / np.where(loss > 0, loss, 1.0), np.inf))
 
 

@@ -153,10 +153,8 @@ def slope_of(loadings: list[Loading], level: float | None = None) -> Slopes | No
     if level is not None:
         del causes["curvature"]
     causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
-    at = float(forces.mean()), float(depths.mean())
-    return Slopes(
-        *at, Measurement(mean.value, causes), tuple(slopes.tolist()), mean.next_half, float(rises.mean())
-    )
+    at, found = (float(forces.mean()), float(depths.mean())), Measurement(mean.value, causes)
+    return Slopes(*at, found, tuple(slopes.tolist()), mean.next_half, float(rises.mean()))
 
 
 def _slope_in(loading: Loading, level: float | None) -> tuple[float, ...] | None:
