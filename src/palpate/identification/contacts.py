@@ -75,11 +75,9 @@ class Contacts:
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
     """Find the contacts with the widest filter, choose the filter from them, and find them again with it.
 
-    Raises:
-        InputError: a cut-off that the readings are too rare for.
+    A cut-off that the readings are too rare for is an `InputError`.
     """
-    cutoff = options.cutoff
-    highest = FASTEST * channels.rate
+    cutoff, highest = options.cutoff, FASTEST * channels.rate
     if cutoff is not None and cutoff > 2 * highest:
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
@@ -101,16 +99,14 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
     around = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)  # its rise and fall, too
-    chosen = cutoff or choose_cutoff(
-        channels.position[around], channels.force[around], channels.dt, channels.rate
-    )
+    own = channels.position[around], channels.force[around]
+    chosen = cutoff or choose_cutoff(*own, channels.dt, channels.rate)
     if chosen > 0.9 * highest:
         return channels, chain, contacts
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = _find_contacts(fewer, narrow, air, options, strokes)
-    again = replace(again, drift=drift, press=contacts.press)
+    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=contacts.press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -166,11 +162,12 @@ def _find_contacts(
     sign = 1.0 if peak > rest else -1.0
     top = sign * peak
     level = _resting(sign * force, sign * rest, top)
-    low_force = np.abs(sign * force[sign * force < level + ONSET * (top - level)] - level)
+    onset = ONSET * (
+        top - level
+    )  # the threshold is clear of this share of the peak, and of the noise at rest
+    low_force = np.abs(sign * force[sign * force < level + onset] - level)
     noise = GAUSSIAN * float(np.median(low_force)) if len(low_force) else 0.0
-    threshold = level + max(
-        ONSET * (top - level), 5 * noise
-    )  # clear of a share of the peak, and of the noise
+    threshold = level + max(onset, 5 * noise)
     touches = _touches(sign * force, level, top, threshold)
     least = max(_FEWEST, int(2 * chain.settling / chain.dt))  # longer than the filter needs to settle
     spans = [(b, e) for b, e in touches if e - b >= least]
@@ -235,16 +232,16 @@ def _never_left(
     rows = [stroke.rows(channels) for stroke in strokes]
     rises = sum(float(np.cov(sign * channels.force[own], channels.position[own])[0, 1]) for own in rows)
     way = -1.0 if rises < 0 else 1.0
-    reversed_signs = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
-    found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, reversed_signs, clear=False)
+    told = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
+    found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, told, clear=False)
     if options.bonded:
-        return found if strokes else replace(found, warnings=())
+        return found
     width = max(len(force) // _BLOCKS, 1)
     f, x = (detrend(block_means(values, width)) for values in (sign * force, way * position))
     along = float(f @ x) / (float(np.sqrt((f @ f) * (x @ x))) or np.inf)
     text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
-    warnings = (Warn(Code.CONTACT_AT_START, text), *reversed_signs)
-    return replace(found, warnings=warnings, signed=bool(strokes) or along > _SIGNED)
+    told = (Warn(Code.CONTACT_AT_START, text), *told)
+    return replace(found, warnings=told, signed=bool(strokes) or along > _SIGNED)
 
 
 def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:

@@ -14,7 +14,7 @@ from palpate.arrays import Array, Mask
 from palpate.identification.filters.sensor_path import position_noise
 from palpate.identification.filters.state_variable import Chain, block_means, white_noise
 from palpate.identification.least_squares import noise_of
-from palpate.identification.pooling import Mean, random_effects
+from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
 from palpate.signals.samples import GAUSSIAN, runs
@@ -70,8 +70,7 @@ class Drift:
         at = np.clip(np.searchsorted(self.times, times) - 1, 0, len(apart) - 1)
         share = np.clip((times - self.times[at]) / apart[at], 0.0, 1.0)
         order = np.pi * np.arange(1, _BENDS + 1)
-        found: Array = (walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order
-        return found
+        return np.asarray((walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order)
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,7 @@ class FreeMotion:
 
     def drift(self, rows: Array) -> Array:
         """Drift of the free-motion force at some rows, relative to its middle [N]: straight lines between stays."""
-        found: Array = np.interp(rows, self.stays, self.levels) - self.rest
-        return found
+        return np.asarray(np.interp(rows, self.stays, self.levels) - self.rest)
 
     def among(self, position: Array) -> list[tuple[int, int]]:
         """First and past-the-last row of each stay in it, of a position of shape (n,)."""
@@ -307,24 +305,15 @@ def payload_of(
     if by_motion <= _EXPLAINED or any(by_motion <= _OTHERS * _accounts(column, force) for column in others):
         return None
     noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
-    level = noise.variance * len(force) / noise.effective
-    mean = _of_parts(force, motion, stays, level)
-    return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
-
-
-def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:
-    """The mass that both halves of each stay tell: a tone in the force goes with some of the motion, not with all.
-
-    Force [N] and acceleration [m/s^2] are those of the stays, one after the other, shape (n,). The variance of a mass
-    is `level` over the sum of the motion's squares.
-    """
+    # Both halves of each stay tell the mass: a tone in the force goes with some of the motion, not with all.
     ends = np.cumsum([0, *(b - a for a, b in stays)])
     edges = np.sort(np.concatenate([ends, (ends[:-1] + ends[1:]) // 2]))
     parts = [(motion[a:b] - motion[a:b].mean(), force[a:b]) for a, b in pairwise(edges.tolist())]
-    size = np.array([float(own @ own) for own, _ in parts])
-    told = size > _LEAST * size.max()
-    masses = np.array([float(own @ f) for own, f in parts])[told] / size[told]
-    return random_effects(masses, level / size[told])
+    sizes = np.array([float(part @ part) for part, _ in parts])
+    told = sizes > _LEAST * sizes.max()
+    masses = np.array([float(part @ f) for part, f in parts])[told] / sizes[told]
+    mean = random_effects(masses, noise.variance * len(force) / noise.effective / sizes[told])
+    return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
 def _accounts(column: Array, force: Array) -> float:

@@ -94,15 +94,12 @@ class SeriesSpring:
             swings = 1.0 - squared * self.share
             gain = swings * abs(self.stiffness / (self.stiffness - seen)) ** 2
             by_spring = Contribution(abs(swings) * self.std * abs(behind / self.stiffness) ** 2)
-            storage, loss = (
-                part.through(swings * own, gain).with_cause(_SPRING, by_spring)
-                for part, own in ((octave.in_phase, behind.real), (octave.in_quadrature, behind.imag))
-            )
-            if self.share_std:
-                by_tip = squared * self.share_std
-                storage = storage.with_cause(_TIP, Contribution(by_tip * abs(behind.real)))
-                loss = loss.with_cause(_TIP, Contribution(by_tip * abs(behind.imag)))
-            found.append(replace(octave, in_phase=storage, in_quadrature=loss))
+            parts = []
+            for part, own in ((octave.in_phase, behind.real), (octave.in_quadrature, behind.imag)):
+                surface = part.through(swings * own, gain).with_cause(_SPRING, by_spring)
+                by_tip = Contribution(squared * self.share_std * abs(own))
+                parts.append(surface.with_cause(_TIP, by_tip) if self.share_std else surface)
+            found.append(replace(octave, in_phase=parts[0], in_quadrature=parts[1]))
         return tuple(found)
 
     def slope(self, seen: Measurement) -> Measurement:
@@ -121,12 +118,7 @@ class SeriesSpring:
     def press(self, seen: Press) -> Press:
         """The press over the depth of the surface alone."""
         softer = (t for t in seen.tangent if t.stiffness < self.stiffness)
-        curves = []
-        for curve in (seen.loading, seen.unloading):
-            own = curve.copy()
-            if own.size:
-                own[0] -= (own[1] - own[1][0]) / self.stiffness
-            curves.append(own)
+        curves = [np.stack([d - (f - f[:1]) / self.stiffness, f]) for d, f in (seen.loading, seen.unloading)]
         tangent = tuple(Tangent(t.force, self.slope(t.slope)) for t in softer)
         return replace(seen, tangent=tangent, loading=curves[0], unloading=curves[1])
 

@@ -130,9 +130,7 @@ def with_modulus(
     check_poisson(poisson)
     units = (found.traces.force_unit, found.traces.position_unit) if found.traces else ("N", "m")
     if units != ("N", "m"):
-        raise InputError(
-            f"an indenter needs force in N and position in m, this log has {units[0]} and {units[1]}"
-        )
+        raise InputError(f"an indenter needs force in N and position in m, not {units[0]} and {units[1]}")
     modulus = _modulus(found.press, indenter, poisson, tolerance)
     return replace(found, parameters={"E": modulus, **found.parameters})
 
@@ -201,8 +199,7 @@ def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, redu
     before = (found_at / (c * reduced)) ** (1 / p)
     least = 1e-3 * float(np.abs(depth).max())  # a touch found too late leaves a force at no depth
     at = np.maximum(np.interp(force, rising, depth) + before, least)
-    found: Array = slope / (p * c * at ** (p - 1))
-    return found
+    return np.asarray(slope / (p * c * at ** (p - 1)))
 
 
 def _beyond_hertz(strain: float) -> float:

@@ -44,8 +44,7 @@ def solve(columns: Array, target: Array) -> Array:
     scale[scale == 0] = 1.0
     gram = columns.T @ columns / np.outer(scale, scale)
     if np.linalg.cond(gram) > 1e10:
-        theta: Array = np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale
-        return theta
+        return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale)
     return np.linalg.solve(gram, (columns.T @ target) / scale) / scale
 
 
@@ -96,8 +95,7 @@ def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Arr
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)
     bread = inverse(gram)
-    cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
-    return cov
+    return np.asarray(bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale))
 
 
 def inverse(normal: Array) -> Array:
@@ -138,8 +136,7 @@ def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
     """
     jumps = np.diff(place)
     step = max(int(np.gcd.reduce(jumps)), 1)
-    closed: NDArray[np.intp] = np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))]
-    return closed
+    return np.asarray(np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))])
 
 
 def _spread(values: Array, place: NDArray[np.intp]) -> Array:

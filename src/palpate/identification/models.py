@@ -67,19 +67,13 @@ class Motion:
     @property
     def instants(self) -> Array:
         """Sample of the position that each row belongs to, shape (m,)."""
-        if isinstance(self.chain, SensorPath):
-            return self.chain.instants[self.rows]
-        return self.rows.astype(np.float64)
+        chain, rows = self.chain, self.rows
+        return chain.instants[rows] if isinstance(chain, SensorPath) else rows.astype(np.float64)
 
     @property
     def matched(self) -> bool:
         """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
         return isinstance(self.chain, SensorPath)
-
-    @property
-    def duration(self) -> float:
-        """Time that the rows cover [s]."""
-        return len(self.rows) * self.chain.period
 
     @property
     def ones(self) -> Array:
@@ -186,7 +180,7 @@ _POWER = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
 
 def _time(motion: Motion) -> NonlinearParameter:
     """A relaxation time that this log can show: between the filter's and the log's."""
-    shortest, longest = 2 / motion.chain.rate, motion.duration
+    shortest, longest = 2 / motion.chain.rate, len(motion.rows) * motion.chain.period
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
     return NonlinearParameter("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
 

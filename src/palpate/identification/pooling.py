@@ -92,8 +92,7 @@ def random_effects(values: Array, variances: Array, covariates: Array | None = N
     offsets = np.empty((n, 0)) if covariates is None else covariates - covariates.mean(axis=0)
     spans = offsets.std(axis=0)
     design = np.column_stack([np.ones(n), offsets / spans])
-    freedom = n - design.shape[1]
-    between = _between(y, own, design)
+    freedom, between = n - design.shape[1], _between(y, own, design)
     weight = 1 / (own + between)
     theta, inverse = _least_squares(y, weight, design)
     excess = max(float(weight @ (y - design @ theta) ** 2) / freedom, 1.0)
@@ -225,8 +224,8 @@ def pool(
         covariates: by name, one number of each log, such as its temperature: the dependence on each is pooled, too.
 
     Raises:
-        InputError: as many names, or numbers of a covariate, as there are logs are wanted; a covariate is not finite,
-            or does not vary by itself.
+        InputError: there are not as many names, or numbers of a covariate, as logs; a covariate is not finite, or does
+            not vary by itself.
     """
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
@@ -253,13 +252,13 @@ class _Covariates:
 
     @classmethod
     def of(cls, given: Mapping[str, ArrayLike], count: int) -> _Covariates:
-        columns = {name: np.asarray(values, np.float64) for name, values in given.items()}
-        for name, column in columns.items():
+        found = cls((), np.empty((count, 0)))
+        for name, values in given.items():
+            column = np.asarray(values, np.float64)
             if column.shape != (count,) or not np.isfinite(column).all():
                 raise InputError(f"the covariate {name} must be a number for each of the {count} logs")
-        found = cls(tuple(columns), np.column_stack([np.empty((count, 0)), *columns.values()]))
-        for i, name in enumerate(columns):
-            if not cls(found.names[: i + 1], found.numbers[:, : i + 1]).vary(range(count)):
+            found = cls((*found.names, name), np.column_stack([found.numbers, column]))
+            if not found.vary(range(count)):
                 raise InputError(
                     f"the covariate {name} is the same in all {count} logs, or a combination of others; leave it out"
                 )

@@ -35,9 +35,8 @@ def number_rows(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
     """The rows of all contacts, and the number of each one's contact; an `InputError` where they are too few."""
     rows = np.concatenate(contacts)
     if len(rows) < _FEWEST:
-        text = (
-            f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed: log longer or faster"
-        )
+        few = f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed"
+        text = f"{few}: log longer or faster"
         lost = [w.text for w in channels.warnings if w.code in (Code.SATURATED, Code.MISSING_SAMPLES)]
         raise InputError(f"{text} ({'; '.join(lost)})" if lost else text)
     return rows, np.repeat(np.arange(len(contacts)), [len(own) for own in contacts])

@@ -84,8 +84,8 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     sample that equals the one before shows no change, but that only weakens the lines. As rows are whole, a line at f
     stands at 1 - f too; from periods near 2 both may be meant.
     """
-    far = np.abs(changed - changed[len(changed) // 2])
-    own = changed[far < _near(far)]
+    far, reach = _reach(changed)
+    own = changed[far < reach]
     least = float(np.percentile(np.diff(own), _SHORTEST))
     size = 8 << int(own[-1] - own[0]).bit_length()
     line = np.zeros(size)
@@ -110,9 +110,10 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     return found
 
 
-def _near(far: NDArray[np.intp]) -> int:
-    """How far from the middle of the changes the grid is looked for, in rows: enough of them must be there."""
-    return max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
+def _reach(changed: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
+    """Distance of each change from the middle one, and that within which enough of them are to look for the grid."""
+    far = np.abs(changed - changed[len(changed) // 2])
+    return far, max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
 
 
 def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
@@ -120,8 +121,7 @@ def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[ND
 
     Counted from the middle of the log to both sides, the period made better on the way.
     """
-    far = np.abs(changed - changed[len(changed) // 2])
-    reach = _near(far)
+    far, reach = _reach(changed)
     while True:
         own = changed[far < reach]
         period, middle = (float(x) for x in np.polyfit(np.round((own - middle) / period), own, 1))
@@ -191,15 +191,11 @@ _STEPS = 4.0
 
 
 def at_limit(force: Array, place: Array, levels: Iterable[float], among: Mask | None = None) -> Mask:
-    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
+    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,), `among` those that count.
 
-    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
-
-    Args:
-        force: of one axis [N], shape (n,).
-        place: of the probe [m], shape (n,) or (n, 3); NaN where there is no reading.
-        levels: the forces that may be an end of the range [N].
-        among: rows that count, shape (n,); all if not given.
+    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution. The
+    force of one axis [N] has the shape (n,), the place of the probe [m] (n,) or (n, 3), NaN where there is no reading;
+    `levels` are the forces that may be an end of the range [N].
     """
     stuck = np.zeros(len(force), bool)
     rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
@@ -226,11 +222,7 @@ def past_end(position: Array, force: Array) -> Mask:
     """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
 
     A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
-    goes on and comes back.
-
-    Args:
-        position: of one axis [m], shape (n,).
-        force: of the same rows [N], shape (n,).
+    goes on and comes back. Position [m] and force [N] have the shape (n,).
     """
     rise = np.sign(float(np.cov(position, force)[0, 1]))
     noise = float(np.median(np.abs(np.diff(force, 2)))) / 1.65  # of a normal distribution: 6^0.5 times 0.674
@@ -240,9 +232,7 @@ def past_end(position: Array, force: Array) -> Mask:
             first, *own, last = way * force[begin:end]
             inside, quarter = np.array(own), (end - begin + 3) // 4
             beyond = [float(inside.mean()) - at for at in (first, last)]
-            near = [
-                float(part.mean()) - at for part, at in ((inside[:quarter], first), (inside[-quarter:], last))
-            ]
+            near = float(inside[:quarter].mean()) - first, float(inside[-quarter:].mean()) - last
             clear = min(beyond) > _MORE * noise * (1 + 1 / len(own)) ** 0.5
             past[begin:end] = clear and all(n > _FLANK * b for n, b in zip(near, beyond, strict=True))
     return past

@@ -85,8 +85,7 @@ class Channels:
     @property
     def time(self) -> Array:
         """Of each sample [s], shape (n,)."""
-        time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
-        return time
+        return np.asarray(self.start + np.arange(len(self.position), dtype=np.float64) * self.dt)
 
 
 def channels_of(record: Record) -> Channels:
@@ -103,10 +102,8 @@ def channels_of(record: Record) -> Channels:
     step = np.diff(time)
     twice = int((step == 0).sum())
     if twice:
-        row = int(np.flatnonzero(step == 0)[0]) + 2
-        text = (
-            f"{twice} rows repeat the time of the row before (first in row {row}); the first of each is kept"
-        )
+        first = f"first in row {int(np.flatnonzero(step == 0)[0]) + 2}"
+        text = f"{twice} rows repeat the time of the row before ({first}); the first of each is kept"
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
         keep = np.r_[True, step > 0]
         time, position, force = time[keep], position[keep], force[keep]
@@ -118,10 +115,8 @@ def channels_of(record: Record) -> Channels:
     _leave_saturated(use_x, use_f, position, force, warnings)
     rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
     if rate < _SLOW:
-        text = (
-            f"only {rate:.3g} fresh readings a second: motion faster than about {rate / 8:.2g} Hz is not seen"
-        )
-        warnings.append(Warn(Code.LOW_RATE, text))
+        seen = f"motion faster than about {rate / 8:.2g} Hz is not seen"
+        warnings.append(Warn(Code.LOW_RATE, f"only {rate:.3g} fresh readings a second: {seen}"))
         if dt >= _LONG_STEP:
             text = f"by its unit there is a row every {dt:.3g} s: is the time in ms? then say NAME:ms"
             warnings.append(Warn(Code.TIME_DOUBTFUL, text))
@@ -216,18 +211,16 @@ def _check(time: Array, position: Array, force: Array) -> None:
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
     if (rate := _rate(time)) > _FASTEST:
-        raise InputError(
-            f"there are {rate:.3g} rows a second, faster than any sensor; is the unit of time right?"
-        )
+        fast = f"there are {rate:.3g} rows a second, faster than any sensor"
+        raise InputError(f"{fast}; is the unit of time right?")
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
-            raise InputError(
-                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
-            )
+            large = f"the {name} reaches {reach:.3g}, beyond any sensor"
+            raise InputError(f"{large}; is it the right column and unit?")
         if np.ptp(seen) == 0:
             still = f"the {name} is {seen[0]:.6g} in every row"
             raise InputError(f"{still}; is it the right column, and did anything move?")

@@ -16,10 +16,9 @@ from palpate.force.sliding.slide_state import SLIDING_TROUBLES
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import data_address
+from palpate.report.page import Card, PageAnswer, answer_page, data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of
@@ -110,7 +109,8 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     columns = {name: column for name, column in columns.items() if not np.isnan(column).all()}
     units = {name: _UNITS.get(name, "1") for name in columns}
-    write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
+    about = {"command": summary["command"], "wrench_frame": "base"}
+    write_record(Record(columns, units, about), folder / RECORD)
     charts = _charts(rows, gains, summary)
     style.save(figure_of(charts), folder / "slide.png")
     shown = panels(charts)

@@ -91,8 +91,7 @@ def _evidence(whole: Array, weights: Array, mean: Array) -> Array:
     along = np.einsum("mij,mi->mj", vector, right)
     explained = (np.where(value > _SINGULAR, along**2, 0.0) / value).sum(axis=1)
     spread = np.log(value).sum(axis=1) + 2 * np.log(size).sum(axis=1) - np.log(weights + 1e-300).sum(axis=1)
-    found: Array = (explained - weights @ mean**2 - spread) / 2
-    return found
+    return np.asarray((explained - weights @ mean**2 - spread) / 2)
 
 
 def averaged(parts: list[Member]) -> Solution:
@@ -163,12 +162,8 @@ _ROUNDED = 100.0
 def position_lines(motion: Motion, dt: float, longest: int, count: int, most: int) -> dict[int, Array]:
     """Power of the position's noise times omega^k in a line of each octave, shape (count,), by even k.
 
-    Args:
-        motion: of the log.
-        dt: from row to row [s].
-        longest: rows of the block of the first octave.
-        count: of the octaves.
-        most: the highest derivative; k goes up to twice that.
+    `dt` is from row to row [s], `longest` the rows of the block of the first octave; k goes up to twice the highest
+    derivative, `most`.
     """
     chain = motion.chain
 

@@ -158,8 +158,7 @@ def _scaling(normal: Array, cov: Array) -> Array:
     left = np.eye(len(root)) - half.T @ (cov / np.outer(size, size)) @ half
     less, turn = np.linalg.eigh(left)
     scale = turn * np.where(less > _ALONE, 1 / np.sqrt(np.maximum(less, _ALONE)), 0.0) @ turn.T
-    found: Array = (half @ scale @ (vector / root).T) * np.outer(1 / size, size)
-    return found
+    return np.asarray((half @ scale @ (vector / root).T) * np.outer(1 / size, size))
 
 
 def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:

@@ -85,9 +85,8 @@ class Descent:
         """The best of the start values of the nonlinear parameters."""
         names = [parameter.name for parameter in self.model.nonlinear]
         starts = product(*(parameter.starts for parameter in self.model.nonlinear))
-        return min(
-            (self.at(dict(zip(names, values, strict=True)), lag) for values in starts), key=lambda p: p.rss
-        )
+        points = (self.at(dict(zip(names, values, strict=True)), lag) for values in starts)
+        return min(points, key=lambda point: point.rss)
 
     def from_point(self, point: Point, lag: Lag | None) -> Point:
         """The least cost near a point; the lag is looked for within its prior, and stays if that is None."""
@@ -108,10 +107,8 @@ class Descent:
                 point, damping = trial, max(damping / 10, _UNDAMPED)
                 if gain < _CONVERGED and damping <= _UNDAMPED:
                     break
-            else:
-                damping *= 10
-                if damping > 1e6:
-                    break
+            elif (damping := 10 * damping) > 1e6:
+                break
         return point
 
     def jacobian(self, point: Point) -> Array:
@@ -194,8 +191,7 @@ def _damped_step(jacobian: Array, residuals: Array, linear: int, damping: float)
     gram = jacobian.T @ jacobian / np.outer(scale, scale)
     gram[np.arange(linear, len(scale)), np.arange(linear, len(scale))] += damping
     vector = jacobian.T @ residuals / scale
-    step: Array = np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale
-    return step
+    return np.asarray(np.linalg.lstsq(gram, vector, rcond=1e-13)[0] / scale)
 
 
 def _move(point: Point, outer: Sequence[NonlinearParameter], step: Array) -> tuple[dict[str, float], float]:

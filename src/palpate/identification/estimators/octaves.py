@@ -71,14 +71,12 @@ class Octaves:
     @property
     def total(self) -> Array:
         """Sums over all groups, shape (octaves, p, p)."""
-        whole: Array = self.products.sum(axis=0)
-        return whole
+        return np.asarray(self.products.sum(axis=0))
 
     @property
     def all_lines(self) -> Array:
         """Lines of all groups, shape (octaves,)."""
-        whole: Array = self.lines.sum(axis=0)
-        return whole
+        return np.asarray(self.lines.sum(axis=0))
 
     def only(self, use: Mask) -> Octaves:
         """The same with some octaves alone, shape (octaves,)."""

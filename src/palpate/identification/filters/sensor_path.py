@@ -52,8 +52,7 @@ class PositionNoise:
         jumps = _IN_BAND * self.jump**2 / np.maximum(step, 1e-12)
         if self.count and self.jump:
             jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
-        found: Array = self.white**2 + jumps
-        return found
+        return np.asarray(self.white**2 + jumps)
 
     def spread(self, weights: Array) -> Array:
         """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k), by the weights, (k, n), k > 2.
@@ -66,8 +65,7 @@ class PositionNoise:
         steps[0] = 0.0
         of_jumps = steps @ steps.T
         of_jumps[0, 2] = of_jumps[2, 0] = -of_jumps[1, 1]
-        found: Array = self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps
-        return found
+        return np.asarray(self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps)
 
 
 NOISELESS = PositionNoise(0.0, 0.0)
@@ -166,8 +164,7 @@ class SensorPath:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the position's first sample."""
-        found: Array = self.instants[rows] * self.dt
-        return found
+        return np.asarray(self.instants[rows] * self.dt)
 
     def force_gain(self, frequency: Array) -> Array:
         """Of the amplitude of the readings' own noise: they are taken as they are."""

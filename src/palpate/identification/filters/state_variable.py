@@ -50,13 +50,11 @@ class Chain:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the first sample, less the chain's own delay."""
-        found: Array = rows.astype(np.float64) * self.dt - self.delay
-        return found
+        return np.asarray(rows.astype(np.float64) * self.dt - self.delay)
 
     def force_gain(self, frequency: Array) -> Array:
         """Of its amplitude at frequencies [Hz]."""
-        found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
-        return found
+        return np.asarray((1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2))
 
     position_gain = force_gain
 
@@ -173,8 +171,7 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     decay = np.exp(-dt / time_constant)
     b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
     driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
-    found: Array = solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven)
-    return found
+    return np.asarray(solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven))
 
 
 def white_noise(signal: Array) -> float:
@@ -189,8 +186,7 @@ def white_noise(signal: Array) -> float:
 def block_means(signal: Array, size: int) -> Array:
     """Means of neighbouring blocks of `size` samples, shape (n // size,); the rest at the end is dropped."""
     count = len(signal) // size
-    means: Array = signal[: count * size].reshape(count, size).mean(axis=1)
-    return means
+    return np.asarray(signal[: count * size].reshape(count, size).mean(axis=1))
 
 
 def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
