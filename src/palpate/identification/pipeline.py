@@ -71,7 +71,7 @@ def identify(record: Record, **given: Any) -> Identification:
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return _nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
+    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer)
     series = SeriesSpring.of(options)
     if series is not None:
         choice = replace(choice, answer=series.parameters(choice.answer, problem.band))

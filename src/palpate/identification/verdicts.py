@@ -140,7 +140,8 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
         return found
     if shown is None or own is None:
         return found
-    parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause != "calibration"}
+    common = "calibration", "friction", "loadings"  # of the answer, too
+    parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause not in common}
     along = found.cov @ slope
     power = float(slope @ along)
     gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(parts))), 0.0)

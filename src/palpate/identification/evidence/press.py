@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -24,7 +25,7 @@ from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.steady_press import Slopes, SteadyPress, few_points
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
 
@@ -166,27 +167,31 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
-def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
+def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | None = None) -> Evidence:
     """Dynamic stiffness, press and working point of the surface.
 
     Args:
         problem: of the log.
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
-        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
+        answer: with the forces beside the contact; None if nothing is known of them.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         return (), None, None
     lag = problem.lag
-    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
+    at = problem.motion.instants
+    friction = (
+        [np.interp(at, answer.problem.motion.instants, own) for own in answer.friction.T] if answer else []
+    )
+    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std, friction)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
-    headline = (
-        None if steady is None else replace(steady.headline, depth=steady.headline.depth - problem.origin)
-    )
+    headline = None
     if steady is not None:
+        headline = _among_loadings(steady.headline, whole)
+        headline = replace(headline, depth=headline.depth - problem.origin)
         press = at_constant_speed(steady, press, problem.origin)
     series = SeriesSpring.of(options)
     if series is not None:
@@ -195,7 +200,30 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
         headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
-    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
+    return spectrum, press, working_point(whole, spectrum, options, unit, answer.hidden if answer else 0.0)
+
+
+def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
+    """A tangent of strokes at constant speed, no more certain than the log's other loadings agree with it.
+
+    The square of their difference, less what their intervals let it be, is the variance between them (Paule and Mandel,
+    1982, of two): a stroke may be the second on a surface that has yielded.
+    """
+    segments, lag = segments_of(problem.motion.rows, problem.spans), problem.lag.value
+    loadings = loadings_in(problem, lag, segments)
+    if not loadings:
+        return headline
+    rest = 0.0 if problem.counted else problem.contacts.resting
+    low, high = np.percentile(np.concatenate([own.force for own in loadings]), [2, 98])
+    level = (headline.force + rest - low) / (high - low or 1.0)
+    other = slope_between(loadings, read_later(problem, lag, segments, loadings), level)
+    if other is None:
+        return headline
+    own, both = headline.stiffness, other.stiffness
+    between = max((both.value - own.value) ** 2 - both.half**2 - own.half**2, 0.0)
+    return replace(
+        headline, stiffness=own.with_cause("loadings", Contribution.within(float(np.sqrt(between))))
+    )
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
