@@ -121,8 +121,9 @@ def _at(found: Answer, name: str, terms: Terms) -> str:
 
 
 def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
-    """An answer with the gap between its stiffness at the working point and the log's own there as a cause.
+    """An answer with the gap between the stiffness of its force at the working point and of the log's as a cause.
 
+    Both are read in the same way: the slope of a press has a mass and a damping in it, in the log as in the answer.
     A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
     covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter).
 
@@ -132,15 +133,8 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
-    if found.fit.model.nonlinear:
-        shown, predicted = (
-            stiffness_of(found.problem, found.problem.force, point),
-            _model_stiffness(found, point),
-        )
-    elif {"K", "M"} <= set(found.names):
-        shown, predicted = point.stiffness.value, _dynamic_stiffness(found, point.frequency_Hz)
-    else:
-        return found
+    shown = stiffness_of(found.problem, found.problem.force, point)
+    predicted = None if shown is None else _model_stiffness(found, point)
     if shown is None or predicted is None:
         return found
     own, slope = predicted
@@ -163,14 +157,6 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     if apart.std**2 > variance[place]:
         variance[place], freedom[place] = apart.std**2, apart.freedom
     return found.budget | {"repetition": Spread(variance, freedom)}
-
-
-def _dynamic_stiffness(found: Answer, frequency: float) -> tuple[float, Array]:
-    """K - omega^2 M of a linear answer at a frequency [Hz], and its derivatives, shape (p,)."""
-    slope = np.zeros(len(found.names))
-    slope[found.names.index("K")] = 1.0
-    slope[found.names.index("M")] = -((2 * np.pi * frequency) ** 2)
-    return float(slope @ found.theta), slope
 
 
 def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] | None:
