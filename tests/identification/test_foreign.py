@@ -167,6 +167,13 @@ def test_a_knowing_estimator_scatters_as_the_bound_says():
     assert 1.96 * found[:, :2].std(0) == pytest.approx([bound["K"], bound["B"]], rel=0.2)
 
 
+def test_a_knowing_estimator_learns_nothing_of_a_probe_at_rest():
+    log = make_log(Cell("mass", "glued"), 970)
+    assert np.ptp(log.dense.depth) < 1e-6 * log.dense.depth.mean()
+    bound = half_widths(log)
+    assert all(bound[name] > abs(log.truth[name][0]) for name in bound)
+
+
 def test_confidently_wrong_is_far_off_or_many_half_widths():
     assert not judged("K", 100, (95, 105), (104, 104)).wrong
     assert judged("K", 100, (60, 140), (130, 130)).holds
