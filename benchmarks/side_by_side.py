@@ -20,7 +20,7 @@ from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers.hybrid import Hybrid
 from palpate.environments import KelvinVoigt
-from palpate.environments.surface_state import contact_force
+from palpate.environments.surface import contact_force
 from palpate.robots import Planar3R
 from palpate.robots.arm3 import Arm3, ArmModel
 from palpate.signals.filters import butterworth2

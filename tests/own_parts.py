@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.bench import Vec3
-from palpate.environments.surface_state import UNTOUCHED, SurfaceState
+from palpate.environments.surface import UNTOUCHED, SurfaceState
 from palpate.identifiers import Estimate
 
 

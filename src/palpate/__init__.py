@@ -35,24 +35,13 @@ a shell: `palpate --help`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from palpate import views
+from palpate import lazy
 
 if TYPE_CHECKING:
     from palpate.calls import identify, identify_log, pool, read_log
     from palpate.errors import InputError, PalpateError
     from palpate.identification import Identification
     from palpate.records import Record
-
-_HOME = {
-    "Identification": "palpate.identification",
-    "InputError": "palpate.errors",
-    "PalpateError": "palpate.errors",
-    "Record": "palpate.records",
-    "identify": "palpate.calls",
-    "identify_log": "palpate.calls",
-    "pool": "palpate.calls",
-    "read_log": "palpate.calls",
-}
 
 _ROOMS = (
     "bench",
@@ -83,7 +72,16 @@ __all__ = [
 ]
 
 
-views.report = lambda: import_module("palpate.report.values")
+lazy.report = lambda: import_module("palpate.report.values")
+
+
+_HOMES = {
+    "calls": ("identify", "identify_log", "pool", "read_log"),
+    "errors": ("InputError", "PalpateError"),
+    "identification": ("Identification",),
+    "records": ("Record",),
+}
+_import_name = lazy.importer(__name__, _HOMES)
 
 
 def __getattr__(name: str) -> Any:
@@ -91,13 +89,7 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("palpate")
-    if name in _ROOMS:
-        return import_module(f"palpate.{name}")
-    if name not in _HOME:
-        raise AttributeError(f"module 'palpate' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
-    value = getattr(import_module(_HOME[name]), name)
-    globals()[name] = value
-    return value
+    return import_module(f"palpate.{name}") if name in _ROOMS else _import_name(name)
 
 
 def __dir__() -> list[str]:

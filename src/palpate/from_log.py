@@ -1,7 +1,5 @@
 """From a log file to an identification in one call: its signals, the arm between sensors and surface, the indenter."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -74,7 +72,7 @@ class LogIdentifier:
             found = with_modulus(found, self.indenter, self.poisson, known.get("tolerance", 0.25))
         return found, along
 
-    def _complete(self, log: Path) -> tuple[LogIdentifier, str]:
+    def _complete(self, log: Path) -> "tuple[LogIdentifier, str]":
         """These with what the log's own names leave no doubt of; what is given goes first."""
         signals, others = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
         frame, arm = self.frame, self.arm

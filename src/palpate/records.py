@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate import views
+from palpate import lazy
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.text import in_python
@@ -44,7 +44,7 @@ def _same_arrays(one: object, other: object) -> bool:
 
 
 class Readable:
-    """A value with a `repr` of one line and a view for notebooks; the report has the facts of each (`views`)."""
+    """A value with a `repr` of one line and a view for notebooks; the report has the facts of each (`lazy.report`)."""
 
     def __init_subclass__(cls, **others: Any) -> None:
         super().__init_subclass__(**others)
@@ -52,11 +52,11 @@ class Readable:
             setattr(cls, name, getattr(cls, name))
 
     def __repr__(self) -> str:
-        return str(views.report().line(self))
+        return str(lazy.report().line(self))
 
     def _repr_html_(self) -> str:
         """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return str(views.report().html(self))
+        return str(lazy.report().html(self))
 
 
 class Compared(Readable):
@@ -75,7 +75,7 @@ class Result(Compared):
     """
 
     def _view(self) -> Any:
-        return views.report().view_of(self)
+        return lazy.report().view_of(self)
 
     def __str__(self) -> str:
         return in_python(str(self._view().text(self)))
@@ -101,7 +101,7 @@ class Result(Compared):
         """
         if path is None:
             return self._view().draw(self)
-        return views.report().write_figure(self, self._view().draw, Path(path))
+        return lazy.report().write_figure(self, self._view().draw, Path(path))
 
     def report(self, path: str | Path) -> Path:
         """Write a page with everything, an HTML file that opens without a network.
@@ -109,7 +109,7 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(views.report().write_page(self, self._view().page, Path(path)))
+        return Path(lazy.report().write_page(self, self._view().page, Path(path)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,6 +26,7 @@ class ArmReading(NamedTuple):
         torque: likewise, about the point that `position` is of [N m].
         position: of the tool in the base [m].
         quaternion: of the tool in the base, x, y, z, w.
+        position_lag: by which the position was taken before `stamp`, by the same clock [s]; positive when it is late.
     """
 
     received: float
@@ -34,6 +35,7 @@ class ArmReading(NamedTuple):
     torque: Triple
     position: Triple
     quaternion: Quaternion
+    position_lag: float = 0.0
 
 
 _UNIT = 0.01
@@ -42,7 +44,8 @@ _UNIT = 0.01
 
 def unreadable(sense: ArmReading) -> str | None:
     """Why a reading is none, whatever came before, in words; None if it is one."""
-    if not all(map(math.isfinite, (sense.stamp, *sense.force, *sense.position, *sense.quaternion))):
+    numbers = (sense.stamp, sense.position_lag, *sense.force, *sense.position, *sense.quaternion)
+    if not all(map(math.isfinite, numbers)):
         return "the arm gives a reading that is no number"
     size = math.hypot(*sense.quaternion)
     if not abs(size * size - 1.0) <= _UNIT:

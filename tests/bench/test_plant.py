@@ -11,8 +11,7 @@ from palpate._jit import kernel
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.bench.plant import Plant
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, StickSlip, join
-from palpate.environments.surface import alone
-from palpate.environments.surface_state import SurfaceState
+from palpate.environments.surface import SurfaceState, alone
 from palpate.friction import LuGre
 from palpate.robots.arm3 import Arm3
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from palpate.bench import ForceSensorTable
 from palpate.bench.tip_on_path import COLUMNS, given_motion
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid
-from palpate.environments.surface_state import UNTOUCHED, SurfaceState
+from palpate.environments.surface import UNTOUCHED, SurfaceState
 from palpate.errors import InputError
 from palpate.instruments import Converter
 from palpate.logs.tables.parquet import read_record, write_record

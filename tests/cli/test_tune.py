@@ -423,3 +423,7 @@ def test_what_stands_there_is_not_replaced_unasked(capsys, elsewhere):
     (elsewhere / "gains.toml").write_text("mine")
     assert "did not write it" in refused(capsys, "tune", *RANGE, "--out", "gains.toml")
     assert (elsewhere / "gains.toml").read_text() == "mine"
+
+
+def test_a_number_of_a_slide_without_a_slide_is_refused(capsys, elsewhere):
+    assert "--mu-max is for a slide; add --slide" in refused(capsys, "tune", *RANGE, "--mu-max", "0.8")

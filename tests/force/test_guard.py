@@ -209,3 +209,7 @@ def test_a_sensor_of_coarse_steps_presses_if_its_step_is_given():
     rows = pressed(world, surface(5e3, 10.0), Guarded(gains.cautious()), 2e-3, np.full(1500, 20.0), 1)
     assert np.abs(rows[-200:, 0] - 20.0).max() < 1.0
     assert rows[:, 0].max() < 1.1 * 20.0
+
+
+def test_no_sentence_of_the_guard_holds_a_name_of_the_code():
+    assert not [text for text in TROUBLES.values() if "_" in text]

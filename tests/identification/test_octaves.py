@@ -117,10 +117,8 @@ def test_groups_are_stretches_of_the_log_that_sum_to_all_of_it():
     found = sums(own)
     assert len(found.products) == GROUPS
     np.testing.assert_allclose(found.products.sum(axis=0), found.total)
-    for group in range(GROUPS):
-        left = found.without(group)
-        np.testing.assert_allclose(left.total, found.total - found.products[group], atol=1e-9)
-        np.testing.assert_allclose(left.all_lines, found.all_lines - found.lines[group], atol=1e-9)
+    np.testing.assert_allclose(found.lines.sum(axis=0), found.all_lines)
+    assert all(group.any() for group in found.products)
 
 
 def test_octaves_alone():

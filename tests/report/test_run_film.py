@@ -9,7 +9,7 @@ from bench.quick import quick
 from palpate.bench import build
 from palpate.records import Record
 from palpate.report.film import FRAMES, frames_of
-from palpate.report.run.film import BEFORE, film
+from palpate.report.run.page import BEFORE, film
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,9 @@ Without arm and control, a tip on a given path: `given_motion(surface).run(path)
 Its names are looked up when they are first used: the summary of a press waits for no bench.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate._jit import law, part
@@ -41,21 +42,14 @@ __all__ = [
     "with_values",
 ]
 
-_HOME = {
-    "_jit": ("law", "part"),
-    "_vector": ("Vec3",),
-    "bench.bench": ("Bench",),
-    "bench.from_experiment": ("build",),
-    "bench.tip_on_path": ("GivenMotion", "given_motion"),
-    "bench.plant": ("Loop", "march", "start_at"),
-    "bench.summary": ("summarise",),
-    "bench.tables": ("Experiment", "ForceSensorTable", "load", "names", "source", "with_values"),
+_HOMES = {
+    "._jit": ("law", "part"),
+    "._vector": ("Vec3",),
+    "bench": ("Bench",),
+    "from_experiment": ("build",),
+    "tip_on_path": ("GivenMotion", "given_motion"),
+    "plant": ("Loop", "march", "start_at"),
+    "summary": ("summarise",),
+    "tables": ("Experiment", "ForceSensorTable", "load", "names", "source", "with_values"),
 }
-
-
-def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
-        if name in names:
-            value = globals()[name] = getattr(import_module(f"palpate.{module}"), name)
-            return value
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = importer(__name__, _HOMES)

@@ -1,7 +1,5 @@
 """The bench: an arm, a surface, a controller and estimators in one loop, run to a record."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -47,7 +45,7 @@ class Bench(Readable):
     def __post_init__(self) -> None:
         controller(type(self.loop.controller))  # a user's own may have only start and step
 
-    def with_surface(self, surface: Any) -> Bench:
+    def with_surface(self, surface: Any) -> "Bench":
         """The same bench before another surface, one of `palpate.environments` or a part of your own.
 
         Its ``truth()``, {name: (value, unit)}, becomes the record's; left out, nothing is known of it.
@@ -57,11 +55,11 @@ class Bench(Readable):
         told = {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
         return replace(self, loop=self.loop._replace(plant=plant), meta={**self.meta, "truth": told})
 
-    def with_controller(self, controller: Any) -> Bench:
+    def with_controller(self, controller: Any) -> "Bench":
         """The same bench with another controller in contact: a part with ``start()`` and ``step``."""
         return replace(self, loop=self.loop._replace(controller=controller))
 
-    def with_identifier(self, identifier: Callable[[], Identifier]) -> Bench:
+    def with_identifier(self, identifier: Callable[[], Identifier]) -> "Bench":
         """The same bench with an identifier that watches; the record has its numbers as ``K_identifier`` and so on.
 
         Args:
@@ -70,7 +68,7 @@ class Bench(Readable):
         """
         return replace(self, identifier=identifier)
 
-    def with_wave(self, wave: ArrayLike) -> Bench:
+    def with_wave(self, wave: ArrayLike) -> "Bench":
         """The same bench, asked for this force on top of its levels and its sine.
 
         Args:

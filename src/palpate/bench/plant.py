@@ -21,8 +21,7 @@ from palpate.bench.force_input import (
 from palpate.bench.summary import CONTACT
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.environments.stick_slip import StickSlip, StickSlipState
-from palpate.environments.surface import Surface
-from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
+from palpate.environments.surface import Surface, SurfaceState, contact_force, follow, opposing
 from palpate.friction import Coulomb, LuGre
 from palpate.instruments import Converter, Encoder
 from palpate.references import ForceSchedule

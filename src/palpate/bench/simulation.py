@@ -16,7 +16,7 @@ from palpate.arrays import Array
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import ALONG_X, Loop, LoopState, compiled_march, march, tick
 from palpate.bench.summary import CONTACT
-from palpate.environments.surface_state import touch
+from palpate.environments.surface import touch
 from palpate.errors import PartError
 from palpate.plugins import reason
 from palpate.signals.types import Sense, Task

@@ -13,8 +13,7 @@ from palpate.arrays import Array
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
 from palpate.bench.tables import ForceSensorTable
 from palpate.environments import SurfaceState, join
-from palpate.environments.surface import members, rest_for
-from palpate.environments.surface_state import follow
+from palpate.environments.surface import follow, members, rest_for
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.signals.samples import quantise

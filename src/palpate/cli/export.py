@@ -1,20 +1,16 @@
 """`palpate export`: an identified surface as the contact of a simulator's scene, or a law as C."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import Group, Parameter
-
 from palpate.cli.options.common import WRITTEN, FileOptions
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, options
 from palpate.errors import InputError
 
 
-@Parameter(name="*", group=Group("The scene", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The scene", 1)
 class SceneOptions:
     """The scene and its contact."""
 
@@ -29,8 +25,7 @@ class SceneOptions:
     "The probe, likewise; every geom that can touch the surface if not given."
 
 
-@Parameter(name="*", group=Group("Given parameters", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Given parameters", 2)
 class GivenOptions:
     """Numbers in place of identified ones."""
 
@@ -43,8 +38,7 @@ class GivenOptions:
     explains."""
 
 
-@Parameter(name="*", group=Group("The law, of C", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("The law, of C", 3)
 class LawOptions:
     """A law and its numbers."""
 
@@ -67,8 +61,7 @@ class LawOptions:
     "Of contact-identifier: samples of the force sensor a second in Hz, if not one a tick."
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class ExportOutput(FileOptions):
     """Where the scene or the law is written."""
 

@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
 from palpate.cli.options.common import WRITTEN, CellOptions, PictureOptions
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.errors import InputError, PalpateError
 from palpate.files import check_place, write_text
 
@@ -213,8 +213,7 @@ def _write(
     return [path for path in files if path is not None]
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class IdentifyOutput(PictureOptions):
     """Files of an identification, and how much is printed."""
 
@@ -249,8 +248,7 @@ class IdentifyOutput(PictureOptions):
         return self.picture(f"{name}.identify.png", FORMATS)
 
 
-@Parameter(name="*", group=Group("Several logs", sort_key=5))
-@dataclass(frozen=True, kw_only=True)
+@options("Several logs", 5)
 class CovariateOptions:
     """Conditions that several logs differ in, such as a temperature."""
 

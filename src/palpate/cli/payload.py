@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from cyclopts import Parameter
 
 from palpate.cli._program import print_result
 from palpate.cli.options.common import WRITTEN, CellOptions, FileOptions, ReportOption
 from palpate.cli.options.log import FrameOptions, LogOptions
-from palpate.cli.options.values import Point, si
+from palpate.cli.options.values import Point, options, si
 from palpate.errors import InputError
 from palpate.files import write_text
 
@@ -23,8 +20,7 @@ if TYPE_CHECKING:
 _ENDINGS = (".toml", ".script", ".json", ".yaml")
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class PayloadOutput(ReportOption, FileOptions):
     """Where the payload is written, and a load file that is compared with it."""
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
-
-from cyclopts import Group, Parameter
 
 from palpate.cli import _terminal
 from palpate.cli._program import command, option_of, print_result
@@ -14,7 +11,7 @@ from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options, si
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
@@ -26,8 +23,7 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 
-@Parameter(name="*", group=Group("The press", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The press", 1)
 class AskOptions:
     """The press, of any arm."""
 
@@ -67,8 +63,7 @@ class AskOptions:
         return force
 
 
-@Parameter(name="*", group=Group("A simulated arm", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("A simulated arm", 2)
 class SimulatedOptions:
     """The simulated arm, its surface, and the results."""
 
@@ -124,8 +119,7 @@ class SimulatedOptions:
         )
 
 
-@Parameter(name="*", group=Group("A map of a phantom, by a simulated arm", sort_key=5))
-@dataclass(frozen=True, kw_only=True)
+@options("A map of a phantom, by a simulated arm", 5)
 class PhantomOptions:
     """The phantom and its map."""
 
@@ -140,8 +134,7 @@ class PhantomOptions:
     "Where to write the page after each map; it loads itself again until the last."
 
 
-@Parameter(name="*", group=Group("A real arm, over its wire", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("A real arm, over its wire", 3)
 class WireOptions:
     """The wire, and its safeguards."""
 
@@ -165,8 +158,7 @@ class WireOptions:
     "Build the record of a press that was killed, from the folder of its --record, and end."
 
 
-@Parameter(name="*", group=Group("Limits at which a real arm stops", sort_key=4))
-@dataclass(frozen=True, kw_only=True)
+@options("Limits at which a real arm stops", 4)
 class LimitOptions:
     """Limits that end a press over a wire."""
 
@@ -181,8 +173,8 @@ class LimitOptions:
     "Total duration, as 20:s."
 
 
-def only(part: SimulatedOptions | WireOptions | LimitOptions | PhantomOptions, of: str) -> None:
-    """Refuse options of the other kind of arm.
+def only(part: Any, of: str) -> None:
+    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
 
     Raises:
         InputError: one was given; it is named.

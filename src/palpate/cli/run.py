@@ -159,7 +159,7 @@ def _draw(
     page = run_page(record, summary, found, source, sha256_of(folder / RECORD))
     write_text(folder / "report.html", page)
     if len(record) > 1:
-        from palpate.report.run.film import film
+        from palpate.report.run.page import film
 
         write_text(folder / "film.svg", film(record))
 

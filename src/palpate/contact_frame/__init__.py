@@ -7,8 +7,9 @@ frame on the tool gives the point that touches, p + R r. Along the normal n thes
 Its names are looked up when they are first used: a record of one axis waits for no weighing.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate.contact_frame.arm import ArmDynamics, describe, identify_contact, robot_stiffness, with_arm
@@ -35,7 +36,7 @@ __all__ = [
     "with_arm",
 ]
 
-_HOME = {
+_HOMES = {
     "arm": ("ArmDynamics", "describe", "identify_contact", "robot_stiffness", "with_arm"),
     "load": ("Payload", "load_payload"),
     "load_files": ("compare", "load_text", "read_load"),
@@ -43,11 +44,4 @@ _HOME = {
     "signals_in_base": ("ContactFrame",),
     "tool_payload": ("Weighed", "weigh"),
 }
-
-
-def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
-        if name in names:
-            value = globals()[name] = getattr(import_module(f"{__name__}.{module}"), name)
-            return value
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = importer(__name__, _HOMES)

@@ -1,7 +1,5 @@
 """The object that an arm touched: an identification, with the mass and stiffness of the arm itself taken off."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import entry_points

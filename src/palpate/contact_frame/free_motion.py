@@ -1,7 +1,5 @@
 """Rows of a log as vectors, and where of them the tool moves freely."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from palpate.arrays import Array, Mask

@@ -17,8 +17,6 @@ the normal the two cosines cancel up to d^2; where the tool moves along the surf
 they leave an error of s d.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -76,7 +74,7 @@ def turns(rotations: Array) -> bool:
     return bool(np.linalg.eigvalsh(np.eye(3) - mean @ mean.T)[-1] > _TOLD)
 
 
-def known_load(force: Array, rotations: Array, payload: Payload) -> Load:
+def known_load(force: Array, rotations: Array, payload: "Payload") -> Load:
     """The bias by least squares over free rows, shape (n, 3), with the weight known; the payload's where n is 0."""
     weight = np.array(payload.weight)
     if not len(force):

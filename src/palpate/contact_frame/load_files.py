@@ -8,8 +8,6 @@
   ros2_controllers, from the sensor.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

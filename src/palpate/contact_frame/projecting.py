@@ -4,8 +4,6 @@ A check of lever arm, axes and torque says whether the force passes through the 
 own mass and compliance are removed.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,22 +4,17 @@ The user declares axes of the wrench, tool and normal of the contact. Saturated 
 before the axes are rotated; weight and bias are removed, with the rows in free motion and in contact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_motion import Vector, contact_rows, matrices, read_rows, rows_between
-from palpate.contact_frame.load import Load, known_load, load_of, no_load, robust_load, turns
+from palpate.contact_frame.load import Load, Payload, known_load, load_of, no_load, robust_load, turns
 from palpate.errors import InputError
 from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
-
-if TYPE_CHECKING:
-    from palpate.contact_frame.load import Payload
 
 
 @dataclass(frozen=True)

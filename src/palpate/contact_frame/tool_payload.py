@@ -1,7 +1,5 @@
 """From a log of free motion to a payload, or to the missing orientations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -10,8 +10,6 @@ of groups: Efron, The jackknife, the bootstrap and other resampling plans, 1982,
 nothing without one of them are seen to tell nothing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Checks of a log for weighing: wrong frame, contact, saturation, wrong compensation of the inertia."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

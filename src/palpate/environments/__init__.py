@@ -4,13 +4,15 @@ from palpate.environments.hunt_crossley import HuntCrossley, HuntCrossleySurface
 from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
 from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
 from palpate.environments.stick_slip import StickSlip, StickSlipState
-from palpate.environments.surface import Surface, join, surface_of
-from palpate.environments.surface_state import (
+from palpate.environments.surface import (
+    Surface,
     SurfaceState,
     SurfaceTable,
     contact_force,
     impact,
+    join,
     part_from,
+    surface_of,
     touch,
 )
 

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, NamedTuple
 from msgspec import Meta
 
 from palpate._jit import part
-from palpate.environments.surface_state import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
+from palpate.environments.surface import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
 from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 

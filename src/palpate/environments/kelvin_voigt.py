@@ -3,7 +3,7 @@
 from typing import ClassVar, NamedTuple
 
 from palpate._jit import part
-from palpate.environments.surface_state import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
+from palpate.environments.surface import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
 from palpate.signals.types import NotNegative, Positive, coerce_fields, require
 
 

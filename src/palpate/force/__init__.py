@@ -3,8 +3,9 @@
 Its names are looked up when they are first used: what reads an arm's file waits for no proof.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate.force.arm import Arm, load_arm
@@ -33,7 +34,7 @@ __all__ = [
     "tune",
 ]
 
-_HOME = {
+_HOMES = {
     "arm": ("Arm", "load_arm"),
     "certificate": ("Certificate",),
     "certifying": ("certify",),
@@ -44,11 +45,4 @@ _HOME = {
     "sliding.turning_tool": ("TurningTool",),
     "tuning": ("Tuning", "tune"),
 }
-
-
-def __getattr__(name: str) -> Any:
-    for module, names in _HOME.items():
-        if name in names:
-            value = globals()[name] = getattr(import_module(f"{__name__}.{module}"), name)
-            return value
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = importer(__name__, _HOMES)

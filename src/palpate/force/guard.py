@@ -25,7 +25,7 @@ TROUBLES = {
     "a motor is at its limit, or something blocks the tip: it was held",
     PULLED: "the force is negative beyond its noise: its sign is turned, or the sensor was not tared in free motion; "
     "the tip was held",
-    DRIFTS: "the sensor drifts in free motion, and its bias is next_follow: tare it again before the next press",
+    DRIFTS: "the sensor drifts in free motion, and its bias is followed: tare it again before the next press",
     UNTARED: "the sensor shows a force that does not follow the tip, beyond a tenth of the force asked for: the tip "
     "was held; tare the sensor in free motion",
     BOUNCED: "contact was lost three times before the force was held: the surface is far stiffer than the gains' cap, "

@@ -30,6 +30,8 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
+    "loadings": Cause("differences between loadings", "press more often, at one speed", "A"),
+    "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause(
@@ -79,12 +81,7 @@ _UNKNOWN = {"octave": "blocks", "press": "curvature"}
 
 
 def cause_of(name: str | None, source: str = "") -> Cause:
-    """The cause of that name.
-
-    Args:
-        name: in a budget; None if there is no budget.
-        source: of the working point, `octave` or `press`.
-    """
+    """The cause of that name in a budget; without a budget, that of a working point's source, `octave` or `press`."""
     if name is None:
         return _CAUSES[_UNKNOWN[source]] if source in _UNKNOWN else NOISE
     return _CAUSES.get(name, Cause(name, NOISE.remedy))

@@ -75,11 +75,9 @@ class Contacts:
 def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Channels, Chain, Contacts]:
     """Find the contacts with the widest filter, choose the filter from them, and find them again with it.
 
-    Raises:
-        InputError: a cut-off that the readings are too rare for.
+    A cut-off that the readings are too rare for is an `InputError`.
     """
-    cutoff = options.cutoff
-    highest = FASTEST * channels.rate
+    cutoff, highest = options.cutoff, FASTEST * channels.rate
     if cutoff is not None and cutoff > 2 * highest:
         raise InputError(
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
@@ -92,24 +90,23 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     if air is not None and air.drifts:
         drift = Drift(air.stays * channels.dt, air.levels)
         channels = _without_drift(channels, air)
-    found = replace(find_contacts(channels, chain, air, options, strokes), drift=drift)
-    contacts = _with_press(channels, found, strokes, options)
+    contacts = replace(_find_contacts(channels, chain, air, options, strokes), drift=drift)
+    if strokes:
+        contacts = _with_press(channels, contacts, strokes, options)
     if strokes and contacts.press is None:
-        strokes, contacts = (), replace(find_contacts(channels, chain, air, options), drift=drift)
+        strokes, contacts = (), replace(_find_contacts(channels, chain, air, options, ()), drift=drift)
     if not contacts.spans:
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
     around = slice(max(begin - (end - begin) // 2, 0), end + (end - begin) // 2)  # its rise and fall, too
-    chosen = cutoff or choose_cutoff(
-        channels.position[around], channels.force[around], channels.dt, channels.rate
-    )
+    own = channels.position[around], channels.force[around]
+    chosen = cutoff or choose_cutoff(*own, channels.dt, channels.rate)
     if chosen > 0.9 * highest:
         return channels, chain, contacts
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = find_contacts(fewer, narrow, air, options, strokes)
-    again = replace(again, drift=drift, press=contacts.press)
+    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=contacts.press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -134,8 +131,6 @@ def _with_press(
     channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
 ) -> Contacts:
     """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
-    if not strokes:
-        return contacts
     whole = channels, channels.force, channels.position, options, strokes
     seen = contacts if contacts.spans else _never_left(*whole)
     lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
@@ -144,24 +139,16 @@ def _with_press(
     return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
 
 
-def find_contacts(
-    channels: Channels,
-    chain: Chain,
-    air: FreeMotion | None,
-    options: Options = NOTHING_SAID,
-    strokes: tuple[Stroke, ...] = (),
+def _find_contacts(
+    channels: Channels, chain: Chain, air: FreeMotion | None, options: Options, strokes: tuple[Stroke, ...]
 ) -> Contacts:
     """Find the stretches in contact.
 
     Free space is where the position travels and the force does not. A force that follows the position at both ends of
     its range never leaves the surface: the whole log is one contact, and nothing tells what the force rests at.
 
-    Args:
-        channels: evenly sampled.
-        chain: the filter that the fit will use, so that the spans count its delay.
-        air: of the log, if it shows any.
-        options: whether the probe is fixed to the surface, and which way the force counts, if that is known.
-        strokes: of a press at constant speed.
+    `chain` is the filter that the fit will use, so that the spans count its delay; `air` is of the log, if it shows
+    any, and `strokes` of a press at constant speed.
     """
     force, position = chain(channels.force), chain(channels.position)
     payload = payload_of(channels, chain, air, options.assumed_lag) if air else None
@@ -175,23 +162,34 @@ def find_contacts(
     sign = 1.0 if peak > rest else -1.0
     top = sign * peak
     level = _resting(sign * force, sign * rest, top)
-    threshold = _threshold(sign * force, level, top)
+    onset = ONSET * (
+        top - level
+    )  # the threshold is clear of this share of the peak, and of the noise at rest
+    low_force = np.abs(sign * force[sign * force < level + onset] - level)
+    noise = GAUSSIAN * float(np.median(low_force)) if len(low_force) else 0.0
+    threshold = level + max(onset, 5 * noise)
     touches = _touches(sign * force, level, top, threshold)
-    spans = _long(touches, chain)
+    least = max(_FEWEST, int(2 * chain.settling / chain.dt))  # longer than the filter needs to settle
+    spans = [(b, e) for b, e in touches if e - b >= least]
     text, rows = "press longer, or log faster", ""
     if air is not None and payload is None and spans:
         touches = _between_losses(channels, sign, (level, top), air, spans, chain)
-        spans = _long(touches, chain)
+        spans = [(b, e) for b, e in touches if e - b >= least]
         text, rows = "press deeper, move slower or log faster", " until the probe leaves the surface again"
     longest = max((e - b for b, e in touches), default=0)
-    text = f"{BRIEF} {longest} rows{rows}, and {_least(chain)} are needed: {text}"
+    text = f"{BRIEF} {longest} rows{rows}, and {least} are needed: {text}"
     if not touches:
         text = f"the force stays between {force.min():.4g} and {force.max():.4g}: there is no contact"
     if not spans:
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
-    clear = _clear(sign * force, spans, threshold, int(chain.settling / chain.dt))
-    way = air.way if air else 0.0
-    found = replace(_orient(force, position, spans, (sign, way, level, threshold), options), clear=clear)
+    found = _orient(force, position, spans, (sign, air.way if air else 0.0, level, threshold), options)
+    free = sign * force[_outside(len(force), spans, int(chain.settling / chain.dt))]
+    if len(free) < _FEWEST:
+        found = replace(found, clear=False)
+    else:
+        middle = float(np.median(free))
+        noise = GAUSSIAN * float(np.median(np.abs(free - middle)))
+        found = replace(found, clear=threshold - middle > _CLEAR * noise)
     if payload is None:
         return found
     own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
@@ -212,11 +210,10 @@ def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
 
 def _without_drift(channels: Channels, air: FreeMotion) -> Channels:
     """The same with the force in free motion level from one stay to the next."""
-    rows: Array = np.arange(len(channels.force), dtype=np.float64)
-    raw = channels.raw
-    first = (raw.start - channels.start) / channels.dt
-    at: Array = first + np.arange(len(raw.held_force), dtype=np.float64) * (raw.dt / channels.dt)
-    raw = replace(raw, held_force=raw.held_force - air.drift(at))
+    raw, rows = channels.raw, np.arange(len(channels.force), dtype=np.float64)
+    first, held = (raw.start - channels.start) / channels.dt, raw.held_force
+    at: Array = first + np.arange(len(held), dtype=np.float64) * (raw.dt / channels.dt)
+    raw = replace(raw, held_force=held - air.drift(at))
     warnings, moved = channels.warnings, float(np.ptp(air.levels))
     if moved > air.noise:  # less is not seen in the log
         text = f"in free motion the force changes by {moved:.3g} N during the log; the change is removed as a drift"
@@ -235,14 +232,16 @@ def _never_left(
     rows = [stroke.rows(channels) for stroke in strokes]
     rises = sum(float(np.cov(sign * channels.force[own], channels.position[own])[0, 1]) for own in rows)
     way = -1.0 if rises < 0 else 1.0
-    reversed_signs = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
-    found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, (), clear=False)
+    told = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
+    found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, told, clear=False)
     if options.bonded:
-        return found if not strokes else replace(found, warnings=reversed_signs)
-    along = _correlation(sign * force, way * position)
+        return found
+    width = max(len(force) // _BLOCKS, 1)
+    f, x = (detrend(block_means(values, width)) for values in (sign * force, way * position))
+    along = float(f @ x) / (float(np.sqrt((f @ f) * (x @ x))) or np.inf)
     text = "the probe never leaves the surface: the force at rest is not known and is estimated as an offset"
-    warnings = (Warn(Code.CONTACT_AT_START, text), *reversed_signs)
-    return replace(found, warnings=warnings, signed=bool(strokes) or along > _SIGNED)
+    told = (Warn(Code.CONTACT_AT_START, text), *told)
+    return replace(found, warnings=told, signed=bool(strokes) or along > _SIGNED)
 
 
 def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:
@@ -253,25 +252,8 @@ def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:
     return (*warnings, Warn(Code.POSITION_SIGN_REVERSED, text)) if position else warnings
 
 
-def _correlation(force: Array, position: Array) -> float:
-    """Of block means over a hundredth of the log, without their slow trend."""
-    width = max(len(force) // _BLOCKS, 1)
-    f, x = (detrend(block_means(values, width)) for values in (force, position))
-    size = float(np.sqrt((f @ f) * (x @ x)))
-    return float(f @ x) / size if size > 0 else 0.0
-
-
-def _clear(force: Array, spans: list[tuple[int, int]], threshold: float, settling: int) -> bool:
-    free = force[_outside(len(force), spans, settling)]
-    if len(free) < _FEWEST:
-        return False
-    middle = float(np.median(free))
-    return threshold - middle > _CLEAR * GAUSSIAN * float(np.median(np.abs(free - middle)))
-
-
 def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
-    out = np.ones(count, bool)
-    out[:begin] = False
+    out = np.arange(count) >= begin
     for first, last in spans:
         out[first:last] = False
     return out
@@ -286,26 +268,25 @@ def _orient(
 ) -> Contacts:
     """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
     sign, way, level, threshold = levels
-    warnings = []
     signed = options.force_sign in (None, int(sign))
-    if not signed:
-        text = (
-            "the sign of the force contradicts --force-sign: in contact it goes to the other side of its rest"
-        )
-        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
-    out = _outside(len(position), spans, 0)
-    inside = ~out
-    reach = float(np.ptp(position[inside])) or 1.0
-    deep = inside & (sign * force > np.median(sign * force[inside]))
     if not way:
+        out = _outside(len(position), spans, 0)
+        inside = ~out
+        reach = float(np.ptp(position[inside])) or 1.0
+        deep = inside & (sign * force > np.median(sign * force[inside]))
         apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
         if abs(apart) < ONSET * reach:
             apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
         way = 1.0 if apart >= 0 else -1.0
+    told = _reversed_signs(sign < 0, way < 0)
+    if not signed:
+        text = (
+            "the sign of the force contradicts --force-sign: in contact it goes to the other side of its rest"
+        )
+        told = (*told, Warn(Code.NEGATIVE_STIFFNESS, text))
     if spans[0][0] == 0:
         text = "the log begins in contact: the depth of that contact is not known"
-        warnings.append(Warn(Code.CONTACT_AT_START, text))
-    told = (*_reversed_signs(sign < 0, way < 0), *warnings)
+        told = (*told, Warn(Code.CONTACT_AT_START, text))
     return Contacts(tuple(spans), False, sign, way, level, threshold, told, signed=signed)
 
 
@@ -336,13 +317,6 @@ def _resting(force: Array, rest: float, peak: float) -> float:
     return rest
 
 
-def _threshold(force: Array, rest: float, peak: float) -> float:
-    """Clear of a share of the peak, and of the noise at rest, which what stays below that share tells."""
-    free = np.abs(force[force < rest + ONSET * (peak - rest)] - rest)
-    noise = GAUSSIAN * float(np.median(free)) if len(free) else 0.0
-    return rest + max(ONSET * (peak - rest), 5 * noise)
-
-
 def _touches(force: Array, rest: float, peak: float, threshold: float) -> list[tuple[int, int]]:
     """Stretches above the onset that reach well above it.
 
@@ -357,16 +331,6 @@ def _touches(force: Array, rest: float, peak: float, threshold: float) -> list[t
     return [(b, e) for b, e in spans if force[b:e].max() > rest + _REACHED * (peak - rest)]
 
 
-def _long(spans: list[tuple[int, int]], chain: Chain) -> list[tuple[int, int]]:
-    """Those that last longer than the filter needs to settle."""
-    return [(b, e) for b, e in spans if e - b >= _least(chain)]
-
-
-def _least(chain: Chain) -> int:
-    """Rows of a contact, at least."""
-    return max(_FEWEST, int(2 * chain.settling / chain.dt))
-
-
 def _between_losses(
     channels: Channels,
     sign: float,
@@ -377,15 +341,8 @@ def _between_losses(
 ) -> list[tuple[int, int]]:
     """The spans without what the readings before any filter show as air: the position moves and the force does not.
 
-    A filter joins what a probe that bounces does between two touches.
-
-    Args:
-        channels: as read.
-        sign: of the force.
-        levels: of the force at rest and at its peak [N].
-        air: of the log.
-        spans: behind the filter.
-        chain: the filter, whose delay a span begins with.
+    A filter joins what a probe that bounces does between two touches. `levels` are the force at rest and at its peak
+    [N], with its sign; a span begins with the chain's delay.
     """
     rest, peak = levels
     force, position = sign * channels.force, channels.position

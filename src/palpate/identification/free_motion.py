@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.sensor_path import position_noise
 from palpate.identification.filters.state_variable import Chain, block_means, white_noise
-from palpate.identification.least_squares import Noise, noise_of
-from palpate.identification.pooling import Mean, random_effects
+from palpate.identification.least_squares import noise_of
+from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
 from palpate.signals.samples import GAUSSIAN, runs
 from palpate.signals.types import NORMAL
-
-Rows = Mask
 
 FLAT = 0.4
 """Slope in free motion over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 %
@@ -64,18 +62,15 @@ class Drift:
     def bends(self, times: Array) -> Array:
         """Ways that it may bend beside straight lines from stay to stay [N], of deviation 1 each, shape (m, _BENDS).
 
-        Those of a random walk that is seen at the stays alone (Karhunen and Loeve's modes of Brown's bridge).
-
-        Args:
-            times: at which [s], shape (m,).
+        Those of a random walk that is seen at the stays alone (Karhunen and Loeve's modes of Brown's bridge), at times
+        [s], shape (m,).
         """
         apart = np.diff(self.times)
         walk = float(np.sqrt(np.sum(np.diff(self.levels) ** 2) / np.sum(apart)))  # N over a root of time
         at = np.clip(np.searchsorted(self.times, times) - 1, 0, len(apart) - 1)
         share = np.clip((times - self.times[at]) / apart[at], 0.0, 1.0)
         order = np.pi * np.arange(1, _BENDS + 1)
-        found: Array = (walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order
-        return found
+        return np.asarray((walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order)
 
 
 @dataclass(frozen=True)
@@ -102,12 +97,11 @@ class FreeMotion:
 
     def drift(self, rows: Array) -> Array:
         """Drift of the free-motion force at some rows, relative to its middle [N]: straight lines between stays."""
-        found: Array = np.interp(rows, self.stays, self.levels) - self.rest
-        return found
+        return np.asarray(np.interp(rows, self.stays, self.levels) - self.rest)
 
     def among(self, position: Array) -> list[tuple[int, int]]:
         """First and past-the-last row of each stay in it, of a position of shape (n,)."""
-        return stays_in(self.way * position < self.way * self.limit)
+        return _stays_in(self.way * position < self.way * self.limit)
 
 
 def free_motion_of(
@@ -124,34 +118,44 @@ def free_motion_of(
         ends: of the force's range, outliers left aside [N].
         none: whether the slope has to be that of none; if not, that of an inertia may do.
     """
+    from scipy.special import chdtri
+
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
     slope = _in_contact(force, position, ends)
 
     @cache
     def steep() -> float:
-        return max(abs(slope), *(_steepest(force, way * position) for way in (1.0, -1.0)))
+        """The largest slope at either end of the position's range that its interval leaves, of any share [N/m]."""
+        found = [abs(slope)]
+        for x in (position, -position):
+            white = white_noise(x)
+            stays = [own for share in _SHARES if (own := _stays_in(x < _limit(x, share)))]
+            slopes = [_slope(force, x, stay, white, np.inf) for stay in stays]
+            found.append(max((abs(own[0]) - own[1] for own in slopes if own is not None), default=0.0))
+        return max(found)
 
     found = [0.0, 0.0]
     for bound in (np.inf, _OUTLYING):
-        if slope and not any(found):
-            found = [_share(force, way * position, (way * slope, steep), bound, none) for way in (1.0, -1.0)]
-            found = [
-                own * _quiet(force, way * position, own) for own, way in zip(found, (1.0, -1.0), strict=True)
-            ]
+        for i, way in enumerate((1.0, -1.0)) if slope and not any(found) else ():
+            own = _share(force, way * position, (way * slope, steep), bound, none)
+            found[i] = own * _quiet(force, way * position, own)
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
     limit = _limit(way * position, max(found))
-    stays = stays_in(way * position < limit)
+    stays = _stays_in(way * position < limit)
     middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
     rows, stay = _rows_of(stays)
     levels = _medians(force[rows], stay)
-    rest = float(np.median(force[rows]))
-    noise = _noise(force, levels, stays)
-    return FreeMotion(
-        way, way * limit, rest, middle, levels, _differ(levels, stays, noise), float(np.sqrt(noise.variance))
-    )
+    noise = noise_of(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
+    # The medians differ if they do so by more than chance would have them in one of twenty logs.
+    length = np.bincount(stay).astype(float)
+    weight = _OF_MEDIAN * length * noise.effective / max(noise.variance * length.sum(), 1e-300)
+    apart = float(weight @ (levels - float(weight @ levels) / float(weight.sum())) ** 2)
+    differ = len(stays) > 1 and apart > chdtri(len(stays) - 1, 0.05)
+    rest, deviation = float(np.median(force[rows])), float(np.sqrt(noise.variance))
+    return FreeMotion(way, way * limit, rest, middle, levels, differ, deviation)
 
 
 def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> float:
@@ -163,35 +167,9 @@ def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> flo
     return (1.0 if rises else -1.0) * (high - low) / reach if reach > 0 else 0.0
 
 
-def _noise(force: Array, levels: Array, stays: list[tuple[int, int]]) -> Noise:
-    """Of the force in free motion."""
-    rows, stay = _rows_of(stays)
-    return noise_of(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
-
-
-def _differ(levels: Array, stays: list[tuple[int, int]], noise: Noise) -> bool:
-    """Whether the medians of the stays differ by more than chance would have them in one of twenty logs."""
-    from scipy.special import chdtri
-
-    if len(stays) < 2:
-        return False
-    length = np.array([b - a for a, b in stays], dtype=float)
-    weight = _OF_MEDIAN * length * noise.effective / max(noise.variance * length.sum(), 1e-300)
-    mean = float(weight @ levels) / float(weight.sum())
-    return float(weight @ (levels - mean) ** 2) > chdtri(len(stays) - 1, 0.05)
-
-
 def _limit(position: Array, share: float) -> float:
     bottom, top = np.percentile(position, [0.1, 99.9])
     return float(bottom + share * (top - bottom))
-
-
-def _steepest(force: Array, position: Array) -> float:
-    """The largest slope at the lower end of a position's range that its interval leaves, of any share [N/m]."""
-    white = white_noise(position)
-    stays = [stays_in(position < _limit(position, share)) for share in _SHARES]
-    found = [_slope(force, position, own, white, np.inf) for own in stays if own]
-    return max((abs(own[0]) - own[1] for own in found if own is not None), default=0.0)
 
 
 def _share(
@@ -201,18 +179,12 @@ def _share(
 
     Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch. That of
     an inertia is held against the steepest: it is in the force over the whole range, and takes from the contact's.
-
-    Args:
-        force: shape (n,).
-        position: shape (n,).
-        slopes: of the contact, over all of it and, if it is asked for, the steepest [N/m].
-        bound: as `_slope` has it.
-        none: as `free_motion_of` has it.
+    `bound` is as `_slope` has it, `none` as `free_motion_of` has it.
     """
     slope, steep = slopes
     clear, white = False, white_noise(position)
     for share in _SHARES:
-        stays = stays_in(position < _limit(position, share))
+        stays = _stays_in(position < _limit(position, share))
         found = _slope(force, position, stays, white, bound) if stays else None
         if found is None:
             continue
@@ -238,7 +210,7 @@ def _quiet(force: Array, position: Array, share: float) -> bool:
     return FLAT * own <= other
 
 
-def stays_in(inside: Rows) -> list[tuple[int, int]]:
+def _stays_in(inside: Mask) -> list[tuple[int, int]]:
     """First and past-the-last row of each unbroken stretch that is long enough."""
     return [(a, b) for a, b in runs(inside) if b - a >= _FEWEST]
 
@@ -265,12 +237,8 @@ def _slope(
     at, stay = _rows_of(stays)
     x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
     f = force[at] - _medians(force[at], stay)[stay]
-    far = (
-        np.abs(f) > bound * GAUSSIAN * float(np.median(np.abs(f)))
-        if np.isfinite(bound)
-        else np.zeros(len(f), bool)
-    )
-    rows = np.flatnonzero(~far)
+    near = np.abs(f) <= bound * GAUSSIAN * float(np.median(np.abs(f)))
+    rows = np.flatnonzero(near | np.isinf(bound))
     x, f = x[rows] - x[rows].mean(), f[rows] - f[rows].mean()
     size = float(x @ x)
     if len(rows) < _FEWEST or size <= _SEEN * len(x) * white**2:
@@ -295,11 +263,7 @@ by `benchmarks/identification/free_motion_constants.py`."""
 
 @dataclass(frozen=True)
 class MovingMass:
-    """A mass seen in free motion [kg]: negative if more than the tool's inertia was taken out before.
-
-    Args:
-        mass, std: [kg].
-    """
+    """A mass seen in free motion, and its deviation [kg]: negative if too much inertia was taken out before."""
 
     mass: float
     std: float
@@ -318,14 +282,10 @@ def payload_of(
 ) -> MovingMass | None:
     """The mass that the force in free motion tells, both channels as they count in the log; None if it tells none.
 
-    Least squares of the filtered force on the filtered acceleration, in each stay on its own level.
-
-    Args:
-        channels: of the log.
-        chain: filter of both.
-        air: of the log.
-        lag: of the force behind the position [s].
-        alone: whether it has to be told from a soft spring too, which one frequency does not do.
+    Least squares of the filtered force on the filtered acceleration, in each stay on its own level. The acceleration
+    accounts for more of the force than all else, and for twice what others do: a force that is read late (by `lag`
+    [s]), or that sinks after a contact, goes with the speed as well. With `alone` it is told from a soft spring too,
+    which one frequency does not do.
     """
     memory = int(np.ceil((chain.settling + abs(lag)) / chain.dt))
     stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST_LEVEL]
@@ -339,39 +299,21 @@ def payload_of(
     size = float(motion @ motion)
     spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
     others = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
-    if size <= _ACCELERATED * len(motion) * float(spread) or not _of_inertia(force, motion, others):
+    if size <= _ACCELERATED * len(motion) * float(spread):
+        return None
+    by_motion = _accounts(motion, force)
+    if by_motion <= _EXPLAINED or any(by_motion <= _OTHERS * _accounts(column, force) for column in others):
         return None
     noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
-    level = noise.variance * len(force) / noise.effective
-    mean = _of_parts(force, motion, stays, level)
-    return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
-
-
-def _of_parts(force: Array, motion: Array, stays: list[tuple[int, int]], level: float) -> Mean:
-    """The mass that both halves of each stay tell: a tone in the force goes with some of the motion, not with all.
-
-    Args:
-        force: in the stays, one after the other, shape (n,) [N].
-        motion: acceleration there, shape (n,) [m/s^2].
-        stays: for their lengths.
-        level: of the noise: variance of a mass is this over the sum of the motion's squares.
-    """
+    # Both halves of each stay tell the mass: a tone in the force goes with some of the motion, not with all.
     ends = np.cumsum([0, *(b - a for a, b in stays)])
     edges = np.sort(np.concatenate([ends, (ends[:-1] + ends[1:]) // 2]))
     parts = [(motion[a:b] - motion[a:b].mean(), force[a:b]) for a, b in pairwise(edges.tolist())]
-    size = np.array([float(own @ own) for own, _ in parts])
-    told = size > _LEAST * size.max()
-    masses = np.array([float(own @ f) for own, f in parts])[told] / size[told]
-    return random_effects(masses, level / size[told])
-
-
-def _of_inertia(force: Array, motion: Array, others: Iterable[Array]) -> bool:
-    """Whether the acceleration accounts for more of the force than all else, and for twice what others do.
-
-    A force that is read late, or that sinks after a contact, goes with the speed as well.
-    """
-    by_motion = _accounts(motion, force)
-    return by_motion > _EXPLAINED and all(by_motion > _OTHERS * _accounts(own, force) for own in others)
+    sizes = np.array([float(part @ part) for part, _ in parts])
+    told = sizes > _LEAST * sizes.max()
+    masses = np.array([float(part @ f) for part, f in parts])[told] / sizes[told]
+    mean = random_effects(masses, noise.variance * len(force) / noise.effective / sizes[told])
+    return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
 def _accounts(column: Array, force: Array) -> float:

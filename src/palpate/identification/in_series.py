@@ -53,11 +53,7 @@ class SeriesSpring:
 
         With what is seen as K_a + B_a s + M_a s^2: K = K_a r, B = B_a r^2, M = M_a r^2 + B_a^2 r^3/k + K m/k,
         r = k/(k - K_a). The covariance goes through the derivatives of these. The next orders make B and M too large by
-        m omega^2/k of each at most, which is their half-width by this cause.
-
-        Args:
-            seen: through the spring.
-            band: frequency below which the probe moved [Hz].
+        m omega^2/k of each at most, which is their half-width by this cause; below `band` [Hz] the probe moved.
         """
         theta, names = seen.theta, seen.names
         self._check(float(theta[names.index("K")]))
@@ -98,15 +94,12 @@ class SeriesSpring:
             swings = 1.0 - squared * self.share
             gain = swings * abs(self.stiffness / (self.stiffness - seen)) ** 2
             by_spring = Contribution(abs(swings) * self.std * abs(behind / self.stiffness) ** 2)
-            storage, loss = (
-                part.through(swings * own, gain).with_cause(_SPRING, by_spring)
-                for part, own in ((octave.in_phase, behind.real), (octave.in_quadrature, behind.imag))
-            )
-            if self.share_std:
-                by_tip = squared * self.share_std
-                storage = storage.with_cause(_TIP, Contribution(by_tip * abs(behind.real)))
-                loss = loss.with_cause(_TIP, Contribution(by_tip * abs(behind.imag)))
-            found.append(replace(octave, in_phase=storage, in_quadrature=loss))
+            parts = []
+            for part, own in ((octave.in_phase, behind.real), (octave.in_quadrature, behind.imag)):
+                surface = part.through(swings * own, gain).with_cause(_SPRING, by_spring)
+                by_tip = Contribution(squared * self.share_std * abs(own))
+                parts.append(surface.with_cause(_TIP, by_tip) if self.share_std else surface)
+            found.append(replace(octave, in_phase=parts[0], in_quadrature=parts[1]))
         return tuple(found)
 
     def slope(self, seen: Measurement) -> Measurement:
@@ -124,23 +117,13 @@ class SeriesSpring:
 
     def press(self, seen: Press) -> Press:
         """The press over the depth of the surface alone."""
-        tangent = [
-            Tangent(t.force, self.slope(t.slope)) for t in seen.tangent if t.stiffness < self.stiffness
-        ]
-        curves = []
-        for curve in (seen.loading, seen.unloading):
-            own = curve.copy()
-            if own.size:
-                own[0] -= (own[1] - own[1][0]) / self.stiffness
-            curves.append(own)
-        return replace(seen, tangent=tuple(tangent), loading=curves[0], unloading=curves[1])
+        softer = (t for t in seen.tangent if t.stiffness < self.stiffness)
+        curves = [np.stack([d - (f - f[:1]) / self.stiffness, f]) for d, f in (seen.loading, seen.unloading)]
+        tangent = tuple(Tangent(t.force, self.slope(t.slope)) for t in softer)
+        return replace(seen, tangent=tangent, loading=curves[0], unloading=curves[1])
 
     def _check(self, apparent: float) -> None:
-        """Two springs in series are softer than either.
-
-        Raises:
-            InputError: the log is as stiff as what is said to be in series with the surface.
-        """
+        """Two springs in series are softer than either; an `InputError` if not."""
         if abs(apparent) >= self.stiffness:
             raise InputError(
                 f"the series stiffness of {self.stiffness:.4g} N/m is softer than the log's own {abs(apparent):.4g}"

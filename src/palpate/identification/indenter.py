@@ -23,7 +23,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.result import Identification, Press, Tangent
+from palpate.identification.result import Identification, Press
 from palpate.identification.uncertainty import Contribution, Parameter, Verdict, half_width
 from palpate.signals.types import NORMAL
 from palpate.units import unit
@@ -52,7 +52,8 @@ class Indenter:
         if self.shape not in _LAWS:
             raise InputError(f"an indenter is a {', a '.join(_LAWS)}, got {self.shape!r}")
         if not (isfinite(self.size) and self.size > 0):
-            raise InputError(f"the {self._size} of a {self.shape} must be more than 0, got {self.size:g}")
+            size = "half angle" if self.shape == "cone" else "radius"
+            raise InputError(f"the {size} of a {self.shape} must be more than 0, got {self.size:g}")
         if self.shape == "cone" and self.size >= pi / 2:
             raise InputError(
                 f"the half angle of a cone must be under 90 deg, got {np.degrees(self.size):g} deg"
@@ -79,10 +80,6 @@ class Indenter:
                 f"{match[2]!r} of --indenter is a unit of {own.quantity}; a {shape} needs one of {quantity}"
             )
         return cls(shape, float(match[1]) * own.factor)
-
-    @property
-    def _size(self) -> str:
-        return "half angle" if self.shape == "cone" else "radius"
 
     @property
     def power(self) -> float:
@@ -133,9 +130,7 @@ def with_modulus(
     check_poisson(poisson)
     units = (found.traces.force_unit, found.traces.position_unit) if found.traces else ("N", "m")
     if units != ("N", "m"):
-        raise InputError(
-            f"an indenter needs force in N and position in m, this log has {units[0]} and {units[1]}"
-        )
+        raise InputError(f"an indenter needs force in N and position in m, not {units[0]} and {units[1]}")
     modulus = _modulus(found.press, indenter, poisson, tolerance)
     return replace(found, parameters={"E": modulus, **found.parameters})
 
@@ -154,9 +149,17 @@ def check_poisson(poisson: tuple[float, float] | None) -> None:
 def _modulus(
     press: Press | None, indenter: Indenter, poisson: tuple[float, float] | None, tolerance: float
 ) -> Parameter:
-    refused = _refuse(press)
-    if refused is not None or press is None:
-        return _none(refused or "")
+    if press is None or not press.tangent or not press.loading.size:
+        return Parameter.unknown("Pa", "the log has no loading whose slope could be estimated")
+    flat = next((t for t in press.tangent if t.stiffness <= t.half), None)
+    if flat is not None:
+        shown = f"{flat.stiffness:.3g} ± {flat.half:.3g} N/m"
+        reason = f"at {flat.force:.3g} N the force does not rise with the depth ({shown})"
+        return Parameter.unknown("Pa", reason)
+    if len(press.tangent) < 2:
+        return Parameter.unknown("Pa", "the slope is known at one force only; its growth is not")
+    if press.tangent[0].force <= 0:
+        return Parameter.unknown("Pa", "the force of the press is not above zero")
     p, c = indenter.power, indenter.factor
     force, slope, half = np.array([(t.force, t.stiffness, t.half) for t in press.tangent]).T
     by_force = slope**p / (p**p * c * force ** (p - 1))
@@ -171,33 +174,17 @@ def _modulus(
     if indenter.shape == "sphere":
         if depth >= indenter.size:
             deep, radius = 1e3 * depth, 1e3 * indenter.size
-            return _none(f"the press goes {deep:.3g} mm deep, beyond the sphere's radius of {radius:.3g} mm")
+            reason = f"the press goes {deep:.3g} mm deep, beyond the sphere's radius of {radius:.3g} mm"
+            return Parameter.unknown("Pa", reason)
         parts["small strain"] = abs(_beyond_hertz(depth / indenter.size) - 1) * reduced
-    share, parts["Poisson's ratio"] = _free_of_poisson(reduced, poisson)
+    if poisson is None:
+        share, unknown = sum(_UNTOLD) / 2, (_UNTOLD[1] - _UNTOLD[0]) / sum(_UNTOLD)
+    else:
+        share = 1 - poisson[0] ** 2
+        unknown = NORMAL * abs(2 * poisson[0]) * poisson[1] / share
+    parts["Poisson's ratio"] = unknown * reduced
     parts = {cause: share * part for cause, part in parts.items()}
     return _judge(share * reduced, parts, indenter, poisson, depth, tolerance)
-
-
-def _refuse(press: Press | None) -> str | None:
-    """Why no slope of the press may be used; None if it may."""
-    if press is None or not press.tangent:
-        return "the log has no loading whose slope could be estimated"
-    flat = next((t for t in press.tangent if t.stiffness <= t.half), None)
-    if flat is not None:
-        return f"at {flat.force:.3g} N the force does not rise with the depth ({_shown(flat)})"
-    if len(press.tangent) < 2:
-        return "the slope is known at one force only; its growth is not"
-    if press.tangent[0].force <= 0:
-        return "the force of the press is not above zero"
-    return None
-
-
-def _free_of_poisson(reduced: float, poisson: tuple[float, float] | None) -> tuple[float, float]:
-    """1 - nu^2, and the half-width of E* that stands for what is not known of it."""
-    if poisson is None:
-        return sum(_UNTOLD) / 2, (_UNTOLD[1] - _UNTOLD[0]) / sum(_UNTOLD) * reduced
-    share = 1 - poisson[0] ** 2
-    return share, NORMAL * abs(2 * poisson[0]) * poisson[1] / share * reduced
 
 
 def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, reduced: float) -> Array:
@@ -210,12 +197,9 @@ def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, redu
     rising = np.maximum.accumulate(own)
     found_at = max(float(np.interp(0.0, depth, own)), 0.0)
     before = (found_at / (c * reduced)) ** (1 / p)
-    at = np.interp(force, rising, depth) + before
-    at = np.maximum(
-        at, 1e-3 * float(np.abs(depth).max())
-    )  # a touch found too late leaves a force at no depth
-    found: Array = slope / (p * c * at ** (p - 1))
-    return found
+    least = 1e-3 * float(np.abs(depth).max())  # a touch found too late leaves a force at no depth
+    at = np.maximum(np.interp(force, rising, depth) + before, least)
+    return np.asarray(slope / (p * c * at ** (p - 1)))
 
 
 def _beyond_hertz(strain: float) -> float:
@@ -249,11 +233,3 @@ def _judge(
     if half <= tolerance * value:
         return replace(found, verdict=Verdict.IDENTIFIED, reason=f"known to {share} (95 %): {terms}")
     return replace(found, reason=f"known to {share} only (95 %), most of it {main}: {terms}")
-
-
-def _none(reason: str) -> Parameter:
-    return Parameter(None, None, None, "Pa", Verdict.NOT_IDENTIFIABLE, reason)
-
-
-def _shown(tangent: Tangent) -> str:
-    return f"{tangent.stiffness:.3g} ± {tangent.half:.3g} N/m"

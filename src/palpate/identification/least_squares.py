@@ -43,12 +43,9 @@ def solve(columns: Array, target: Array) -> Array:
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     scale[scale == 0] = 1.0
     gram = columns.T @ columns / np.outer(scale, scale)
-    vector = (columns.T @ target) / scale
     if np.linalg.cond(gram) > 1e10:
-        theta: Array = np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale
-        return theta
-    theta = np.linalg.solve(gram, vector) / scale
-    return theta
+        return np.asarray(np.linalg.lstsq(columns / scale, target, rcond=1e-12)[0] / scale)
+    return np.linalg.solve(gram, (columns.T @ target) / scale) / scale
 
 
 def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Noise:
@@ -67,29 +64,24 @@ def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Nois
     if variance <= 0:
         return Noise(np.zeros(1), float(len(residuals)), 0.0)
     shape = raw / pairs / variance
-    width = _width(shape, most)
-    taper = _parzen(width)
+    below = np.flatnonzero(
+        np.abs(shape) < 0.1
+    )  # the correlation time: where it has first come down to a tenth
+    width = int(np.clip(8 * (int(below[0]) if len(below) else most), 4, most))
+    u = np.arange(width) / width
+    taper = np.where(u < 0.5, 1 - 6 * u**2 + 6 * u**3, 2 * (1 - u) ** 3)  # Parzen
     curve = variance * shape[: len(taper)] * taper
     inflation = max(1.0, float(1 + 2 * (shape[1 : len(taper)] * taper[1:]).sum()))
     effective = max(len(residuals) / inflation, parameters + 2.0)
     return Noise(curve * effective / (effective - parameters), effective, variance)
 
 
-def covariance(
-    columns: Array,
-    place: NDArray[np.intp],
-    noise: Noise,
-    prior: Array | None = None,
-) -> Array:
+def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Array | None = None) -> Array:
     """Covariance of the least-squares answer under coloured noise, shape (p, p).
 
-    (A + L)^-1 (Phi' Gamma Phi + prior part) (A + L)^-1 with A = Phi' Phi: the sandwich with the noise's own Gamma.
-
-    Args:
-        columns: Phi, shape (n, p).
-        place: rows of the even grid, shape (n,).
-        noise: colour of the noise.
-        prior: standard deviation of each parameter known beforehand, infinite where nothing is; shape (p,).
+    (A + L)^-1 (Phi' Gamma Phi + prior part) (A + L)^-1 with A = Phi' Phi: the sandwich with the noise's own Gamma. Phi,
+    shape (n, p), is at rows of an even grid, shape (n,); the prior is the standard deviation of each parameter known
+    beforehand, infinite where nothing is; shape (p,).
     """
     place = _closed_up(place)
     scale = np.sqrt(np.einsum("ij,ij->j", columns, columns))
@@ -103,8 +95,7 @@ def covariance(
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)
     bread = inverse(gram)
-    cov: Array = bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale)
-    return cov
+    return np.asarray(bread @ ((meat + meat.T) / 2) @ bread / np.outer(scale, scale))
 
 
 def inverse(normal: Array) -> Array:
@@ -145,8 +136,7 @@ def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
     """
     jumps = np.diff(place)
     step = max(int(np.gcd.reduce(jumps)), 1)
-    closed: NDArray[np.intp] = np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))]
-    return closed
+    return np.asarray(np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))])
 
 
 def _spread(values: Array, place: NDArray[np.intp]) -> Array:
@@ -160,20 +150,6 @@ def _autocorrelation(line: Array, count: int) -> Array:
     size = 1 << (len(line) + count).bit_length()
     power = np.abs(np.fft.rfft(line, size)) ** 2
     return np.fft.irfft(power, size)[:count]
-
-
-def _width(shape: Array, most: int) -> int:
-    """Eight times the correlation time: where the autocorrelation has first come down to a tenth."""
-    below = np.flatnonzero(np.abs(shape) < 0.1)
-    first = int(below[0]) if len(below) else most
-    return int(np.clip(8 * first, 4, most))
-
-
-def _parzen(width: int) -> Array:
-    u = np.arange(width) / width
-    inner = 1 - 6 * u**2 + 6 * u**3
-    outer = 2 * (1 - u) ** 3
-    return np.where(u < 0.5, inner, outer)
 
 
 def _smooth(columns: Array, place: NDArray[np.intp], autocovariance: Array) -> Array:

@@ -56,10 +56,7 @@ class Motion:
         """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
 
         At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth):
-        the shortest that the position's noise and its encoder do not turn it within.
-
-        Args:
-            least: way that it turns within at least [m].
+        the shortest that the position's noise and its encoder do not turn it within, and `least` at least [m].
         """
         noise, position = self.noise, self.position
         way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), least, 1e-300)
@@ -70,19 +67,13 @@ class Motion:
     @property
     def instants(self) -> Array:
         """Sample of the position that each row belongs to, shape (m,)."""
-        if isinstance(self.chain, SensorPath):
-            return self.chain.instants[self.rows]
-        return self.rows.astype(np.float64)
+        chain, rows = self.chain, self.rows
+        return chain.instants[rows] if isinstance(chain, SensorPath) else rows.astype(np.float64)
 
     @property
     def matched(self) -> bool:
         """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
         return isinstance(self.chain, SensorPath)
-
-    @property
-    def duration(self) -> float:
-        """Time that the rows cover [s]."""
-        return len(self.rows) * (self.chain.period if isinstance(self.chain, SensorPath) else self.chain.dt)
 
     @property
     def ones(self) -> Array:
@@ -91,12 +82,9 @@ class Motion:
 
 
 def from_surface(motion: Motion, inside: Mask, surface: float) -> Motion:
-    """The same motion counted from a surface: nothing is pressed before it is met.
+    """The same motion counted from a surface [m]: nothing is pressed before it is met.
 
-    Args:
-        motion: whose position is that of the probe.
-        inside: samples that are in contact for sure, shape (n,).
-        surface: its position [m].
+    Samples `inside`, shape (n,), are in contact for sure.
     """
     depth = motion.position - surface
     pressed = np.where(inside, depth, np.maximum(depth, 0.0))
@@ -142,11 +130,7 @@ class Model:
     @property
     def of_position(self) -> bool:
         """Whether the force is made of the position and its derivatives alone, and so its noise too."""
-        return (
-            self.linear[-1] == "offset"
-            and set(self.linear[:-1]) == set(self.derivatives)
-            and not self.nonlinear
-        )
+        return not self.nonlinear and {*self.derivatives, "offset"} == {*self.linear}
 
     @property
     def of_power(self) -> bool:
@@ -158,44 +142,6 @@ class Model:
         """Which parameters multiply which derivative of the position."""
         return {name: k for name, k in (("K", 0), ("B", 1), ("M", 2)) if name in self.linear}
 
-
-def _kelvin_voigt(motion: Motion, _nonlinear: dict[str, float], lag: float) -> list[Array]:
-    """f = K x + B v."""
-    return [motion.moved(0, lag), motion.moved(1, lag), motion.ones]
-
-
-def _kelvin_voigt_mass(motion: Motion, _nonlinear: dict[str, float], lag: float) -> list[Array]:
-    """f = K x + B v + M a."""
-    return [motion.moved(0, lag), motion.moved(1, lag), motion.moved(2, lag), motion.ones]
-
-
-def _deep(motion: Motion, nonlinear: dict[str, float]) -> Array:
-    """Penetration: the position beyond the surface, zero before it, shape (n,). A probe fixed to it is always in it."""
-    return motion.position if motion.bonded else np.maximum(motion.position - nonlinear["x0"], 0.0)
-
-
-def _standard_linear_solid(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
-    """f = K x + B v + K1 y, where the spring K1 of the Maxwell branch is stretched by y: y' + y/tau = x'."""
-    return _relaxing(motion, _deep(motion, nonlinear), nonlinear["tau"], lag)
-
-
-def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
-    """Columns of a spring, a damper and a Maxwell branch that are stretched by u, shape (n,)."""
-    branch = u - u[0] - low_pass_once(u - u[0], tau, motion.chain.dt)
-    columns = [motion.filtered(u, k, lag) for k in (0, 1)]
-    return [*columns, motion.filtered(branch, 0, lag), motion.ones]
-
-
-def _hunt_crossley(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
-    """f = K d^n + B d^n v. The damping's column is the derivative of d^(n+1)/(n+1), so that v is never formed."""
-    n = nonlinear["n"]
-    d = np.maximum(motion.position - nonlinear["x0"], 0.0)
-    power = d**n
-    return [motion.filtered(power, 0, lag), motion.filtered(power * d / (n + 1), 1, lag), motion.ones]
-
-
-KELVIN_VOIGT = Model("kelvin-voigt", ("K", "B", "offset"), _kelvin_voigt)
-KELVIN_VOIGT_MASS = Model("kelvin-voigt-mass", ("K", "B", "M", "offset"), _kelvin_voigt_mass)
 
 _TURNS = 6.0
 """Deviations of the position's noise within which friction does not turn: nearly none is larger."""
@@ -211,10 +157,52 @@ NAMES = (
 )
 
 
+def _of_derivatives(count: int) -> Columns:
+    """f = K x + B v, with three M a as well."""
+    return lambda motion, _, lag: [*(motion.moved(k, lag) for k in range(count)), motion.ones]
+
+
+KELVIN_VOIGT = Model(NAMES[0], ("K", "B", "offset"), _of_derivatives(2))
+KELVIN_VOIGT_MASS = Model(NAMES[1], ("K", "B", "M", "offset"), _of_derivatives(3))
+
+
+def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
+    """f = K u + B u' + K1 y, shape (n,), where the spring K1 of a Maxwell branch is stretched by y: y' + y/tau = u'."""
+    branch = u - u[0] - low_pass_once(u - u[0], tau, motion.chain.dt)
+    columns = [motion.filtered(u, k, lag) for k in (0, 1)]
+    return [*columns, motion.filtered(branch, 0, lag), motion.ones]
+
+
+_RELAXING = ("K", "B", "K1", "offset")
+_PASSIVE = ("K", "B", "K1", "Fc")
+_POWER = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
+
+
+def _time(motion: Motion) -> NonlinearParameter:
+    """A relaxation time that this log can show: between the filter's and the log's."""
+    shortest, longest = 2 / motion.chain.rate, len(motion.rows) * motion.chain.period
+    starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
+    return NonlinearParameter("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
+
+
+def _touch(motion: Motion) -> NonlinearParameter:
+    """Where the surface is, about the position at which the force was first seen, and on the way there at the least."""
+    depth = float(np.max(motion.position)) or 1.0
+    least = min(-depth, float(np.min(motion.position)))
+    return NonlinearParameter("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
+
+
 def standard_linear_solid(motion: Motion) -> Model:
-    """The standard linear solid."""
+    """The standard linear solid, stretched by the depth beyond the surface; a probe fixed to it is always in it."""
+
+    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
+        x = motion.position
+        return _relaxing(
+            motion, x if motion.bonded else np.maximum(x - nonlinear["x0"], 0.0), nonlinear["tau"], lag
+        )
+
     nonlinear = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
-    return Model(NAMES[2], _RELAXING, _standard_linear_solid, nonlinear, _PASSIVE)
+    return Model(NAMES[2], _RELAXING, columns, nonlinear, _PASSIVE)
 
 
 def quasi_linear(motion: Motion) -> Model:
@@ -236,30 +224,18 @@ def quasi_linear(motion: Motion) -> Model:
     return Model(NAMES[4], _RELAXING, columns, nonlinear, _PASSIVE, deepest)
 
 
-_RELAXING = ("K", "B", "K1", "offset")
-_PASSIVE = ("K", "B", "K1", "Fc")
-_POWER = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
-
-
-def _time(motion: Motion) -> NonlinearParameter:
-    """A relaxation time that this log can show: between the filter's and the log's."""
-    shortest, longest = 2 / motion.chain.rate, motion.duration
-    starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
-    return NonlinearParameter("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
-
-
-def _touch(motion: Motion) -> NonlinearParameter:
-    """Where the surface is, about the position at which the force was first seen, and on the way there at the least."""
-    depth = float(np.max(motion.position)) or 1.0
-    least = min(-depth, float(np.min(motion.position)))
-    return NonlinearParameter("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
-
-
 def hunt_crossley(motion: Motion) -> Model:
-    """Hunt and Crossley's contact (1975): stiffness and damping both grow with d^n, so the force starts from zero."""
-    return Model(
-        "hunt-crossley", ("K", "B", "offset"), _hunt_crossley, (_POWER, _touch(motion)), ("K", "B", "Fc")
-    )
+    """Hunt and Crossley's contact (1975): f = K d^n + B d^n v; both grow with the depth, so the force starts from zero.
+
+    The damping's column is the derivative of d^(n+1)/(n+1), so that v is never formed.
+    """
+
+    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
+        n, d = nonlinear["n"], np.maximum(motion.position - nonlinear["x0"], 0.0)
+        power = d**n
+        return [motion.filtered(power, 0, lag), motion.filtered(power * d / (n + 1), 1, lag), motion.ones]
+
+    return Model(NAMES[3], ("K", "B", "offset"), columns, (_POWER, _touch(motion)), ("K", "B", "Fc"))
 
 
 def at_rest_before(model: Model) -> Model:

@@ -40,14 +40,10 @@ class Lag:
 def lag_prior(
     lag: float | None, lag_std: float, period: float, filtered: float, mass: tuple[float, float] | None
 ) -> Lag:
-    """The prior of the lag.
+    """The prior of the lag, as calibrated, with its standard deviation, or as sensors have it where `lag` is None [s].
 
-    Args:
-        lag: as calibrated [s]; None if it is not.
-        lag_std: standard deviation of that [s].
-        period: between two readings of the slower channel [s].
-        filtered: delay of the force sensor's own low-pass [s], 0 if it is not known.
-        mass: as in `Lag`.
+    `period` is between two readings of the slower channel, `filtered` the delay of the force sensor's own low-pass, 0
+    if it is not known [s]; `mass` is as in `Lag`.
     """
     if lag is not None:
         return Lag(lag, lag_std, True, mass)
@@ -135,15 +131,12 @@ class Options:
 
     @classmethod
     def of(cls, **said: Any) -> Options:
-        """Check what was said.
-
-        Raises:
-            InputError: a value out of its range, in one line.
-        """
+        """Check what was said; a value out of its range is an `InputError`."""
         told = said.get("force_filter")
         low_pass = LowPass.parse(told) if isinstance(told, str) else told
         options = cls(**(said | {"force_filter": low_pass if low_pass and low_pass.sections else None}))
-        _check(options)
+        _check_words(options)
+        _check_numbers(options)
         return options
 
     @property
@@ -168,16 +161,11 @@ class Options:
             )
 
 
-def _check(o: Options) -> None:
+def _check_words(o: Options) -> None:
     if o.model is not None and o.model not in NAMES:
         raise unknown("model", o.model, NAMES)
     if o.force_sign not in (None, 1, -1):
         raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
-    _check_masses(o)
-    _check_numbers(o)
-
-
-def _check_masses(o: Options) -> None:
     for name, mass in (("mass", o.mass), ("mass in series", o.series_mass)):
         if mass is not None and not all(isfinite(number) and number >= 0 for number in mass):
             raise InputError(f"the {name} and its std must be 0 or more, got {mass[0]:g} and {mass[1]:g}")
@@ -192,11 +180,7 @@ def _check_numbers(o: Options) -> None:
         raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
     if o.lag is not None and not isfinite(o.lag):
         raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
-    deviations = {
-        "calibration": o.calibration,
-        "lag's std": o.lag_std,
-        "series stiffness' std": o.series_std,
-    }
+    deviations = {"calibration": o.calibration, "lag's std": o.lag_std, "series stiffness' std": o.series_std}
     for name, value in deviations.items():
         if not (isfinite(value) and value >= 0):
             raise InputError(f"the {name} must be 0 or more, got {value:g}")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.identification.causes import Code, Warn
-from palpate.identification.contacts import Contacts, contacts_of
+from palpate.identification.contacts import contacts_of
 from palpate.identification.estimators.fit import Fit, fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
@@ -60,7 +60,7 @@ def identify(record: Record, **given: Any) -> Identification:
     warnings = (*channels.warnings, *contacts.warnings)
     terms = Terms(options.tolerance, options.calibration, record.units["force"], record.units["position"])
     if not contacts.spans:
-        return nothing(channels, chain, options, terms, warnings)
+        return _nothing(channels, chain, options, terms, warnings)
     problem = with_fewer_rows(problem_of(channels, chain, contacts, options))
     terms = replace(terms, band=problem.band)
     choice = choose(problem, options)
@@ -70,8 +70,8 @@ def identify(record: Record, **given: Any) -> Identification:
     if not (contacts.clear or options.bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
-        return nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer.hidden)
+        return _nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
+    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer)
     series = SeriesSpring.of(options)
     if series is not None:
         choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
@@ -80,7 +80,7 @@ def identify(record: Record, **given: Any) -> Identification:
         weighed = np.where(np.array(choice.answer.names) == "M", contacts.payload.std, 0.0)
         choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
     parameters, told = verdicts(choice, holds, evidence[2], terms)
-    return outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)
+    return _outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)
 
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
@@ -93,7 +93,7 @@ _NARROWER = 0.5
 
 
 # More than seven arguments: it gathers what every stage has found.
-def outcome(
+def _outcome(
     channels: Channels,
     chain: Chain,
     choice: Choice,
@@ -107,23 +107,19 @@ def outcome(
     """Identification from the fit, its verdicts and its evidence."""
     problem, found = choice.problem, choice.answer
     spectrum, press, point = evidence
-    mass = parameters.get("M")
-    name = found.fit.model.name
-    if (
-        name == "kelvin-voigt-mass"
-        and options.model is None
-        and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
-    ):
-        name = "kelvin-voigt"
+    mass, name = parameters.get("M"), found.fit.model.name
+    massless = options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
+    delay = 0.0 if problem.contacts.bonded else chain.delay
+    ends = ((channels.start + i * channels.dt - delay for i in span) for span in problem.contacts.spans)
     return Identification(
-        model=name,
+        model="kelvin-voigt" if massless and name == "kelvin-voigt-mass" else name,
         parameters=parameters,
-        contacts=tuple(_clock(channels, chain, problem.contacts, span) for span in problem.contacts.spans),
+        contacts=tuple((max(float(begin), channels.start), float(end)) for begin, end in ends),
         lag=_lag(choice),
         r2=max(found.fit.r2, 0.0),
         rmse=found.fit.rmse,
         n=len(problem.force),
-        warnings=(*warnings, *_late(press, problem, warnings), *_doubts(parameters, problem, options, terms)),
+        warnings=(*warnings, *_doubts(parameters, press, problem, warnings, options, terms)),
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
         traces=_traces(channels, chain, choice, terms),
@@ -138,30 +134,20 @@ def outcome(
     )
 
 
-def nothing(
+def _nothing(
     channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]
 ) -> Identification:
-    """There is no contact: every parameter without a number."""
-    reason = "there is no contact in this log"
-    units = impedance_units(terms.force_unit, terms.position_unit)
-    parameters = {
-        name: Parameter(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
-        for name, unit in units.items()
-    }
-    nan = float("nan")
+    """There is no contact: every parameter without a number, and the force, which says why."""
+    reason, nan = "there is no contact in this log", float("nan")
+    units = impedance_units(terms.force_unit, terms.position_unit).items()
     return Identification(
         options.model or "kelvin-voigt",
-        parameters,
-        (),
-        None,
-        nan,
-        nan,
-        0,
-        warnings,
+        {name: Parameter.unknown(unit, reason) for name, unit in units},
+        (), None, nan, nan, 0, warnings,
         cutoff=chain.cutoff,
-        traces=_outcome_untouched(channels, chain, terms),
+        traces=_traces(channels, chain, None, terms),
         options=_plain_options(options),
-    )
+    )  # fmt: skip
 
 
 def _plain_options(options: Options) -> dict[str, object]:
@@ -191,14 +177,9 @@ def _correlation(
     choice: Choice, parameters: dict[str, Parameter], point: WorkingPoint | None
 ) -> dict[str, float]:
     """Of the fit's K, B and M that have a number; a tangent in place of K is no part of the fit."""
-    found = choice.answer
-    names = [
-        name
-        for name in ("K", "B", "M")
-        if name in found.names
-        and parameters[name].value is not None
-        and not (point is not None and parameters[name] is point.stiffness)
-    ]
+    found, tangent = choice.answer, point and point.stiffness
+    known = {name: p for name, p in parameters.items() if p.value is not None and p is not tangent}
+    names = [name for name in ("K", "B", "M") if name in found.names and name in known]
     places = [found.names.index(name) for name in names]
     return correlations(names, found.cov[np.ix_(places, places)])
 
@@ -214,81 +195,64 @@ def _lag(choice: Choice) -> LagFound | None:
     return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "prior")
 
 
-def _late(press: Press | None, problem: Problem, warnings: tuple[Warn, ...]) -> list[Warn]:
-    """The lag that the work of the presses tells, where it is farther than the prior's bound and nobody told one."""
-    late = press.late if press else None
-    known = problem.lag.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
-    if late is None or known or late[0] <= NORMAL * problem.lag.std:
-        return []
-    text = (
-        f"unloading returns more work than loading took, which no passive surface does: the force is read"
-        f" after the position by {problem.lag.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
-    )
-    return [Warn(Code.FORCE_LAGS_POSITION, text)]
-
-
-def _doubts(parameters: dict[str, Parameter], problem: Problem, options: Options, terms: Terms) -> list[Warn]:
-    warnings = []
+def _doubts(
+    parameters: dict[str, Parameter],
+    press: Press | None,
+    problem: Problem,
+    warnings: tuple[Warn, ...],
+    options: Options,
+    terms: Terms,
+) -> list[Warn]:
+    """The lag that the work of the presses tells, where it is beyond an assumed prior's bound; unlikely numbers."""
+    found, prior, late = [], problem.lag, press.late if press else None
+    known = prior.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
+    if late is not None and not known and late[0] > NORMAL * prior.std:
+        text = (
+            f"unloading returns more work than loading took, which no passive surface does: the force is read"
+            f" after the position by {prior.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
+        )
+        found.append(Warn(Code.FORCE_LAGS_POSITION, text))
     stiffness = parameters["K"].value if "K" in parameters else None
     if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
         text = (
             f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
         )
-        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
+        found.append(Warn(Code.UNIT_DOUBTFUL, text))
     series = options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
         text = (
             f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K depends on that calibration"
         )
-        warnings.append(Warn(Code.SERIES_COMPLIANCE, text))
+        found.append(Warn(Code.SERIES_COMPLIANCE, text))
     position = problem.motion.position
     at = np.clip(np.round(problem.motion.instants).astype(np.intp), 0, len(position) - 1)
     deep = float(np.ptp(position[at]))
     if terms.position_unit == "m" and deep > _DEEPEST:
         text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
-        warnings.append(Warn(Code.UNIT_DOUBTFUL, text))
-    return warnings
+        found.append(Warn(Code.UNIT_DOUBTFUL, text))
+    return found
 
 
-def _clock(
-    channels: Channels, chain: Chain, contacts: Contacts, span: tuple[int, int]
-) -> tuple[float, float]:
-    """Times of a contact on the log's own clock: the filter's delay is taken off."""
-    delay = 0.0 if contacts.bonded else chain.delay
-    begin, end = (channels.start + i * channels.dt - delay for i in span)
-    return max(float(begin), channels.start), float(end)
-
-
-def _outcome_untouched(channels: Channels, chain: Chain, terms: Terms) -> Traces:
-    """The force of a log in which nothing is touched: seen, it says why."""
-    step = max(len(channels.force) // _SHOWN, 1)
-    none = np.empty(0)
-    time, force = channels.time - chain.delay, chain(channels.force)
-    return Traces(
-        time[::step], force[::step], none, none, none, none,
-        position_unit=terms.position_unit, force_unit=terms.force_unit,
-    )  # fmt: skip
-
-
-def _traces(channels: Channels, chain: Chain, choice: Choice, terms: Terms) -> Traces:
+def _traces(channels: Channels, chain: Chain, choice: Choice | None, terms: Terms) -> Traces:
+    """Signals and fit to be drawn; of a log in which nothing is touched, the force alone."""
+    step, units = max(len(channels.position) // _SHOWN, 1), (terms.position_unit, terms.force_unit)
+    time = (channels.time - chain.delay)[::step]
+    if choice is None:
+        none = np.empty(0)
+        return Traces(time, chain(channels.force)[::step], *(none,) * 4, {}, {}, {}, False, *units)
     problem, fitted = choice.answer.problem, choice.answer.fit
-    step = max(len(channels.position) // _SHOWN, 1)
-    size = max(len(problem.force) // _SHOWN, 1)
-    linear = fitted.model.linear
-    nonlinear = {parameter.name: fitted[parameter.name] for parameter in fitted.model.nonlinear}
-    columns = fitted.model.columns(problem.motion, nonlinear, fitted.lag)
-    lag = problem.lag
+    size, linear, mass = max(len(problem.force) // _SHOWN, 1), fitted.model.linear, problem.lag.mass
+    columns = fitted.model.columns(problem.motion, fitted.theta, fitted.lag)
     return Traces(
-        time=(channels.time - chain.delay)[::step],
-        force=chain(problem.contacts.force_sign * channels.force)[::step] - problem.resting,
-        fitted_time=block_means(channels.start + problem.time, size),
-        fitted_position=block_means(problem.motion.moved(0, fitted.lag), size),
-        fitted_force=block_means(problem.force, size),
-        predicted=block_means(fitted.force, size),
-        columns={name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
-        theta={name: fitted[name] for name in linear},
-        prior={"M": lag.mass[1]} if lag.mass and "M" in linear else {},
-        matched=problem.motion.matched,
-        position_unit=terms.position_unit,
-        force_unit=terms.force_unit,
+        time,
+        chain(problem.contacts.force_sign * channels.force)[::step] - problem.resting,
+        block_means(channels.start + problem.time, size),
+        block_means(problem.motion.moved(0, fitted.lag), size),
+        block_means(problem.force, size),
+        block_means(fitted.force, size),
+        {name: block_means(c, size) for name, c in zip(linear, columns, strict=True)},
+        {name: fitted[name] for name in linear},
+        {"M": mass[1]} if mass and "M" in linear else {},
+        problem.motion.matched,
+        *units,
     )

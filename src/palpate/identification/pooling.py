@@ -31,9 +31,9 @@ _EXACT = 1e-12
 """Share of the spread of the values below which a stated variance counts as none."""
 _ALONE = 4.0
 """Degrees of freedom of a single effect's own variance, which nothing repeats."""
-POOLED = ("K", "B", "M", "E")
+_POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
-BY_CHANCE = ("noise", "repetition", "blocks")
+_BY_CHANCE = ("noise", "repetition", "blocks")
 """Causes whose errors are independent from log to log. The others are errors common to all logs of one rig and one
 motion (the lag, a calibration, a force that the model lacks): no number of logs makes them smaller."""
 _ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
@@ -92,8 +92,7 @@ def random_effects(values: Array, variances: Array, covariates: Array | None = N
     offsets = np.empty((n, 0)) if covariates is None else covariates - covariates.mean(axis=0)
     spans = offsets.std(axis=0)
     design = np.column_stack([np.ones(n), offsets / spans])
-    freedom = n - design.shape[1]
-    between = _between(y, own, design)
+    freedom, between = n - design.shape[1], _between(y, own, design)
     weight = 1 / (own + between)
     theta, inverse = _least_squares(y, weight, design)
     excess = max(float(weight @ (y - design @ theta) ** 2) / freedom, 1.0)
@@ -146,8 +145,7 @@ class PooledParameter:
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
-        own = self.parameter.to_json()
-        return own | {
+        return self.parameter.to_json() | {
             "prediction95": list(self.prediction95) if self.prediction95 else None,
             "between_std": self.between,
             "logs": list(self.logs),
@@ -199,9 +197,8 @@ class Pooled(Result):
     @property
     def found(self) -> bool:
         """Whether there is anything with a number."""
-        own = [p.parameter.value for p in self.parameters.values()]
-        point = self.working_point.stiffness.parameter.value if self.working_point else None
-        return any(value is not None for value in (*own, point))
+        point = [self.working_point.stiffness] if self.working_point else []
+        return any(p.parameter.value is not None for p in (*self.parameters.values(), *point))
 
     def to_json(self) -> dict[str, Any]:
         """The plain values under `pooled` of `palpate identify --json` for many logs."""
@@ -227,17 +224,22 @@ def pool(
         covariates: by name, one number of each log, such as its temperature: the dependence on each is pooled, too.
 
     Raises:
-        InputError: as many names, or numbers of a covariate, as there are logs are wanted; a covariate is not finite,
-            or does not vary by itself.
+        InputError: there are not as many names, or numbers of a covariate, as logs; a covariate is not finite, or does
+            not vary by itself.
     """
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
     beside = _Covariates.of(covariates or {}, len(logs))
-    own = {
-        name: _pool([_one(found, name) for found in logs], tolerance, beside)
-        for name in POOLED
-        if any(found is not None and name in found.parameters for found in logs)
-    }
+    own = {}
+    for name in _POOLED:
+        given = [  # a parameter, and the model that gives it its meaning
+            (log.parameters[name], "" if name == "E" else _ALIKE.get(log.model, log.model))
+            if log is not None and name in log.parameters
+            else None
+            for log in logs
+        ]
+        if any(given):
+            own[name] = _pool(given, tolerance, beside)
     return Pooled(own, _point(logs, tolerance, beside), tuple(logs), tuple(names))
 
 
@@ -250,13 +252,13 @@ class _Covariates:
 
     @classmethod
     def of(cls, given: Mapping[str, ArrayLike], count: int) -> _Covariates:
-        columns = {name: np.asarray(values, np.float64) for name, values in given.items()}
-        for name, column in columns.items():
+        found = cls((), np.empty((count, 0)))
+        for name, values in given.items():
+            column = np.asarray(values, np.float64)
             if column.shape != (count,) or not np.isfinite(column).all():
                 raise InputError(f"the covariate {name} must be a number for each of the {count} logs")
-        found = cls(tuple(columns), np.column_stack([np.empty((count, 0)), *columns.values()]))
-        for i, name in enumerate(columns):
-            if not cls(found.names[: i + 1], found.numbers[:, : i + 1]).vary(range(count)):
+            found = cls((*found.names, name), np.column_stack([found.numbers, column]))
+            if not found.vary(range(count)):
                 raise InputError(
                     f"the covariate {name} is the same in all {count} logs, or a combination of others; leave it out"
                 )
@@ -275,86 +277,55 @@ def _point(
     logs: Sequence[Identification | None], tolerance: float, beside: _Covariates
 ) -> PooledPoint | None:
     points = [found.working_point if found else None for found in logs]
-    there = [point for point in points if point is not None]
-    if not there:
+    if not any(points):
         return None
     stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance, beside)
-    used = [p for i in stiffness.logs if (p := points[i]) is not None] or there
-
-    def range_of(values: list[float]) -> Interval:
-        return min(values), max(values)
-
-    return PooledPoint(
-        stiffness,
-        range_of([p.force_N for p in used]),
-        range_of([p.depth_m for p in used]),
-        range_of([p.frequency_Hz for p in used]),
-    )
-
-
-def _one(found: Identification | None, name: str) -> tuple[Parameter, str] | None:
-    """A log's parameter and the model that gives it its meaning."""
-    if found is None or name not in found.parameters:
-        return None
-    return found.parameters[name], "" if name == "E" else _ALIKE.get(found.model, found.model)
-
-
-@dataclass(frozen=True)
-class _Given:
-    """One log's number: value, 95 % half-widths by what it errs by itself and with all logs, and what it is."""
-
-    value: float
-    own: float
-    shared: float
-    kind: tuple[str, str]
-
-    @classmethod
-    def of(cls, p: Parameter, meaning: str) -> _Given | None:
-        """None for a parameter without a number, or one that is rejected."""
-        if p.value is None or p.ci95 is None or p.verdict is Verdict.REJECTED:
-            return None
-        half = (p.ci95[1] - p.ci95[0]) / 2
-        alike = [part for cause, part in p.budget.items() if cause not in BY_CHANCE]
-        shared = min(float(np.hypot.reduce([0.0, *alike])), half)
-        return cls(p.value, float(np.sqrt(half**2 - shared**2)), shared, (p.unit, meaning))
+    used = [p for i in stiffness.logs or range(len(points)) if (p := points[i]) is not None]
+    forces, depths, frequencies = zip(*((p.force_N, p.depth_m, p.frequency_Hz) for p in used), strict=True)
+    ranges = ((min(own), max(own)) for own in (forces, depths, frequencies))
+    return PooledPoint(stiffness, *ranges)
 
 
 def _pool(
     own: Sequence[tuple[Parameter, str] | None], tolerance: float, beside: _Covariates
 ) -> PooledParameter:
     """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
-    given = {i: found for i, pair in enumerate(own) if pair is not None and (found := _Given.of(*pair))}
+    kinds, numbers_of = (
+        {},
+        {},
+    )  # of each log: unit and model; value, half-widths of its own and common to all logs
+    for i, (p, meaning) in ((i, pair) for i, pair in enumerate(own) if pair is not None):
+        if p.value is not None and p.ci95 is not None and p.verdict is not Verdict.REJECTED:
+            half = (p.ci95[1] - p.ci95[0]) / 2
+            alike = [part for cause, part in p.budget.items() if cause not in _BY_CHANCE]
+            common = min(float(np.hypot.reduce([0.0, *alike])), half)
+            kinds[i] = p.unit, meaning
+            numbers_of[i] = p.value, float(np.sqrt(half**2 - common**2)), common
     unit = next((pair[0].unit for pair in own if pair is not None), "1")
-    kinds = [found.kind for found in given.values()]
-    kind = max(kinds, key=kinds.count, default=(unit, ""))
-    used = {i: found for i, found in given.items() if found.kind == kind}
+    kind = max(kinds.values(), key=[*kinds.values()].count, default=(unit, ""))
+    used = {i: numbers_of[i] for i, own_kind in kinds.items() if own_kind == kind}
     least = 2 + len(beside.names)
     if len(used) < least or not beside.vary(tuple(used)):
         few = f"{len(used)} of {len(own)} logs give{'s' * (len(used) == 1)} it a number; pooling takes two or more"
         if beside.names:
             few += f", and with {', '.join(beside.names)} {least} in which each of these varies by itself"
-        none = Parameter(None, None, None, kind[0], Verdict.NOT_IDENTIFIABLE, few)
-        return PooledParameter(none, None, None, tuple(used))
-    values, halves, shared = np.array([(g.value, g.own, g.shared) for g in used.values()]).T
+        return PooledParameter(Parameter.unknown(kind[0], few), None, None, tuple(used))
+    values, halves, shared = np.array([*used.values()]).T
     numbers = beside.numbers[list(used)]
-    mean, alike = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
-    prediction = None
-    if mean.next_half is not None:
-        again = float(np.hypot(mean.next_half, alike))
-        prediction = mean.value - again, mean.value + again
+    mean, common = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
+    again = None if mean.next_half is None else float(np.hypot(mean.next_half, common))
+    prediction = None if again is None else (mean.value - again, mean.value + again)
     of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
     freedom = mean.freedom * (mean.share**2 + (1 - mean.share) ** 2)  # that of both together is the mean's
     parts = {
         "between logs": Contribution(mean.std * float(np.sqrt(mean.share)), freedom),
         "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
-        "common to all logs": Contribution.within(alike),
+        "common to all logs": Contribution.within(common),
     }
     together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
     slopes = {}
     for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
-        scaled = (
-            alike * abs(slope / mean.value) if mean.value else 0.0
-        )  # an error common to all logs is of the scale
+        scaled = common * abs(slope / mean.value) if mean.value else 0.0  # such an error is of the scale
         parts = {
             "between logs": Contribution(std, mean.freedom),
             "common to all logs": Contribution.within(scaled),

@@ -32,20 +32,11 @@ _FEWEST = 30
 
 
 def number_rows(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
-    """The rows of all contacts, and the number of each one's contact.
-
-    Args:
-        contacts: rows of each.
-        channels: which say why rows are lost.
-
-    Raises:
-        InputError: too few rows in contact.
-    """
+    """The rows of all contacts, and the number of each one's contact; an `InputError` where they are too few."""
     rows = np.concatenate(contacts)
     if len(rows) < _FEWEST:
-        text = (
-            f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed: log longer or faster"
-        )
+        few = f"only {len(rows)} usable samples in contact; at least {_FEWEST} are needed"
+        text = f"{few}: log longer or faster"
         lost = [w.text for w in channels.warnings if w.code in (Code.SATURATED, Code.MISSING_SAMPLES)]
         raise InputError(f"{text} ({'; '.join(lost)})" if lost else text)
     return rows, np.repeat(np.arange(len(contacts)), [len(own) for own in contacts])
@@ -67,7 +58,7 @@ def ends(channels: Channels, contacts: Contacts) -> list[int]:
     return found
 
 
-MOST_ROWS = 1 << 16
+_MOST_ROWS = 1 << 16
 """Rows that are fitted at most, in pieces spread over the log: more average noise alone, which limits nothing then."""
 _PIECE = 1 << 14
 
@@ -124,13 +115,7 @@ class Problem:
         return self.contacts.resting if self.counted else 0.0
 
     def at(self, rows: Rows, force: Array, spans: Rows) -> Problem:
-        """The same at other rows.
-
-        Args:
-            rows: shape (m,).
-            force: at these, shape (m,).
-            spans: number of the contact that each belongs to, shape (m,).
-        """
+        """The same at other rows, with the force there and the number of each one's contact, all of shape (m,)."""
         return replace(self, motion=replace(self.motion, rows=rows, _kept={}), force=force, spans=spans)
 
     @property
@@ -164,12 +149,8 @@ class Memory:
 def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None:
     """The problem with the rows before each touch, the force counted from its rest; None if no touch is in the log.
 
-    As many before as the filter remembers; fewer where the contact before is nearer, none where it is too near.
-
-    Args:
-        problem: of the rows in contact.
-        memory: of the front end.
-        reach: rows before the touch for each of the contact, if there are so many; those of the memory at least.
+    As many before as the filter remembers, and `reach` times those of the contact if there are so many; fewer where the
+    contact before is nearer, none where it is too near.
     """
     rows, spans, length = problem.motion.rows, problem.spans, memory.length
     before, left = [], 0
@@ -194,21 +175,16 @@ def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None
 
 def with_fewer_rows(problem: Problem) -> Problem:
     """The same with so many rows at most, in evenly spaced unbroken pieces."""
-    wider = (
-        None if own is None else with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach)
+    touches, approach = (
+        own and with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach)
     )
-    rows = problem.motion.rows
-    kept = _pieces(len(rows)) if len(rows) > MOST_ROWS else np.ones(len(rows), bool)
-    fewer = problem if kept.all() else problem.at(rows[kept], problem.force[kept], problem.spans[kept])
-    touches, approach = wider
+    rows, fewer = problem.motion.rows, problem
+    if len(rows) > _MOST_ROWS:
+        pieces = -(-len(rows) // _PIECE)
+        every = -(-pieces * _PIECE // _MOST_ROWS)
+        kept = (np.arange(len(rows)) // _PIECE) % every == 0
+        fewer = problem.at(rows[kept], problem.force[kept], problem.spans[kept])
     return replace(fewer, with_touches=touches, with_approach=approach)
-
-
-def _pieces(count: int) -> Mask:
-    pieces = -(-count // _PIECE)
-    every = -(-pieces // (MOST_ROWS // _PIECE))
-    kept: Mask = (np.arange(count) // _PIECE) % every == 0
-    return kept
 
 
 _CONTACTS = 32
@@ -235,18 +211,16 @@ def highest_motion(motion: Motion) -> float:
     told = [stretch for stretch in sorted(stretches, key=len)[-_CONTACTS:] if len(stretch) >= FEWEST_SEGMENT]
     if not told:
         return float("inf")
-    spectra = [_energy(stretch) for stretch in told]
+    spectra = []
+    for stretch in told:
+        speed = np.diff(stretch)
+        frequency, power = periodogram(speed, _TAPER)
+        noise = position_noise([stretch])
+        floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
+        seen = np.where(power > ABOVE_FLOOR * floor, power, 0.0)
+        spectra.append((frequency, seen * len(speed) / len(frequency)))
     frequency, energy = (np.concatenate(parts) for parts in zip(*spectra, strict=True))
     order = np.argsort(frequency, kind="stable")
     below = np.cumsum(energy[order])
     least = 1 / max(map(len, told))
     return max(float(frequency[order][np.searchsorted(below, _MOST * below[-1])]), least) / motion.chain.dt
-
-
-def _energy(position: Array) -> tuple[Array, Array]:
-    """Of the speed in a stretch by frequency [1/sample], where it stands above the noise; both of shape (l,)."""
-    speed = np.diff(position)
-    frequency, power = periodogram(speed, _TAPER)
-    noise = position_noise([position])
-    floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
-    return frequency, np.where(power > ABOVE_FLOOR * floor, power, 0.0) * len(speed) / len(frequency)

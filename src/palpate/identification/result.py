@@ -54,14 +54,8 @@ class DynamicStiffness(Readable):
 
     def to_json(self) -> dict[str, float]:
         """Plain values that JSON can hold."""
-        return {
-            "Hz": self.frequency,
-            "storage": self.storage,
-            "storage_half": self.storage_half,
-            "loss": self.loss,
-            "loss_half": self.loss_half,
-            "blocks": self.blocks,
-        }
+        names = ("storage", "storage_half", "loss", "loss_half", "blocks")
+        return {"Hz": self.frequency} | {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -81,12 +75,7 @@ class Relaxation:
 
 @dataclass(frozen=True)
 class Tangent:
-    """Slope of force over depth in loading, at one force.
-
-    Args:
-        force: [N].
-        slope: there [N/m].
-    """
+    """Slope of force over depth in loading [N/m], at one force [N]."""
 
     force: float
     slope: Measurement
@@ -124,17 +113,12 @@ class Press(Compared):
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
-        relaxed = self.relaxation
+        own = self.relaxation
         return {
             "tangent": [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent],
             "hysteresis_loss": self.hysteresis_loss,
-            "relaxation": None
-            if relaxed is None
-            else {
-                "share": relaxed.share,
-                "half_time_s": relaxed.half_time,
-                "duration_s": relaxed.duration,
-            },
+            "relaxation": own
+            and {"share": own.share, "half_time_s": own.half_time, "duration_s": own.duration},
         }
 
 
@@ -179,13 +163,7 @@ class WorkingPoint(Readable):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well one of the models fits the same filtered force.
-
-    Args:
-        model: what it is called.
-        r2, rmse: of the fit.
-        note: what speaks for or against it.
-    """
+    """How well one of the models fits the same filtered force, by its name, and what speaks for or against it."""
 
     model: str
     r2: float
@@ -316,8 +294,7 @@ class Identification(Result):
     @property
     def found(self) -> bool:
         """Whether there is anything with a number."""
-        numbers = [parameter.value for parameter in self.parameters.values()]
-        return self.working_point is not None or any(value is not None for value in numbers)
+        return self.working_point is not None or any(p.value is not None for p in self.parameters.values())
 
     @property
     def resonance(self) -> tuple[float, float] | None:
@@ -328,14 +305,15 @@ class Identification(Result):
         k, b, m = (p.value or 0.0 for p in own if p)
         return sqrt(k / m) / (2 * pi), b / (2 * sqrt(k * m))
 
-    def _comparison_json(self, own: Comparison) -> dict[str, Any]:
-        """One of the models; the chosen one is called as the parameters' model, whose mass may be left out."""
-        chosen = isclose(own.rmse, self.rmse, rel_tol=1e-9)
-        name = self.model if chosen else own.model
-        return {"model": name, "r2": _plain(own.r2), "note": own.note, "chosen": chosen}
-
     def to_json(self) -> dict[str, Any]:
         """The plain values that `palpate identify --json` prints."""
+        models = []
+        for (
+            own
+        ) in self.comparison:  # the chosen one is called as the parameters' model, whose mass may be left out
+            chosen = isclose(own.rmse, self.rmse, rel_tol=1e-9)
+            name = self.model if chosen else own.model
+            models.append({"model": name, "r2": _plain(own.r2), "note": own.note, "chosen": chosen})
         return {
             "model": self.model,
             "depth_m": self.depth,
@@ -348,19 +326,18 @@ class Identification(Result):
             "lag_s": None if self.lag is None else asdict(self.lag),
             "fit": {"r2": _plain(self.r2), "rmse_N": _plain(self.rmse), "n": self.n},
             "warnings": [{"code": warn.code.word, "text": warn.text} for warn in self.warnings],
-            "models": [self._comparison_json(c) for c in self.comparison],
+            "models": models,
             "options": self.options,
             "uncertainty": self.uncertainty_json(),
         }
 
     def uncertainty_json(self) -> dict[str, Any]:
         """Uncertainty budgets of the working point and of each parameter with a number, as plain values."""
-        point = [self.working_point.stiffness] if self.working_point else []
-        every = {"working_point": next(iter(point), None), **self.parameters}
+        every = {"working_point": self.working_point.stiffness} if self.working_point else {}
         budgets = {
             name: own.budget_json(self.inputs) | {"value": own.value, "unit": p.unit}
-            for name, p in every.items()
-            if p is not None and (own := p.measurement) is not None
+            for name, p in (every | self.parameters).items()
+            if (own := p.measurement) is not None
         }
         return {
             "working_point": budgets.pop("working_point", None),

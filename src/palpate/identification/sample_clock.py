@@ -53,37 +53,27 @@ def sample_clock_of(values: Array) -> SampleClock:
     A channel that changes in nearly every row is taken to be as fast as the log.
     """
     changed = np.flatnonzero(np.diff(values)) + 1
+    every = np.arange(len(values))
+    in_every_row = SampleClock(every.astype(np.float64), every, 0.0, 1.0)
     if len(changed) < _FEWEST or len(changed) > _EVERY_ROW * len(values):
-        return _in_every_row(len(values))
+        return in_every_row
     counted = [_number(changed, *beat) for beat in _beats(changed)]
     even = [grid for grid in (_even(number, changed, period) for number, period in counted) if grid]
     as_fast = np.bincount(np.diff(changed)).argmax() == 1
     if not even and as_fast:  # and often the same twice
-        return _in_every_row(len(values))
+        return in_every_row
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
-    grid = max(even, key=lambda grid: grid.period)  # with the fewest samples that no change shows
-    first = int(np.ceil((-0.5 - grid.phase) / grid.period))
-    last = int(np.floor((len(values) - 1 - grid.phase) / grid.period))
-    instants = grid.phase + np.arange(first, last + 1) * grid.period
-    rows = np.ceil(instants - grid.room * 1e-6).astype(np.intp)
+    period, phase, room, spread = max(
+        even, key=lambda grid: grid[0]
+    )  # with the fewest samples that no change shows
+    first = int(np.ceil((-0.5 - phase) / period))
+    last = int(np.floor((len(values) - 1 - phase) / period))
+    instants = phase + np.arange(first, last + 1) * period
+    rows = np.ceil(instants - room * 1e-6).astype(np.intp)
     kept = (rows >= 0) & (rows < len(values))
-    return SampleClock(instants[kept], rows[kept], grid.spread, grid.period)
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """Instants phase + number * period; `room`: how far they stand from the ends of their rows at least; in rows."""
-
-    phase: float
-    period: float
-    room: float
-    spread: float
-
-
-def _in_every_row(count: int) -> SampleClock:
-    return SampleClock(np.arange(count, dtype=np.float64), np.arange(count), 0.0, 1.0)
+    return SampleClock(instants[kept], rows[kept], spread, period)
 
 
 def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
@@ -94,8 +84,8 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     sample that equals the one before shows no change, but that only weakens the lines. As rows are whole, a line at f
     stands at 1 - f too; from periods near 2 both may be meant.
     """
-    far = np.abs(changed - changed[len(changed) // 2])
-    own = changed[far < _near(far)]
+    far, reach = _reach(changed)
+    own = changed[far < reach]
     least = float(np.percentile(np.diff(own), _SHORTEST))
     size = 8 << int(own[-1] - own[0]).bit_length()
     line = np.zeros(size)
@@ -113,19 +103,17 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     lines = {best, strongest(mean - _PER_LINE, min(mean + _PER_LINE, size - 1))}
     if first <= size - best <= last:
         lines.add(size - best)
-    return [_beat(at, size, spectrum, own[0]) for at in sorted(lines)]
+    found = []
+    for at in sorted(lines):
+        angle, period = float(np.angle(spectrum[min(at, size - at)])) / (2 * np.pi), size / at
+        found.append((period, own[0] + period * (angle if at > size // 2 else -angle)))
+    return found
 
 
-def _beat(at: int, size: int, spectrum: NDArray[np.complex128], first: int) -> tuple[float, float]:
-    """Period of a line, and a place in the middle of a row that it makes of the changes from row `first` on."""
-    angle = float(np.angle(spectrum[min(at, size - at)])) / (2 * np.pi)
-    period = size / at
-    return period, first + period * (angle if at > size // 2 else -angle)
-
-
-def _near(far: NDArray[np.intp]) -> int:
-    """How far from the middle of the changes the grid is looked for, in rows: enough of them must be there."""
-    return max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
+def _reach(changed: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
+    """Distance of each change from the middle one, and that within which enough of them are to look for the grid."""
+    far = np.abs(changed - changed[len(changed) // 2])
+    return far, max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
 
 
 def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
@@ -133,8 +121,7 @@ def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[ND
 
     Counted from the middle of the log to both sides, the period made better on the way.
     """
-    far = np.abs(changed - changed[len(changed) // 2])
-    reach = _near(far)
+    far, reach = _reach(changed)
     while True:
         own = changed[far < reach]
         period, middle = (float(x) for x in np.polyfit(np.round((own - middle) / period), own, 1))
@@ -143,8 +130,10 @@ def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[ND
         reach *= 2
 
 
-def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> _Grid | None:
-    """The grid whose instants stand farthest from the ends of their rows; None if no grid has one in each.
+def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> tuple[float, ...] | None:
+    """Period and phase of the even grid of the samples, room and standard deviation of the phase; in rows.
+
+    Its instants stand farthest from the ends of their rows, by the room at least; None if no grid has one in each.
 
     Phase and period of all that have form a polygon. What is not known of the phase is how far the polygon reaches,
     where the phase is that in the middle of the log.
@@ -155,7 +144,7 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
     if room <= _ROOM:
         return None
     reach = [_farthest((way, 0.0, 0.0), count, changed, best)[0][0] for way in (1.0, -1.0)]
-    return _Grid(best[0] - best[1] * middle, best[1], room, (reach[1] - reach[0]) / np.sqrt(12))
+    return best[1], best[0] - best[1] * middle, room, (reach[1] - reach[0]) / np.sqrt(12)
 
 
 def _farthest(
@@ -165,11 +154,8 @@ def _farthest(
 
     Of its constraints, two a change, only those are taken that were violated most in their part of the log.
 
-    Args:
-        goal: what of phase, period and room is made smallest; the room is at least 0 where it is no part of it.
-        count: number of each sample from the middle of the log, shape (m,).
-        changed: the row that shows it, shape (m,).
-        begin: phase and period to begin with.
+    `goal` is what of phase, period and room is made smallest; the room is at least 0 where it is no part of it. `count`
+    is the number of each sample from the middle of the log, `changed` the row that shows it, both of shape (m,).
     """
     from scipy.optimize import linprog
 
@@ -197,8 +183,6 @@ def _farthest(
     return (phase, period), room
 
 
-Rows = Mask
-
 _FEWEST_AT_LIMIT = 8
 _RUN = 3
 """Equal readings in a row that count as standing still."""
@@ -206,16 +190,12 @@ _STEPS = 4.0
 """Steps of the reading's own resolution that the force should have changed by meanwhile, were it not at its limit."""
 
 
-def at_limit(force: Array, place: Array, levels: Iterable[float], among: Rows | None = None) -> Rows:
-    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,).
+def at_limit(force: Array, place: Array, levels: Iterable[float], among: Mask | None = None) -> Mask:
+    """Rows in unbroken stretches of exactly one force while the probe moves on, shape (n,), `among` those that count.
 
-    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution.
-
-    Args:
-        force: of one axis [N], shape (n,).
-        place: of the probe [m], shape (n,) or (n, 3); NaN where there is no reading.
-        levels: the forces that may be an end of the range [N].
-        among: rows that count, shape (n,); all if not given.
+    The probe moves on if, at the slope of the whole log, the force should have changed by more than its resolution. The
+    force of one axis [N] has the shape (n,), the place of the probe [m] (n,) or (n, 3), NaN where there is no reading;
+    `levels` are the forces that may be an end of the range [N].
     """
     stuck = np.zeros(len(force), bool)
     rows = np.arange(len(force)) if among is None else np.flatnonzero(among)
@@ -238,15 +218,11 @@ _FLANK = 0.4
 """Share of that by which it does so in the quarter next to either end: a straight line has 0.25, half a sine 0.6."""
 
 
-def past_end(position: Array, force: Array) -> Rows:
+def past_end(position: Array, force: Array) -> Mask:
     """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
 
     A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
-    goes on and comes back.
-
-    Args:
-        position: of one axis [m], shape (n,).
-        force: of the same rows [N], shape (n,).
+    goes on and comes back. Position [m] and force [N] have the shape (n,).
     """
     rise = np.sign(float(np.cov(position, force)[0, 1]))
     noise = float(np.median(np.abs(np.diff(force, 2)))) / 1.65  # of a normal distribution: 6^0.5 times 0.674
@@ -256,9 +232,7 @@ def past_end(position: Array, force: Array) -> Rows:
             first, *own, last = way * force[begin:end]
             inside, quarter = np.array(own), (end - begin + 3) // 4
             beyond = [float(inside.mean()) - at for at in (first, last)]
-            near = [
-                float(part.mean()) - at for part, at in ((inside[:quarter], first), (inside[-quarter:], last))
-            ]
+            near = float(inside[:quarter].mean()) - first, float(inside[-quarter:].mean()) - last
             clear = min(beyond) > _MORE * noise * (1 + 1 / len(own)) ** 0.5
             past[begin:end] = clear and all(n > _FLANK * b for n, b in zip(near, beyond, strict=True))
     return past

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +30,9 @@ _ROUNDED = 1e3
 """Last places of a floating-point number below which a step is its own rounding, no log's."""
 _WHOLE = 0.05
 """Of a step that a multiple of it may be off by: sums and units round too."""
+_BESIDE, _ALONE = 4, 5.0
+"""Readings on either side that one is held against, and how many times their range it lies beyond them to stand
+alone."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,7 @@ class Channels:
     """Position and force on one even grid of time, both sampled at the same instants before.
 
     Args:
-        start: time of the first sample [s].
-        dt: sampling period [s].
+        start, dt: time of the first sample, and sampling period [s].
         position, force: shape (n,), SI units.
         valid: where both channels have readings near by, shape (n,).
         rate: fresh readings per second of the slower channel [1/s].
@@ -83,13 +85,7 @@ class Channels:
     @property
     def time(self) -> Array:
         """Of each sample [s], shape (n,)."""
-        time: Array = self.start + np.arange(len(self.position), dtype=np.float64) * self.dt
-        return time
-
-
-_BESIDE, _ALONE = 4, 5.0
-"""Readings on either side that one is held against, and how many times their range it lies beyond them to stand
-alone."""
+        return np.asarray(self.start + np.arange(len(self.position), dtype=np.float64) * self.dt)
 
 
 def channels_of(record: Record) -> Channels:
@@ -106,10 +102,8 @@ def channels_of(record: Record) -> Channels:
     step = np.diff(time)
     twice = int((step == 0).sum())
     if twice:
-        row = int(np.flatnonzero(step == 0)[0]) + 2
-        text = (
-            f"{twice} rows repeat the time of the row before (first in row {row}); the first of each is kept"
-        )
+        first = f"first in row {int(np.flatnonzero(step == 0)[0]) + 2}"
+        text = f"{twice} rows repeat the time of the row before ({first}); the first of each is kept"
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
         keep = np.r_[True, step > 0]
         time, position, force = time[keep], position[keep], force[keep]
@@ -121,17 +115,17 @@ def channels_of(record: Record) -> Channels:
     _leave_saturated(use_x, use_f, position, force, warnings)
     rate = min(_rate(time[use_x]), _rate(time[use_f]), 1 / dt)
     if rate < _SLOW:
-        text = (
-            f"only {rate:.3g} fresh readings a second: motion faster than about {rate / 8:.2g} Hz is not seen"
-        )
-        warnings.append(Warn(Code.LOW_RATE, text))
+        seen = f"motion faster than about {rate / 8:.2g} Hz is not seen"
+        warnings.append(Warn(Code.LOW_RATE, f"only {rate:.3g} fresh readings a second: {seen}"))
         if dt >= _LONG_STEP:
             text = f"by its unit there is a row every {dt:.3g} s: is the time in ms? then say NAME:ms"
             warnings.append(Warn(Code.TIME_DOUBTFUL, text))
     grid = time if even else np.arange(time[0], time[-1] + dt / 2, dt)
     x, f, valid = _common(grid, time, (position, use_x), (force, use_f), even)
     own_x, near_x = _bridge(grid, time[use_x], position[use_x])
-    raw = Raw(float(time[0]), dt, own_x, _hold_lengths(grid + dt / 4, time, force), near_x & valid)
+    there = np.isfinite(force)
+    rows = np.searchsorted(time[there], grid + dt / 4, side="right") - 1
+    raw = Raw(float(time[0]), dt, own_x, force[there][np.maximum(rows, 0)], near_x & valid)
     return Channels(float(time[0]), dt, x, f, valid, rate, raw, tuple(warnings), rounding)
 
 
@@ -152,11 +146,8 @@ def _without_spikes(force: Array, rounding: float, warnings: list[Warn]) -> Arra
     spikes = rows[at[beyond > _ALONE * np.maximum(np.ptp(near, axis=1), 2 * usual)]]
     if not len(spikes):
         return force
-    text = (
-        f"{len(spikes)} readings of the force stand alone, far from those beside them (first: row"
-        f" {spikes[0] + 1}); they are bridged"
-    )
-    warnings.append(Warn(Code.MISSING_SAMPLES, text))
+    far = f"{len(spikes)} readings of the force stand alone, far from those beside them"
+    warnings.append(Warn(Code.MISSING_SAMPLES, f"{far} (first: row {spikes[0] + 1}); they are bridged"))
     force = force.copy()
     force[spikes] = np.nan
     return force
@@ -181,21 +172,10 @@ def thinned(channels: Channels, size: int) -> Channels:
         return channels
     position, force = block_means(channels.position, size), block_means(channels.force, size)
     valid = block_means(channels.valid.astype(float), size) == 1
-    start = channels.start + (size - 1) / 2 * channels.dt
-    dt = channels.dt * size
-    rate = min(channels.rate, 1 / dt)
-    own, other = channels.rounding
+    start, dt = channels.start + (size - 1) / 2 * channels.dt, channels.dt * size
+    rate, (own, other) = min(channels.rate, 1 / dt), channels.rounding
     rounding = own / size**0.5, other / size**0.5
-    return replace(
-        channels,
-        start=start,
-        dt=dt,
-        position=position,
-        force=force,
-        valid=valid,
-        rate=rate,
-        rounding=rounding,
-    )
+    return Channels(start, dt, position, force, valid, rate, channels.raw, channels.warnings, rounding)
 
 
 def _common(
@@ -218,17 +198,10 @@ def _common(
     return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
 
 
-def _hold_lengths(at: Array, time: Array, force: Array) -> Array:
-    """The force as it stood in the log, held from row to row."""
-    there = np.isfinite(force)
-    rows = np.searchsorted(time[there], at, side="right") - 1
-    held: Array = force[there][np.maximum(rows, 0)]
-    return held
-
-
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
-        count = f"{len(time)} row{'s' * (len(time) != 1)} with a time of {'their' if len(time) != 1 else 'its'} own"
+        several, whose = ("", "its") if len(time) == 1 else ("s", "their")
+        count = f"{len(time)} row{several} with a time of {whose} own"
         raise InputError(
             f"the log has {count}; at least {_FEWEST} are needed: log longer, or check --time, --start and --end"
         )
@@ -237,23 +210,20 @@ def _check(time: Array, position: Array, force: Array) -> None:
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
-    if _rate(time) > _FASTEST:
-        raise InputError(
-            f"there are {_rate(time):.3g} rows a second, faster than any sensor; is the unit of time right?"
-        )
+    if (rate := _rate(time)) > _FASTEST:
+        fast = f"there are {rate:.3g} rows a second, faster than any sensor"
+        raise InputError(f"{fast}; is the unit of time right?")
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
-            raise InputError(
-                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
-            )
+            large = f"the {name} reaches {reach:.3g}, beyond any sensor"
+            raise InputError(f"{large}; is it the right column and unit?")
         if np.ptp(seen) == 0:
-            raise InputError(
-                f"the {name} is {seen[0]:.6g} in every row; is it the right column, and did anything move?"
-            )
+            still = f"the {name} is {seen[0]:.6g} in every row"
+            raise InputError(f"{still}; is it the right column, and did anything move?")
 
 
 def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
@@ -261,7 +231,15 @@ def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool
     middle = float(np.median(step))
     gaps = step > 3 * middle
     dt = float(step[~gaps].mean())
-    _check_leaps(time, step, dt)
+    samples = (time[-1] - time[0]) / dt
+    if samples > max(
+        _BRIDGED * len(time), _FEW
+    ):  # little else than gaps: its even grid would fill the memory
+        widest = int(np.argmax(step))
+        raise InputError(
+            f"the time jumps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
+            f" {samples:.3g} samples; cut the log there with --start and --end"
+        )
     even = not gaps.any() and abs(time[-1] - time[0] - dt * len(step)) < dt
     even = even and float(np.abs(step - dt).max()) <= _JITTER * dt
     if not even:
@@ -272,23 +250,11 @@ def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool
     return dt, even
 
 
-def _check_leaps(time: Array, step: Array, dt: float) -> None:
-    """Refuse a log that is little else than gaps: its even grid would fill the memory."""
-    samples = (time[-1] - time[0]) / dt
-    if samples > max(_BRIDGED * len(time), _FEW):
-        widest = int(np.argmax(step))
-        raise InputError(
-            f"the time jumps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
-            f" {samples:.3g} samples; cut the log there with --start and --end"
-        )
-
-
 def _usable(name: str, values: Array, dt: float, warnings: list[Warn]) -> Mask:
     """Rows whose reading is there and is fresh."""
     usable = np.isfinite(values)
     if not usable.all() and not any(w.code is Code.MISSING_SAMPLES for w in warnings):
-        count = int((~usable).sum())
-        first = int(np.argmin(usable)) + 1
+        count, first = int((~usable).sum()), int(np.argmin(usable)) + 1
         text = f"{count} of {len(values)} rows have no {name} (first: row {first}); they are bridged"
         warnings.append(Warn(Code.MISSING_SAMPLES, text))
     rows = np.flatnonzero(usable)
@@ -307,19 +273,14 @@ def _leave_saturated(
     """Take rows out in which a channel stands at the end of its range."""
     rows = np.flatnonzero(use_force & use_position)
     x, f = position[rows], force[rows]
-    stuck, past = at_limit(f, x, _far_end(f)), past_end(x, f)
+    ends = float(f.max()), float(f.min())  # near zero rests a force in free motion
+    far = [end for end in ends if abs(end) > max(map(abs, ends)) / 2]
+    stuck, past = at_limit(f, x, far), past_end(x, f)
     for name, values, at, use in (("force", f, stuck, use_force), ("position", x, past, use_position)):
         if at.any():
             rests = f"the {name} rests at its extreme value {values[at][0]:.6g}"
             warnings.append(Warn(Code.SATURATED, f"{rests} for {int(at.sum())} rows; they are left out"))
             use[rows[at]] = False
-
-
-def _far_end(force: Array) -> list[float]:
-    """The ends of the range that are far from zero: near it rests a force in free motion."""
-    ends = [float(force.max()), float(force.min())]
-    far = max(abs(end) for end in ends)
-    return [end for end in ends if abs(end) > far / 2]
 
 
 def _rate(time: Array) -> float:

@@ -74,11 +74,7 @@ def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution
 
 
 def _descent(start: Linearisation) -> tuple[Linearisation, float]:
-    """Form the columns again about what is found until it rests.
-
-    Returns:
-        The likeliest linearisation, and its misfit.
-    """
+    """The likeliest linearisation, its columns formed again about what is found until it rests, and its misfit."""
     best = local = start
     places, least = list(local.searched), np.inf
     for _ in range(_ROUNDS if places else 0):
@@ -129,16 +125,14 @@ def _starts(local: Linearisation) -> list[Linearisation]:
 def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:
     """Over the approach too: how the force rises from nothing tells most of a press that then rests.
 
-    The surface is looked for: what a wrong place of it does is a force that is there at once with the touch.
+    The surface is looked for: what a wrong place of it does is a force that is there at once with the touch. None if it
+    is not found.
 
     Args:
         problem: with the rows of the approach.
         inside: samples of the position that are in contact.
-        known: what it is over the rows in contact.
+        known: the linearisation over the rows in contact.
         found: its answer.
-
-    Returns:
-        None if the surface is not found.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     at = problem.motion.instants.astype(np.intp)

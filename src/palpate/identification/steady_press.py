@@ -74,11 +74,7 @@ class Stroke:
 
 
 def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
-    """The strokes of a log whose motion is little else; none of another log.
-
-    Args:
-        channels: evenly sampled.
-    """
+    """The strokes of an evenly sampled log whose motion is little else; none of another log."""
     size = -(-len(channels.position) // _BLOCKS)
     x = block_means(channels.position, size)
     noise = noise_within(x, np.arange(len(x)), np.zeros(len(x), np.intp))
@@ -99,10 +95,8 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
 def _goes_in_strokes(made: Array, legs: Array, whole: Array) -> bool:
     """Whether a motion goes one way in strokes, comes back at any speed, and does little else.
 
-    Args:
-        made: ways of the strokes, (n,) [m].
-        legs: ways between large turns, at any speed, (m,) [m].
-        whole: ways between all turns above the noise, (k,) [m].
+    By the ways [m] of the strokes, of the legs between large turns at any speed, and of those between all turns above
+    the noise.
     """
     strokes = float(made[made > 0].sum())
     there, back = float(whole[whole > 0].sum()), float(-legs[legs < 0].sum())
@@ -163,8 +157,6 @@ _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
 _FOLLOWED = 0.5
 """Share of a stroke's force that a smooth curve of the position follows, of a contact."""
-_TOUCHED = 0.2
-"""Share of the largest range of the force above which a stroke is a press, too, if not one of those that are named."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
 _DEGREES = (2, 4, 6, 8)
@@ -226,9 +218,8 @@ class Slopes:
         """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
         if wider is None or not wider.stiffness.value:
             return self
-        spread = wider.stiffness.contributions["repetition"].times(
-            self.stiffness.value / wider.stiffness.value
-        )
+        gain = self.stiffness.value / wider.stiffness.value
+        spread = wider.stiffness.contributions["repetition"].times(gain)
         if spread.half <= self.stiffness.contributions["repetition"].half:
             return self
         parts = {**self.stiffness.contributions, "repetition": spread}
@@ -261,7 +252,8 @@ def steady_press(
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
-    The tangents are of the loadings; of the unloadings, where the log has no other stroke.
+    The tangents are of the loadings; of the unloadings, where the log has no loading at any speed: a surface that
+    relaxes or yields gives back at another slope than it took.
 
     Args:
         channels: as logged.
@@ -274,11 +266,15 @@ def steady_press(
     every = curves_of(channels, strokes, signs, drift)
     deepest = max((own.span for own in every), default=0.0)
     curves = [own for own in every if own.span > deepest / 2]
-    named = [own for own in curves if own.loads] or curves
+    named = [own for own in curves if own.loads]
+    force = block_means(signs[1] * channels.force[channels.valid], -(-len(channels.force) // _BLOCKS))
+    if not named and (np.diff(force[_turns(force, deepest / 2)]) > deepest / 2).any():
+        return None
+    named = named or curves
     headline = slopes_at(named, WINDOW, lag, rest)
     if headline is None or headline.explained < _FOLLOWED:
         return None
-    beside = [own for own in every if own.loads is named[0].loads and own.span > _TOUCHED * deepest]
+    beside = [own for own in every if own.loads is named[0].loads and own.span > _STROKE * deepest]
     if len(beside) > len(named):  # at a force that all reach
         headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
@@ -315,9 +311,8 @@ def curves_of(
             ends = [float(np.median(own)) for own in np.array_split(force, 5)]
             time = channels.time[there]
             gone = np.zeros(len(time)) if drift is None else np.interp(time, drift.times, drift.levels)
-            curves.append(
-                Curve(time, position, force, gone, ends[-1] > ends[0], min(channels.rate * channels.dt, 1.0))
-            )
+            readings = min(channels.rate * channels.dt, 1.0)
+            curves.append(Curve(time, position, force, gone, ends[-1] > ends[0], readings))
     return curves
 
 
@@ -326,13 +321,9 @@ def slopes_at(
 ) -> Slopes | None:
     """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
 
-    Where strokes differ by more than their noise, the variance between them is in the interval.
-
-    Args:
-        curves: of one direction.
-        shares: of the force that they have in common, between which the window lies.
-        lag: prior of the lag.
-        rest: the force out of contact [N].
+    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
+    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
+    contact [N].
     """
     low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
     ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
@@ -349,9 +340,8 @@ def slopes_at(
     n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
     weight /= weight.sum()
     noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
-    share = differ**2 / max(
-        noise**2 + differ**2, 1e-300
-    )  # Satterthwaite: the noise is known, the differences by n - 1
+    # Satterthwaite: the noise is known, the differences by n - 1.
+    share = differ**2 / max(noise**2 + differ**2, 1e-300)
     freedom = (n - 1) / share**2 if share else np.inf
     bend = float(weight @ bends)
     value = float(weight @ values) * (1 + lag.value * bend)
@@ -371,13 +361,10 @@ def slopes_at(
 
 
 def _bend(window: _Window, level: float, slope: float, depth: float) -> tuple[float, float]:
-    """How far a bend that no smooth curve follows, as a yield or a second layer, moves the slope of a window.
+    """Bias [N/m] of a window's slope by a bend that no smooth curve follows, as a second layer; its variance.
 
     In half of the window it is smaller. The slopes' difference is that bias and the noise of the narrower one, so that
     the bias is known as well as its excess over the noise (James and Stein's shrinkage).
-
-    Returns:
-        The bias to add [N/m] and its variance.
     """
     near, variance, *_ = _tangent(window.about(depth), level)
     share = max(1 - variance / max((near - slope) ** 2, 1e-300), 0.0)

@@ -26,12 +26,7 @@ _MOST_FREEDOM = 1e9
 
 
 def student(freedom: float, level: float = 0.95) -> float:
-    """Two-sided quantile of Student's t.
-
-    Args:
-        freedom: degrees of freedom; fewer than one count as one.
-        level: probability within.
-    """
+    """Two-sided quantile of Student's t for a probability within; fewer degrees of freedom than one count as one."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(freedom, 1.0), (1 + level) / 2))
@@ -40,30 +35,24 @@ def student(freedom: float, level: float = 0.95) -> float:
 def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
     """Degrees of freedom of a sum of variances (Welch and Satterthwaite, JCGM 100, G.2b), shape (p,).
 
-    Args:
-        variance: by cause, shape (c, p).
-        freedom: degrees of freedom of each, shape (c, p).
+    The variances are by cause, shape (c, p), and so are the degrees of freedom of each.
     """
     variance = np.asarray(variance, np.float64)
     total = variance.sum(axis=0)
     loss = ((variance / np.where(total > 0, total, 1.0)) ** 2 / np.asarray(freedom)).sum(axis=0)
-    found: Array = 1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0)
-    return found
+    return np.asarray(1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0))
 
 
 def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
     """95 % half-widths of all causes together, shape (p,): Student's t times the root of the sum of the variances.
 
-    Args:
-        variance: by cause, shape (c, p).
-        freedom: degrees of freedom of each, shape (c, p).
+    The variances are by cause, shape (c, p), and so are the degrees of freedom of each.
     """
     from scipy.special import stdtrit
 
     whole, together = np.asarray(variance, np.float64).sum(axis=0), effective_freedom(variance, freedom)
     coverage = np.where(together < 0.99 * _MOST_FREEDOM, stdtrit(together, 0.975), NORMAL)
-    found: Array = coverage * np.sqrt(whole)
-    return found
+    return np.asarray(coverage * np.sqrt(whole))
 
 
 class Contribution(NamedTuple):
@@ -235,26 +224,20 @@ class Parameter(Readable):
         reason: str,
         contributions: Contributions,
     ) -> Parameter:
-        """A parameter with its interval and its budget.
-
-        Args:
-            value: of it.
-            unit: in SI.
-            verdict: on it.
-            reason: of that.
-            contributions: to its uncertainty, by cause.
-        """
+        """A parameter with its interval and its budget, of the contributions to its uncertainty by cause."""
         whole = Measurement(value, contributions)
         half = whole.half
         share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
         parts = {cause: share * part.std for cause, part in contributions.items()}
-        budget = {
-            cause: part for cause, part in sorted(parts.items(), key=lambda x: -x[1]) if part > _SMALL * half
-        }
+        parts = dict(sorted(parts.items(), key=lambda item: -item[1]))
+        budget = {cause: part for cause, part in parts.items() if part > _SMALL * half}
         ends = value - half, value + half
-        return cls(
-            value, half / NORMAL, ends, unit, verdict, reason, budget=budget, contributions=contributions
-        )
+        return cls(value, half / NORMAL, ends, unit, verdict, reason, None, budget, contributions)
+
+    @classmethod
+    def unknown(cls, unit: str, reason: str) -> Parameter:
+        """A parameter that the log says nothing of, and why."""
+        return cls(None, None, None, unit, Verdict.NOT_IDENTIFIABLE, reason)
 
     def without_number(
         self,
@@ -262,13 +245,7 @@ class Parameter(Readable):
         verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
         ci95: tuple[float, float] | None = None,
     ) -> Parameter:
-        """The same without a value, and at most with bounds: its budget says why.
-
-        Args:
-            reason: why there is none.
-            verdict: on it.
-            ci95: bounds that the log still shows.
-        """
+        """The same without a value, at most with bounds `ci95` that the log still shows: its budget says why."""
         bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
         return replace(bare, verdict=verdict, reason=reason)
 
@@ -294,19 +271,10 @@ class Parameter(Readable):
 
 
 def correlations(names: Sequence[str], cov: Array) -> dict[str, float]:
-    """Correlation coefficient of each pair of parameters, by their names with a comma between.
-
-    Args:
-        names: of the parameters, shape (p,).
-        cov: their covariance, shape (p, p).
-    """
+    """Correlation coefficient of each pair of parameters, by their names with a comma between; cov is (p, p)."""
     std = np.sqrt(np.diag(cov))
-    pairs = combinations(range(len(names)), 2)
-    return {
-        f"{names[i]},{names[j]}": float(cov[i, j] / (std[i] * std[j]))
-        for i, j in pairs
-        if std[i] * std[j] > 0
-    }
+    pairs = [(i, j) for i, j in combinations(range(len(names)), 2) if std[i] * std[j] > 0]
+    return {f"{names[i]},{names[j]}": float(cov[i, j] / (std[i] * std[j])) for i, j in pairs}
 
 
 def _finite(value: float) -> float | None:

@@ -30,6 +30,14 @@ _NUISANCE = ("x0", "y0")
 _IN_TIME = ("B", "M", "K1", "tau")
 """Parameters that are seen in time: a shift of the force looks like them."""
 _BELOW = "below zero: no passive surface does that"
+_STEADY = "the log does not show it: the probe moves at constant speed"
+_UNSIGNED = (
+    "the log does not show the signs of force and position: begin it in free motion, or give --force-sign"
+)
+_UNTOUCHED = (
+    "a power law needs depth and force from the touch on, and the log never leaves the surface:"
+    " let it begin in free motion"
+)
 
 
 @dataclass(frozen=True)
@@ -60,35 +68,32 @@ def verdicts(
 ) -> tuple[dict[str, Parameter], tuple[Warn, ...]]:
     """Pass a verdict on each parameter.
 
-    Args:
-        choice: the model chosen.
-        holds: least squares on it, for the interval that holds if the model does.
-        point: the working point, with which K must agree.
-        terms: how.
+    `holds` is least squares on the model chosen, for the interval that holds if the model does; `point` is the working
+    point, with which K must agree.
     """
-    steady = point is not None and choice.problem.contacts.press is not None
+    contacts, model = choice.problem.contacts, choice.answer.fit.model
+    tangent = None if contacts.press is None or model.nonlinear else point
     found = against_working_point(choice.answer, point)
-    if point is not None and steady and not found.fit.model.nonlinear:
-        found = replace(found, budget=_with_presses(found, point))
+    if tangent is not None:
+        found = replace(found, budget=_with_presses(found, tangent))
     scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
     found = found.with_cause("calibration", scales * found.theta)
-    choice = replace(choice, answer=found)
-    lag = choice.problem.lag
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
-    parameters = {name: _parameter(name, choice, holds, terms) for name in names}
-    weighed = choice.problem.contacts.payload is not None
-    parameters = _passive(parameters, weighed)
-    if not choice.problem.contacts.signed:
-        parameters = {name: _refuse(p, _UNSIGNED) for name, p in parameters.items()}
-    if found.fit.model.of_power and choice.problem.contacts.bonded:
-        parameters = {name: _refuse(p, _UNTOUCHED) for name, p in parameters.items()}
-    if point is not None and steady and not found.fit.model.nonlinear:
-        parameters = _of_press(parameters, point)
-    return parameters, _warnings(parameters, found, lag, terms)
+    parameters = {name: _parameter(name, found, holds, terms) for name in names}
+    parameters = _passive(parameters, contacts.payload is not None)
+    for refused, reason in (
+        (not contacts.signed, _UNSIGNED),
+        (model.of_power and contacts.bonded, _UNTOUCHED),
+    ):
+        for name, p in parameters.items() if refused else ():
+            if p.verdict is Verdict.IDENTIFIED:
+                parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+    if tangent is not None:
+        parameters = _of_press(parameters, tangent)
+    return parameters, _warnings(parameters, found, choice.problem.lag, terms)
 
 
-def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter:
-    found = choice.answer
+def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
     value, unit = found[name], unit_of(name, found.fit, terms)
     half, parts = found.half_of(name), found.contributions(name)
     whole = Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, "", parts)
@@ -103,7 +108,9 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
         return whole.without_number(f"the log does not show it: {NOISE.remedy}")
     clear = low > 0 or high < 0
     if half <= terms.tolerance * abs(value) and clear:
-        reason = f"known to {_percent(half, value)} (95 %){_at(found, name, terms)}"
+        reason, depth = f"known to {100 * half / abs(value):.2g} % (95 %)", found.fit.model.depth
+        if depth is not None and name not in _SHAPE:  # it grows with the depth
+            reason += f", at a penetration of {_digits(depth)} {terms.position_unit}"
         return replace(whole, verdict=Verdict.IDENTIFIED, reason=reason)
     bounds = f"95 %: {_digits(low)} to {_digits(high)} {_show(unit)}".rstrip()
     limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
@@ -112,33 +119,22 @@ def _parameter(name: str, choice: Choice, holds: Fit, terms: Terms) -> Parameter
     return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
 
 
-def _at(found: Answer, name: str, terms: Terms) -> str:
-    """Which depth a parameter belongs to that grows with it."""
-    depth = found.fit.model.depth
-    if depth is None or name in _SHAPE:
-        return ""
-    return f", at a penetration of {_digits(depth)} {terms.position_unit}"
-
-
 def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     """An answer with the gap between the stiffness of its force at the working point and of the log's as a cause.
 
     Both are read in the same way: the slope of a press has a mass and a damping in it, in the log as in the answer.
     A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
-    covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter).
-
-    Args:
-        found: parameters of a model.
-        point: the working point; nothing is compared without one, or with one that has no interval.
+    covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter). Nothing is compared
+    without a working point that has an interval.
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
     shown = stiffness_of(found.problem, found.problem.force, point)
-    predicted = None if shown is None else _model_stiffness(found, point)
-    if shown is None or predicted is None:
+    own, slope = _model_stiffness(found, point)
+    if shown is None or own is None:
         return found
-    own, slope = predicted
-    parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause != "calibration"}
+    common = "calibration", "friction", "loadings"  # of the answer, too
+    parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause not in common}
     along = found.cov @ slope
     power = float(slope @ along)
     gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(parts))), 0.0)
@@ -159,14 +155,12 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     return found.budget | {"repetition": Spread(variance, freedom)}
 
 
-def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float, Array] | None:
+def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float | None, Array]:
     """Stiffness of a model's force, read as the log's own is, and its derivatives by the parameters, shape (p,)."""
     own, problem = stiffness_of(found.problem, found.fit.force, point), found.problem
-    if own is None:
-        return None
     slope = np.zeros(len(found.names))
     for i, name in enumerate(found.names):
-        if name not in found.fit.theta:
+        if own is None or name not in found.fit.theta:
             continue
         step = 1e-4 * (abs(found.fit.theta[name]) or 1.0)
         theta = found.fit.theta | {name: found.fit.theta[name] + step}
@@ -192,17 +186,11 @@ def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str
     return parameters | shown | {"K": K}
 
 
-_STEADY = "the log does not show it: the probe moves at constant speed"
-
-
 def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Parameter]:
     """A parameter that is certainly below zero refuses those that the same missing force may be in.
 
-    All that is seen in time shares a force that depends on the motion. A stiffness below zero leaves no model at all.
-
-    Args:
-        parameters: as found.
-        weighed: a tool's inertia was found in free motion and removed: it is not that, and K rests on the same fit.
+    All that is seen in time shares a force that depends on the motion. A stiffness below zero leaves no model at all. A
+    tool's inertia that was found in free motion and removed (`weighed`) is not that force, and K rests on the same fit.
     """
     negative = [name for name, p in parameters.items() if _BELOW in p.reason]
     if "K" in negative:
@@ -213,36 +201,18 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:
         return parameters
-    return parameters | {name: _reject(p, reason) for name, p in parameters.items() if name in touched}
-
-
-_UNSIGNED = (
-    "the log does not show the signs of force and position: begin it in free motion, or give --force-sign"
-)
-_UNTOUCHED = (
-    "a power law needs depth and force from the touch on, and the log never leaves the surface:"
-    " let it begin in free motion"
-)
-
-
-def _reject(p: Parameter, reason: str) -> Parameter:
-    """Rejected, if it was identified: a number that a model gives which does not hold stands nowhere."""
-    return p.without_number(reason, Verdict.REJECTED) if p.verdict is Verdict.IDENTIFIED else p
-
-
-def _refuse(p: Parameter, reason: str) -> Parameter:
-    """Not identified, whatever its interval."""
-    if p.verdict is not Verdict.IDENTIFIED:
-        return p
-    return replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+    return parameters | {  # a number that a model gives which does not hold stands nowhere
+        name: p.without_number(reason, Verdict.REJECTED)
+        for name, p in parameters.items()
+        if name in touched and p.verdict is Verdict.IDENTIFIED
+    }
 
 
 def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:
     warnings = []
     if LAG in found.names and not lag.known:
-        low = lag.value - _FAR * lag.std
-        at = found[LAG]
-        if abs(at - lag.value) > _FAR * lag.std or at + found.half_of(LAG) < low:
+        at, reach = found[LAG], _FAR * lag.std
+        if abs(at - lag.value) > reach or at + found.half_of(LAG) < lag.value - reach:
             text = (
                 f"the fit estimates a lag of {_digits(1e3 * at)} ms of the force, longer than sensors have:"
                 " something else delays the force; parameters that such a delay changes are rejected"
@@ -271,17 +241,13 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
         if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") != "lag"
     ]  # fmt: skip
     if low_names:
-        text = f"the log does not show {', '.join(low_names)}: {_remedy(low_names[-1], terms)}"
+        remedy = NOISE.remedy
+        if low_names[-1] in ("B", "M") and np.isfinite(terms.band):
+            more, fastest = "mass needs" if low_names[-1] == "M" else "damping needs", _digits(terms.band, 2)
+            remedy = f"the position moved only below {fastest} Hz, {more} faster motion; try palpate excite"
+        text = f"the log does not show {', '.join(low_names)}: {remedy}"
         warnings.append(Warn(Code.LOW_EXCITATION, text))
     return tuple(warnings)
-
-
-def _remedy(name: str, terms: Terms) -> str:
-    """The measurement that would show a parameter."""
-    if name in ("B", "M") and np.isfinite(terms.band):
-        more = "mass needs" if name == "M" else "damping needs"
-        return f"the position moved only below {_digits(terms.band, 2)} Hz, {more} faster motion; try palpate excite"
-    return NOISE.remedy
 
 
 def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
@@ -298,10 +264,6 @@ def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
         n = fitted["n"] + (name == "B")
         return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"
     return units["K" if name == "K1" else name]
-
-
-def _percent(half: float, value: float) -> str:
-    return f"{100 * half / abs(value):.2g} %" if value else "?"
 
 
 def _digits(value: float, count: int = 3) -> str:

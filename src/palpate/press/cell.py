@@ -11,7 +11,7 @@ from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
-from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
+from palpate.environments.surface import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import KinematicChain, Room, axis_of, chain_motion, room_for
 from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward_both, product
 

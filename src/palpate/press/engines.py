@@ -1,7 +1,5 @@
 """Who moves the arm: palpate's own laws, compiled, or MuJoCo."""
 
-from __future__ import annotations
-
 from copy import copy
 from typing import NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """From what was typed to an arm, a surface and gains."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

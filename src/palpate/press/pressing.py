@@ -1,7 +1,5 @@
 """A simulated press: its drivers, its record, and its summary with the keys of `palpate run`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Setting of a press, checked: an arm at a pose before a surface, with the tool that it carries."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A simulated arm, read and moved as a real one."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +9,7 @@ import numpy as np
 from palpate._jit import BoundKernel
 from palpate._vector import ZERO3, Mat3, Vec6
 from palpate.arrays import Array
-from palpate.environments.surface import rest_for
-from palpate.environments.surface_state import UNTOUCHED
+from palpate.environments.surface import UNTOUCHED, rest_for
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Reading, TouchState, Workcell, body_at

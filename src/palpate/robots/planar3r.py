@@ -1,7 +1,5 @@
 """The thesis' arm for use outside the control loop: arrays in, arrays out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,7 +60,7 @@ class Planar3R(Readable):
         """Inertias of the motors' rotors [kg m^2], shape (3,); not in `mass_matrix`, see `with_rotors`."""
         return _freeze(self.arm.rotor)
 
-    def with_rotors(self) -> Planar3R:
+    def with_rotors(self) -> "Planar3R":
         """The arm whose links carry the rotors of their direct-drive motors."""
         return Planar3R(self.arm.with_rotors())
 

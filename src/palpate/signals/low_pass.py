@@ -5,8 +5,6 @@ integral of W(w) (jw)^d H(jw) e^(jwt) X(w) dw: H is the low-pass, and W passes a
 and nothing above a half. W falls so smoothly that the weights die away fast on both sides.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -43,7 +41,7 @@ class LowPass:
                 raise InputError(f"a low-pass needs a cut-off above 0 Hz, got {cutoff:g}")
 
     @classmethod
-    def parse(cls, text: str) -> LowPass:
+    def parse(cls, text: str) -> "LowPass":
         """The low-passes that a text names: `butterworth3:120`, `butterworth3:120+butterworth2:120`, or `none`.
 
         Raises:

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli.options.common import PluginOptions
-from palpate.cli.options.values import FLAG, WHOLE, Force, StiffnessRange, quantity_default, spread_default
+from palpate.cli.options.values import (
+    FLAG,
+    WHOLE,
+    Force,
+    StiffnessRange,
+    options,
+    quantity_default,
+    spread_default,
+)
 from palpate.cli.toolkit import (
     COMPILING,
     command,
@@ -28,8 +35,7 @@ if TYPE_CHECKING:
     from palpate_benchmark.simulated import ForceResult, Surfaces
 
 
-@Parameter(name="*", group=Group("The test of force control", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The test of force control", 1)
 class ForceOptions:
     """The test of force control.
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Group, Parameter
-
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
-from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, si
+from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, options, si
 from palpate.cli.toolkit import command, console, print_lines, print_result
 from palpate.errors import InputError
 from palpate.files import MADE, read_text, write_text
@@ -24,8 +22,7 @@ if TYPE_CHECKING:
     from palpate.force.certificate import CertificateVerdict
 
 
-@Parameter(name="*", group=Group("Scope of the proof", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("Scope of the proof", 1)
 class ProofOptions:
     """Surfaces, gains and delays of the proof."""
 
@@ -74,8 +71,7 @@ class ProofOptions:
         return high
 
 
-@Parameter(name="*", group=Group("Another controller", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Another controller", 2)
 class OthersOptions(ReportOption):
     """A controller of others, by its parameter file.
 
@@ -249,8 +245,7 @@ def _print(
     written: Path | None = None,
 ) -> None:
     from palpate.force.describe import as_json, lines
-    from palpate.report.page import CommandAnswer
-    from palpate.report.terminal import print_hanging
+    from palpate.report.page import CommandAnswer, print_hanging
     from palpate_certify.report import proof_lines
 
     def display(console: Console) -> None:

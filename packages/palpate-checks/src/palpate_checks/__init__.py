@@ -10,8 +10,9 @@ def test_my_controller(check):
 A check that fails raises an AssertionError that names the violated law. ``palpate checks module:Class`` runs them all.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate_checks.check import Check, CheckOutcome, outcomes
@@ -20,15 +21,11 @@ if TYPE_CHECKING:
     from palpate_checks.surfaces import surface_checks
 
 __all__ = ["Check", "CheckOutcome", "controller_checks", "identifier_checks", "outcomes", "surface_checks"]
-_MODULES = {
-    "controller_checks": "controllers",
-    "identifier_checks": "identifiers",
-    "surface_checks": "surfaces",
+
+_HOMES = {
+    "check": ("Check", "CheckOutcome", "outcomes"),
+    "controllers": ("controller_checks",),
+    "identifiers": ("identifier_checks",),
+    "surfaces": ("surface_checks",),
 }
-
-
-def __getattr__(name: str) -> Any:
-    """A public name, imported when it is first used: the help of the command imports none."""
-    if name not in __all__:
-        raise AttributeError(f"palpate_checks has no {name!r}; it has {', '.join(__all__)}")
-    return getattr(import_module(f"palpate_checks.{_MODULES.get(name, 'check')}"), name)
+__getattr__ = importer(__name__, _HOMES)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
-
 from palpate.cli.options import values
 from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
-from palpate.cli.options.values import FLAG, SIGNED, si
+from palpate.cli.options.values import FLAG, SIGNED, options, si
 from palpate.cli.toolkit import command, print_result
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -25,8 +22,7 @@ _FASTEST = 200_000
 """Rows or readings a second [Hz]: no sensor of force is read faster."""
 
 
-@Parameter(name="*", group=Group("The surfaces", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The surfaces", 1)
 class SurfaceRangeOptions:
     """Range of the surfaces."""
 
@@ -48,8 +44,7 @@ class SurfaceRangeOptions:
         )
 
 
-@Parameter(name="*", group=Group("Limits", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Limits", 2)
 class BudgetOptions:
     """Limits of force and frequency."""
 
@@ -84,8 +79,7 @@ class BudgetOptions:
         )
 
 
-@Parameter(name="*", group=Group("Goals", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("Goals", 3)
 class GoalOptions:
     """Wanted precision, and the time for it."""
 
@@ -103,8 +97,7 @@ class GoalOptions:
     "Optimality of a multisine: worst (the worst parameter), or D, A or E as in optimal experiment design."
 
 
-@Parameter(name="*", group=Group("The sensors", sort_key=4))
-@dataclass(frozen=True, kw_only=True)
+@options("The sensors", 4)
 class SensorOptions:
     """Sensors of force and position."""
 
@@ -142,8 +135,7 @@ class SensorOptions:
         return Sensors(chain, step, float(self.rate), self.lag_std.si)
 
 
-@Parameter(name="*", group=Group("The robot", sort_key=5))
-@dataclass(frozen=True, kw_only=True)
+@options("The robot", 5)
 class LoopOptions:
     """Force control of the arm."""
 
@@ -179,8 +171,7 @@ class LoopOptions:
         return KnownBandwidth(self.loop_bandwidth.si)
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class ExcitationOutput(PictureOptions, FileOptions):
     """Where the excitation is written."""
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter, validators
+from cyclopts import Parameter, validators
 
 from palpate.cli.options.common import FolderOptions
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:
@@ -23,8 +22,7 @@ def _within(least: int, most: int) -> Parameter:
     return Parameter(validator=validators.Number(gte=least, lte=most))
 
 
-@Parameter(name="*", group=Group("The search", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The search", 1)
 class SearchOptions:
     """Size of the search."""
 
@@ -46,8 +44,7 @@ class SearchOptions:
         )
 
 
-@Parameter(name="*", group=Group("Who tries", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Who tries", 2)
 class RunnerOptions:
     """Cores or a cluster for the search."""
 
@@ -58,8 +55,7 @@ class RunnerOptions:
     here: name only a cluster that you trust as this machine."""
 
 
-@Parameter(name="*", group=Group("Output", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("Output", 3)
 class InferredOptions(FolderOptions):
     """Where the inferred laboratory is written."""
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
 from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
 _DEFAULT = "foam-hybrid"
 
 
-@Parameter(name="*", group=Group("Source", sort_key=0))
-@dataclass(frozen=True, kw_only=True)
+@options("Source", 0)
 class ShownOptions:
     """A simulation, a log or a record."""
 
@@ -56,8 +54,7 @@ class ShownOptions:
         return self.log or self.record
 
 
-@Parameter(name="*", group=Group("Server", sort_key=7))
-@dataclass(frozen=True, kw_only=True)
+@options("Server", 7)
 class ServedOptions:
     """Ports for the browser and other viewers."""
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate_maps.next_press import NextPresses
@@ -11,11 +12,5 @@ if TYPE_CHECKING:
 
 __all__ = ["FieldMap", "FieldPrediction", "NextPresses", "StiffnessMap"]
 
-
-def __getattr__(name: str) -> Any:
-    """A public name, imported when it is first used: the help of the command imports none."""
-    if name not in __all__:
-        raise AttributeError(f"palpate_maps has no {name!r}; it has {', '.join(__all__)}")
-    return getattr(
-        import_module(f"palpate_maps.{'next_press' if name == 'NextPresses' else 'stiffness_map'}"), name
-    )
+_HOMES = {"next_press": ("NextPresses",), "stiffness_map": ("FieldMap", "FieldPrediction", "StiffnessMap")}
+__getattr__ = importer(__name__, _HOMES)

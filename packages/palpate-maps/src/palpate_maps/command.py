@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import sleep as wait
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Group, Parameter
+from cyclopts import Group
 
 from palpate.cli._streams import notice_signals
 from palpate.cli.identify import OneLog
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
+from palpate.cli.options.values import FLAG, Length, Stiffness, options, quantity, si
 from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
 from palpate.files import check_place, fresh_folder, with_author, write_json, write_text
@@ -34,8 +34,7 @@ POLL = 0.5
 """Time between two looks for presses [s]."""
 
 
-@Parameter(name="*", group=MAP)
-@dataclass(frozen=True, kw_only=True)
+@options(MAP)
 class PlaceOptions:
     """Where the presses are."""
 
@@ -54,8 +53,7 @@ class PlaceOptions:
     "Each contact of a log is a press of its own, at its own place; else a log is one press."
 
 
-@Parameter(name="*", group=MAP)
-@dataclass(frozen=True, kw_only=True)
+@options(MAP)
 class MapOptions:
     """Options of the map itself."""
 
@@ -102,8 +100,7 @@ class MapOptions:
         return MapRequest(self.next, goal, threshold, half, self.common / 100.0, start, way)
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class OutputOptions(ReportOption, JsonOption):
     """Files of a map, and their formats."""
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.estimators.descent import Descent
+from palpate.identification.estimators.fit import Descent
 from palpate.identification.least_squares import solve
 from palpate.identification.models import Model, NonlinearParameter
 from palpate_references.models import FLOATS, SineMotion

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from dataclasses import replace as replaced
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 SHORTEST = 0.003
 """Path that is one [m]."""
+SHORTEST_TIME = 1.0
+"""Slide that is judged, twice the time in which it settles [s]."""
 _OF_WIRE = {"force", "gains", "normal", "path", "length", "seconds"}
 _SURFACE = {
     "K": "stiffness",
@@ -63,7 +65,7 @@ class SlideOptions(SlideLimits):
     length: values.Length = values.quantity_default("40:mm", "length")
     "Of a line or a pass, radius of a circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
-    "Duration of the slide."
+    "Duration of the slide; a line ends at its --length, if that is earlier."
     normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
@@ -91,10 +93,12 @@ class SlideOptions(SlideLimits):
         for part in self.surface.split(","):
             key, _, text = (word.strip() for word in part.partition("="))
             try:
+                if _SURFACE[key] in numbers:
+                    raise KeyError(key)
                 numbers[_SURFACE[key]] = float(text)
             except (KeyError, ValueError):
                 raise InputError(
-                    f"--surface needs K=..,B=..,mu=.. as numbers, as K=20000,mu=0.3; got {self.surface!r}"
+                    f"--surface needs K=..,B=..,mu=.. as numbers, each once, as K=20000,mu=0.3; got {self.surface!r}"
                 ) from None
         name, _, size = self.shape.partition(":")
         stiffness, heights = numbers.pop("stiffness", 0.0), None
@@ -118,8 +122,8 @@ class SlideOptions(SlideLimits):
     def extent(self) -> float:
         """Of the path [m]."""
         length = self.length.si
-        if not 1.0 <= self.seconds <= 600.0:
-            raise InputError(f"--seconds must be from 1 to 600, got {self.seconds:g}")
+        if not SHORTEST_TIME <= self.seconds <= 600.0:
+            raise InputError(f"--seconds must be from {SHORTEST_TIME:g} to 600, got {self.seconds:g}")
         if not length >= SHORTEST:
             raise InputError(f"--length must be at least {1e3 * SHORTEST:g} mm, got {1e3 * length:g} mm")
         return length
@@ -198,6 +202,14 @@ class SlideOptions(SlideLimits):
         wanted = 15.0 if self.force is None else self.force.si
         if self.gains is not None:
             gains = load_gains(self.gains)
+            given = options_given((self,)).keys()
+            twice = sorted(given & {field.name.replace("_", "-") for field in fields(SlideLimits)})
+            if self.has_no_joints and "arm" in given and load_arm(self.arm).title != gains.arm.title:
+                twice = ["arm"]
+            if twice:
+                raise InputError(
+                    f"--{twice[0]} is of the gains, and {self.gains} has its own; leave it out, or tune again"
+                )
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
@@ -239,7 +251,7 @@ def slide(
     json
         Print one JSON object and nothing else.
     """
-    from palpate.force.sliding.paths import check_directions, directions
+    from palpate.force.sliding.paths import check_directions, directions, duration
     from palpate.force.sliding.slide_domain import numbers_of
     from palpate_slide.dither import check_share, dither_frequency, stiffness_along
     from palpate_slide.report import sentence, summarise, write_report
@@ -255,7 +267,13 @@ def slide(
     tool = asked.tool
     gains = asked.tuned_gains()
     speed = numbers_of(gains).speed
-    ways = directions(asked.path, asked.seconds, gains.arm.rate, speed, asked.extent)
+    seconds = duration(asked.path, asked.seconds, speed, asked.extent)
+    if seconds < SHORTEST_TIME:
+        raise InputError(
+            f"a line of {1e3 * asked.extent:g} mm ends after {seconds:.2g} s at {1e3 * speed:g} mm/s, and a slide is "
+            f"judged from {SHORTEST_TIME:g} s up; give a longer --length, or a lower --speed"
+        )
+    ways = directions(asked.path, seconds, gains.arm.rate, speed, asked.extent)
     check_directions(ways, gains, asked.into)
     ground = asked.ground(ways, speed, gains.arm.rate)
     if live:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -67,7 +68,7 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
         raise InputError(
             f"{path}: {path.stat().st_size / GB:.2g} GB are more than a mesh may have; thin it out"
         )
-    asset = f'<mesh name="surface" inertia="shell" file={quoteattr(str(path.resolve()))}/>'
+    asset = f'<mesh name="surface" inertia="shell" {_content(path)}/>'
     geom = '<geom type="mesh" mesh="surface" contype="0" conaffinity="0"/>'
     model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
     turn = np.zeros(9)
@@ -83,6 +84,17 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
             f"{path}: {int((count > 2).sum())} edges have more than two triangles: no surface (non-manifold); mend it"
         )
     return points, faces
+
+
+def _content(path: Path) -> str:
+    """Attributes of a mesh of MuJoCo: its file, or the triangles of an STL in text, which MuJoCo does not read."""
+    with path.open("rb") as file:
+        text = file.read(5) == b"solid" and b"facet" in file.read(1000)
+    corners = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", path.read_bytes()) if text else []
+    if path.suffix.lower() == ".obj" or not corners:
+        return f"file={quoteattr(str(path.resolve()))}"
+    numbers = " ".join(number.decode("ascii", "replace") for corner in corners for number in corner)
+    return f'vertex={quoteattr(numbers)} face="{" ".join(map(str, range(len(corners) // 3 * 3)))}"'
 
 
 def _check(path: Path, grid: Array, half: int) -> None:

@@ -16,10 +16,9 @@ from palpate.force.sliding.slide_state import SLIDING_TROUBLES
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import data_address
+from palpate.report.page import Card, PageAnswer, answer_page, data_address
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of
@@ -100,7 +99,7 @@ def _friction(summary: dict[str, Any]) -> tuple[str, str]:
     """Friction and its half-width."""
     low, high = summary["friction"]["ci95"]
     digits = 2 if high - low > 0.01 else 3
-    return f"{summary['friction']['value']:.{digits}f}", f"{0.5 * (high - low):.{digits}f}"
+    return f"{summary['friction']['value']:z.{digits}f}", f"{0.5 * (high - low):.{digits}f}"
 
 
 def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, Any], folder: Path) -> None:
@@ -110,7 +109,8 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     columns = {name: column for name, column in columns.items() if not np.isnan(column).all()}
     units = {name: _UNITS.get(name, "1") for name in columns}
-    write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
+    about = {"command": summary["command"], "wrench_frame": "base"}
+    write_record(Record(columns, units, about), folder / RECORD)
     charts = _charts(rows, gains, summary)
     style.save(figure_of(charts), folder / "slide.png")
     shown = panels(charts)
@@ -147,7 +147,7 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     lost = summary["contact_lost"]
     off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, most = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
-    true = quantity(truth["stiffness"], "N/m")
+    true = quantity(truth["stiffness"], "N/m") + ", with the arm in series" * (summary["mode"] == "position")
     return [
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
@@ -181,7 +181,7 @@ def _along(summary: dict[str, Any]) -> list[tuple[str, str, list[list[str]]]]:
 
 
 def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
-    """Force error, speed, normal, friction and stiffness against the path; stretches where the slide was slower."""
+    """Force error, speed, and of a slide the estimates against the path; stretches where it was slower."""
     on = rows[:, COLUMNS.index("sliding")] > 0.0
     kept = rows[on] if on.any() else rows
     c = dict(zip(COLUMNS, kept[:: max(len(kept) // 2000, 1)].T, strict=True))
@@ -193,7 +193,7 @@ def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
         1e3 * summary["slide"]["speed_m_s"],
         np.degrees(CHI2_95 * c["cone"]),
     )
-    slower = _slower(way, c["speed"], summary["slide"]["speed_m_s"])
+    slower = _slower(way, c["speed"], summary["slide"]["speed_m_s"]) if on.any() else []
     charts = []
     for label, value, ends, known, colour, least in (
         ("force error [N]", c["normal_force"] - c["desired"], (), (-within, within), "F", None),
@@ -202,7 +202,7 @@ def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
         ("tool's angle [deg]", np.degrees(c["tool"]), (), (), "ink", 0.0),
         ("friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), "ink", None),
         ("K [N/m]", c["stiffness"], _interval(c, "stiffness"), (truth["stiffness"],), "K", None),
-    ):
+    )[: None if on.any() else 2]:  # without a slide nothing was estimated
         series = [Series(way, value, colour, "estimate" if ends else "", 1.2)]
         series += [Series(way, end, "measured", "" if i else "95 %", 1.0) for i, end in enumerate(ends)]
         settled = [np.asarray(v)[way > 0.05 * way[-1]] for v in (value, *ends)]

@@ -48,10 +48,21 @@ def obj(path: Path, corners: np.ndarray) -> Path:
     return path
 
 
-@pytest.mark.parametrize("write", [stl, obj])
+def stl_text(path: Path, corners: np.ndarray) -> Path:
+    facets = (
+        f"facet normal 0 0 0\nouter loop\n{{}}endloop\nendfacet\n".format(
+            "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in corner)
+        )
+        for corner in corners.tolist()
+    )
+    path.write_text(f"solid part\n{''.join(facets)}endsolid part\n")
+    return path
+
+
+@pytest.mark.parametrize("write", [stl, stl_text, obj])
 def test_heights_are_those_of_the_file(write, tmp_path: Path) -> None:
     corners = triangles() + np.array([500.0, -300.0, 40.0])  # wherever it lies
-    heights = heights_of(write(tmp_path / f"part.{write.__name__}", corners), 1e-3, 0.03)
+    heights = heights_of(write(tmp_path / f"part.{write.__name__[:3]}", corners), 1e-3, 0.03)
     ground = ground_of("mesh", 0.1, 2e4, heights=heights)
     rng = np.random.default_rng(0)
     for x, y in rng.uniform(-0.03, 0.03, (50, 2)):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from palpate.cli import main
 from palpate.errors import InputError
 from palpate.force import Gains, load_arm
 from palpate.force.gains import gains_for
@@ -67,6 +69,8 @@ def test_film_and_page_of_a_surface_that_was_never_touched(slid, tmp_path) -> No
     write_report(before, gains, ground, summary | {"command": "palpate slide", "seed": 0}, tmp_path)
     page = (tmp_path / "report.html").read_text()
     assert '<p class="lead">The surface was never touched' in page
+    assert "speed [mm/s]" in page
+    assert "friction [1]" not in page  # nothing was estimated
 
 
 def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:
@@ -77,6 +81,40 @@ def test_the_first_line_of_the_page_is_the_answer(slid, tmp_path) -> None:
     assert '<p class="lead">15 N held within' in page
     assert page.count('data-panels="') == 2
     assert "image/svg+xml" in page
+    low = {"value": -0.001, "ci95": [-0.02, 0.018]}
+    assert "friction 0.00 \N{PLUS-MINUS SIGN} 0.02" in sentence(summary | {"friction": low})
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (
+            ["--gains", "gains.toml", "--mu-max", "0.5"],
+            "--mu-max is of the gains, and gains.toml has its own",
+        ),
+        (["--gains", "gains.toml", "--arm", "fr3"], "--arm is of the gains"),
+        (["--gains", "gains.toml", "--path", "line", "--length", "20:mm"], "ends after 0.67 s at 30 mm/s"),
+        (["--gains", "gains.toml", "--surface", "K=2e4,K=5"], "each once"),
+        (["--gains", "gains.toml", "--surface", "K=2e4,mu=-1"], "not below 0; got friction of -1"),
+    ],
+)
+def test_words_that_contradict_each_other_are_one_line(words, says, tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gains.toml").write_text(tuned().to_toml())
+    assert main(["slide", *words]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_line_ends_at_its_length(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gains.toml").write_text(tuned().to_toml())
+    words = ["--path", "line", "--length", "36:mm", "--shape", "plane", "--surface", "K=2e4,mu=0.3"]
+    assert main(["slide", "--gains", "gains.toml", *words, "--out", "out"]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert 0.03 < summary["path_m"] < 0.0361  # it starts slowly
 
 
 def test_a_watched_slide_shows_what_it_does_and_takes_sliders() -> None:

@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Group, Parameter
-
 from palpate.cli.options.common import (
     QUIET,
     FigureOptions,
@@ -23,7 +21,7 @@ from palpate.cli.options.common import (
     shipped_names,
     source_of,
 )
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.cli.toolkit import (
     COMPILING,
     confirmed,
@@ -51,8 +49,7 @@ _SHOWN = 3
 """Tables that the terminal shows: the factors, the settings, the results of the runs. The page has all metrics."""
 
 
-@Parameter(name="*", group=Group("A cluster", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("A cluster", 1)
 class ClusterOptions:
     """A cluster for the runs, in place of this machine's cores."""
 

@@ -13,8 +13,7 @@ from palpate._vector import clip
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
 from palpate.bench.tables import ForceSensorTable
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
-from palpate.environments.surface import Surface
-from palpate.environments.surface_state import SurfaceState, contact_force, follow, opposing
+from palpate.environments.surface import Surface, SurfaceState, contact_force, follow, opposing
 from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.networks import Network, NetworkState, network, random_layers
@@ -265,7 +264,7 @@ def one_joint(
     """
     require_positive(rate=rate, steps=steps)
     force = force_input(ForceSensorTable(noise=noise), rate * steps)
-    joint = Joint(float(link.inertia), float(link.lever), link.friction.checked(), join(surface))
+    joint = Joint(float(link.inertia), float(link.lever), link.friction.validate(), join(surface))
     smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
     return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))
 

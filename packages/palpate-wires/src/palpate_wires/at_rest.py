@@ -72,6 +72,9 @@ def look(wire: Wire, order: Order) -> AtRest:
     broken = next(filter(None, map(unreadable, sensed)), None)
     if broken is not None:
         raise InputError(f"{broken}; is its sensor switched on?")
+    apart = out_of_step(min(sensed, key=lambda s: abs(s.position_lag)), gains.theta)
+    if apart is not None:
+        raise InputError(apart)
     offsets = np.array([s.received - s.stamp for s in sensed])
     _check_clock(offsets, gains.theta)
     force, place = np.array([s.force for s in sensed]), np.array([s.position for s in sensed])
@@ -99,6 +102,22 @@ def with_noise_of(rest: AtRest, order: Order) -> tuple[Order, str | None]:
         raise InputError(f"{said}: the certificate is of other gains; tune for this noise, and certify again")
     retuned = check_order(ForceLoop(gains), order.task, order.limits)
     return retuned, f"{said}: tuned again for {gains.arm.sensor.noise:.2g} N"
+
+
+def out_of_step(sense: ArmReading, theta: float) -> str | None:
+    """Why the position of a reading is none of the time of its force, in words; None if it is.
+
+    Args:
+        sense: as it came.
+        theta: the loop's lag [s].
+    """
+    lag = sense.position_lag
+    if abs(lag) <= theta:
+        return None
+    return (
+        f"the tool's position was taken {abs(lag):.3g} s {'before' if lag > 0.0 else 'after'} the force, more than the"
+        f" loop's lag of {1e3 * theta:.3g} ms; have the positions ended, or are their clocks not set alike?"
+    )
 
 
 def _count(rest: AtRest) -> int:

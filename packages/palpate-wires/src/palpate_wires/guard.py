@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.wires import ArmReading, Command, EndedError, LostError, SilentError, Wire, unreadable
-from palpate_wires.at_rest import AtRest
+from palpate_wires.at_rest import AtRest, out_of_step
 from palpate_wires.order import Order, PressLimits
 from palpate_wires.realtime import CLOCKS
 
@@ -140,7 +140,7 @@ class Moment(NamedTuple):
         sense: as it came.
         force: along the direction, without the bias [N].
         depth: likewise, from the start [m].
-        speed: measured, since the reading before [m/s].
+        speed: measured, from the position before to this one, by their own stamps [m/s].
         missed: readings that never came, since the one before.
         age: beyond the least that was seen [s].
         since_start: by the arm's clock [s].
@@ -178,7 +178,7 @@ def fault_of(sense: ArmReading, last: ArmReading, rest: AtRest, theta: float) ->
             f"the arm's clock is {ahead:.3g} s ahead of this computer's since the arm was at rest; does it run too"
             " fast, has it been set, or do two arms speak?"
         )
-    return None
+    return out_of_step(sense, theta)
 
 
 def reason_to_stop(now: Moment, order: Order, rest: AtRest) -> str | None:

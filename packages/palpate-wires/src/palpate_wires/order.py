@@ -10,7 +10,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.force.gains import Gains
-from palpate.force.sliding.paths import directions
+from palpate.force.sliding.paths import directions, duration
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_state import beside
 from palpate.press.sequence import TARE, Plan
@@ -54,12 +54,16 @@ class Path:
     Args:
         name: line, back, raster or circle.
         length: of a line or a pass, radius of a circle [m].
-        seconds: of the slide [s].
+        seconds: of the slide, at most; a line ends at its length [s].
     """
 
     name: str
     length: float
     seconds: float
+
+    def duration(self, gains: Gains) -> float:
+        """Of the slide [s], with the speed of the gains."""
+        return duration(self.name, self.seconds, numbers_of(gains).speed, self.length)
 
     def directions(self, gains: Gains, into: Array) -> Array:
         """Unit vectors in the base's axes for each tick, shape (n, 3).
@@ -69,7 +73,9 @@ class Path:
             into: direction into the surface, of unit length, shape (3,).
         """
         e1 = np.array(beside(Vec3(*into.tolist())))  # type: ignore[no-untyped-call]
-        ways = directions(self.name, self.seconds, gains.arm.rate, numbers_of(gains).speed, self.length)
+        ways = directions(
+            self.name, self.duration(gains), gains.arm.rate, numbers_of(gains).speed, self.length
+        )
         return np.asarray(ways @ np.array([e1, np.cross(e1, into), -into]))
 
 
@@ -187,6 +193,7 @@ def check_order(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
     task = replace(task, direction=triple(np.array(task.direction) / size))
     if task.path is not None:
         _check_path(task.path, gains, task, limits)
+        task = replace(task, hold=task.path.duration(gains))
     return Order(loop, task, limits)
 
 

@@ -118,11 +118,12 @@ class GuardedArm:
         force, position = np.array(sense.force) - self.rest.bias, np.array(sense.position)
         last = self.now.sense
         ticks = (sense.stamp - last.stamp) / self._tick
+        moving = sense.stamp - sense.position_lag - (last.stamp - last.position_lag)
         self.now = Moment(
             sense=sense,
             force=float(force @ self._direction),
             depth=float((position - self.rest.position) @ self._direction),
-            speed=math.dist(sense.position, last.position) / max(ticks, 1.0) / self._tick,
+            speed=math.dist(sense.position, last.position) / max(moving, self._tick),
             missed=max(round(ticks) - 1, 0),
             age=self.watch.age(sense.stamp, time.monotonic()),
             since_start=sense.stamp - self.rest.last.stamp,
@@ -194,7 +195,7 @@ class _Press:
         """Go back from the surface: the tip, or the command of a servo, which its tip follows later."""
         arm, retreat, gains = self._arm, self._order.task.retreat, self._order.loop.gains
         back, servo = arm.now.depth - retreat, gains.arm.kind == "servo"
-        # At half the limit: a pose that a network delays shows the way of two or three ticks as that of one.
+        # At half the limit: of an arm that does not stamp its positions, a late one shows the way of several ticks.
         speed = min(0.5 * self._order.limits.speed, 10.0 * gains.approach)
         while retreat and (arm.commanded @ self._direction if servo else arm.now.depth) > back:
             arm.read()

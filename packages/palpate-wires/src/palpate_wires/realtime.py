@@ -180,7 +180,7 @@ STARTED, READY, STATE, FAILED, REFUSED, BEGUN, TARED, RESTED = b"arsfxbtq"
 TARE, BEGIN, MOVE, REST = b"TBMR"
 LARGEST = 4096
 
-_STATE = struct.Struct("<B15d")
+_STATE = struct.Struct("<B16d")
 _MOVE = struct.Struct("<B6d")
 _BEGIN = struct.Struct("<Bd")
 
@@ -188,13 +188,15 @@ _BEGIN = struct.Struct("<Bd")
 def state(sense: ArmReading) -> bytes:
     """Message that carries a reading."""
     s = sense
-    return _STATE.pack(STATE, s.received, s.stamp, *s.force, *s.torque, *s.position, *s.quaternion)
+    return _STATE.pack(
+        STATE, s.received, s.stamp, *s.force, *s.torque, *s.position, *s.quaternion, s.position_lag
+    )
 
 
 def read_state(message: bytes) -> ArmReading:
     """The reading of a message of that kind."""
     _, received, stamp, *v = _STATE.unpack(message)
-    return ArmReading(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]))
+    return ArmReading(received, stamp, tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:13]), v[13])
 
 
 def move(command: Command) -> bytes:

@@ -129,7 +129,7 @@ class DdsWire:
         self._topics, self._domain = topics, domain
         self._tool: JointTool | PoseTool = JointTool(topics.arm, topics.site) if topics.arm else PoseTool()
         self._ends = _open(domain, topics, ros2_messages)
-        self._last, self._silence = -1.0, _PATIENCE
+        self._last = -1.0
         self._command: Any = None
         try:
             self.read(_PATIENCE)
@@ -177,19 +177,13 @@ class DdsWire:
         received, stamp = time.monotonic(), seconds(sample.header.stamp)
         if not stamp > self._last:
             return None
-        behind = stamp - float(self._tool.stamp or 0.0)
-        if behind > self._silence:
-            raise LostError(
-                f"what came at {self._topics.place} is {behind:.3g} s older than what came at {self._topics.wrench}:"
-                " has it ended, or are their clocks not set alike?"
-            )
         self._last = stamp
         position, quaternion = self._tool.place()
         sign = 1.0 if self._topics.force_sign == "action" else -1.0
         f, m = ((sign * v.x, sign * v.y, sign * v.z) for v in (sample.wrench.force, sample.wrench.torque))
         if self._topics.wrench_frame == "tool":
             f, m = turn_vector(quaternion, f), turn_vector(quaternion, m)
-        return ArmReading(received, stamp, f, m, position, quaternion)
+        return ArmReading(received, stamp, f, m, position, quaternion, stamp - float(self._tool.stamp or 0.0))
 
     def tare(self) -> None:
         """ROS 2 has no one way to zero a sensor."""
@@ -208,7 +202,7 @@ class DdsWire:
         ]  # fmt: skip
         if others:
             raise InputError(f"{self._topics.command} has another master; end that one first")
-        self._command, self._silence = own, silence
+        self._command = own
 
     def write(self, command: Command) -> None:
         """A message of the kind that was told."""

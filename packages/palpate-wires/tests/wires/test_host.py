@@ -19,7 +19,7 @@ from palpate_wires import realtime
 from palpate_wires.host import Host
 from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, cell
 
-SENSE = ArmReading(1.0, 2.0, (3.0, 4.0, 5.0), (6.0, 7.0, 8.0), (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0))
+SENSE = ArmReading(1.0, 2.0, (3.0, 4.0, 5.0), (6.0, 7.0, 8.0), (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0), 0.5)
 DOWN = Command((0.0, 0.0, -0.01), (0.1, 0.2, 0.3))
 
 

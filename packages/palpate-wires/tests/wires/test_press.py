@@ -67,7 +67,7 @@ def folder(tmp_path_factory):
 
 def lying(
     folder, lie=lambda sense, first: sense, since=2.0, noise=None, hold=2.0, shown=None,
-    touched=SURFACE, speed=0.05, travel=0.03,
+    touched=SURFACE, speed=0.05, travel=0.03, retreat=0.001,
 ):  # fmt: skip
     model = load_arm(str(folder / "arm.toml"))
     arm = ToolAxisArm(model, touched, 0.002, (0.0, 0.0, 1.0), 0)
@@ -75,7 +75,7 @@ def lying(
         arm.world = arm.world._replace(noise=noise)
     wire = FakeWire(arm, lie, since)
     order = check_order(
-        ForceLoop.load(folder / "gains.toml"), PressTask(10.0, (0.0, 0.0, -1.0), hold, 0.001),
+        ForceLoop.load(folder / "gains.toml"), PressTask(10.0, (0.0, 0.0, -1.0), hold, retreat),
         PressLimits(force=25.0, speed=speed, travel=travel, seconds=20.0),
     )  # fmt: skip
     rows = Rows(None, order.most, {})
@@ -122,6 +122,43 @@ def test_a_reading_that_is_none_ends_the_press_with_its_reason(folder, lie, says
     assert not outcome.ok
     assert says in outcome.ended
     assert rows.count == len(wire.sent)
+
+
+class LatePlaces:
+    """A lie: each position is one of up to six ticks ago, at random, and never older than the one before.
+
+    Args:
+        stamped: it says how late each is.
+        stretch: of the way that the positions show.
+    """
+
+    def __init__(self, stamped=True, stretch=1.0):
+        self.stamped, self.stretch = stamped, stretch
+        self.came, self.shown, self.rng = [], 0, np.random.default_rng(0)
+
+    def __call__(self, sense, first):
+        self.came.append(sense)
+        self.shown = max(self.shown, len(self.came) - 1 - int(self.rng.integers(7)))
+        old = self.came[self.shown]
+        place = (np.array(old.position) - first.position) * self.stretch + first.position
+        lag = sense.stamp - old.stamp if self.stamped else 0.0
+        return sense._replace(position=tuple(place.tolist()), position_lag=lag)
+
+
+def test_positions_that_are_late_by_up_to_six_ticks_are_borne_by_their_stamps(folder):
+    """As two topics of a network are; without the stamps one tick shows the way of seven, which is no speed."""
+    outcome, wire, _ = lying(folder, LatePlaces(), retreat=0.02)
+    assert outcome.ok, outcome.ended
+    assert outcome.force == pytest.approx(10.0, rel=0.1)
+    assert max(abs(command.velocity[2]) for command in wire.sent) <= 0.05
+    assert "the tool moves at" in lying(folder, LatePlaces(stamped=False), retreat=0.02)[0].ended
+
+
+def test_an_arm_that_moves_too_fast_is_seen_by_late_positions_too(folder):
+    """On the way back at 25 mm/s, which its positions show as up to 125, above twice the limit."""
+    outcome, _, _ = lying(folder, LatePlaces(stretch=5.0), travel=0.2, retreat=0.02)
+    assert "the tool moves at 1" in outcome.ended
+    assert "above the limit of 50" in outcome.ended
 
 
 @pytest.mark.parametrize("times", [5.0, 1.0 / 5.0])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import time
 from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,6 +67,27 @@ def test_it_presses_with_the_force_asked_for(folder, here, capsys, kind, place):
     if place == JOINTS:  # its tip points down before a UR5e at home
         assert record["quaternion_w"] == pytest.approx(0.0, abs=1e-4)
         assert np.ptp(record["position_x"]) < 1e-4
+
+
+def test_a_reading_says_how_much_older_its_pose_is_than_its_wrench(monkeypatch):
+    """Both topics in this process, without DDS: the newest wrench is of 5.03 s, the newest pose of 4.99 s."""
+    from palpate_wires import ros2
+    from palpate_wires import ros2_messages as m
+
+    wrenches = [
+        m.wrench(m.header(at, "base"), (0.0, 0.0, -3.0), (0.0,) * 3) for at in (5_010_000_000, 5_020_000_000)
+    ]
+    pose = m.pose(m.header(4_990_000_000, "base"), (0.4, 0.0, 0.3), (1.0, 0.0, 0.0, 0.0))
+    topic = lambda samples: SimpleNamespace(take=lambda most: samples)  # noqa: E731
+    waiting = SimpleNamespace(wait=lambda nanoseconds: None)
+    monkeypatch.setattr(
+        ros2, "_open", lambda *_: ros2._Ends(topic(wrenches), topic([pose]), None, None, waiting)
+    )
+    wire = ros2.DdsWire(*ros2.topics_of(words_of(Path())[2].removeprefix("ros2:")))
+    wrenches.append(m.wrench(m.header(5_030_000_000, "base"), (0.0, 0.0, -4.0), (0.0,) * 3))
+    sense = wire.read(1.0)
+    assert sense.stamp == pytest.approx(5.03)
+    assert sense.position_lag == pytest.approx(0.04)
 
 
 @pytest.mark.long

@@ -92,7 +92,7 @@ def pressed(folder, capsys, kind, act, *more):
     ("ahead", "force", "says"),
     [
         (0.05, (math.nan, 0.0, 0.0), "no number"),
-        pytest.param(1000.0, (0.0, 0.0, 1.0), "s older than what came at /ft/wrench", marks=pytest.mark.long),
+        pytest.param(1000.0, (0.0, 0.0, 1.0), "s ahead of this computer's", marks=pytest.mark.long),
         pytest.param(0.05, (0.0, 0.0, 1e6), "above the limit", marks=pytest.mark.long),
     ],
 )

@@ -134,6 +134,11 @@ def test_limits_that_the_path_passes_are_refused_before_anything_moves(folder, l
         order_of(folder, **limits)
 
 
+def test_a_line_ends_at_its_length(folder):
+    order = order_of(folder, path=SlidePath("line", 0.01, 6.0), travel=0.011)
+    assert order.task.hold == pytest.approx(2.5)  # at 4 mm/s
+
+
 def words_of(folder, address, *more, gains="gains.toml"):
     return ["slide", "--wire", address, "--gains", str(folder / gains), *WORDS, *ALONG, *more]
 

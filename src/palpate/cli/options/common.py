@@ -4,14 +4,13 @@
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._terminal import confirmed, console, print_lines
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.errors import InputError
 from palpate.files import check_place, read_bytes
 from palpate.text import printable
@@ -66,8 +65,7 @@ else:
 # No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
 
 
-@Parameter(name="*", group=Group("Known names", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Known names", 2)
 class KnownOptions:
     """List or print, without a run."""
 
@@ -77,8 +75,7 @@ class KnownOptions:
     "Print the named file, to copy and edit, and stop."
 
 
-@Parameter(name="*", group=Group("Output", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("Output", 3)
 class FolderOptions:
     """The folder of results."""
 
@@ -123,8 +120,7 @@ def source_of(files: "TomlFiles", name: str | None, verb: str, printed: bool) ->
 WRITTEN = Group("Output", sort_key=6)
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class JsonOption:
     """An answer for programs."""
 
@@ -132,8 +128,7 @@ class JsonOption:
     "Print one JSON object and nothing else."
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class ReportOption:
     """A page with all results."""
 
@@ -147,8 +142,7 @@ class ReportOption:
         return self.report
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class FileOptions(JsonOption):
     """A file of results."""
 
@@ -170,8 +164,7 @@ class FileOptions(JsonOption):
             raise InputError(f"{path} exists; choose another place, or add --replace")
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class PictureOptions(ReportOption, JsonOption):
     """A figure, a page, an answer for programs."""
 
@@ -194,8 +187,7 @@ class PictureOptions(ReportOption, JsonOption):
 DRAWN = Group("Figures", sort_key=4)
 
 
-@Parameter(name="*", group=DRAWN)
-@dataclass(frozen=True, kw_only=True)
+@options(DRAWN)
 class FigureOptions:
     """How figures are written."""
 
@@ -223,8 +215,7 @@ class FigureOptions:
                 )
 
 
-@Parameter(name="*", group=Group("Your own code", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Your own code", 2)
 class PluginOptions:
     """Consent to run code."""
 
@@ -284,8 +275,7 @@ def _whole(text: str) -> int | float:
     return int(text) if len(text) <= _DIGITS else float(text)
 
 
-@Parameter(name="*", group=Group("Options from a file", sort_key=7))
-@dataclass(frozen=True, kw_only=True)
+@options("Options from a file", 7)
 class CellOptions:
     """Options saved in a file."""
 

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
-
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, options
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,8 +16,7 @@ if TYPE_CHECKING:
     from palpate.force.inner_loop import InnerLoop
 
 
-@Parameter(name="*", group=Group("The arm", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("The arm", 1)
 class LoopArmOptions:
     """The arm whose loop is tuned."""
 
@@ -44,8 +41,7 @@ class LoopArmOptions:
         return found.of(one, self.loop_from.name), found
 
 
-@Parameter(name="*", group=Group("The surface", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("The surface", 2)
 class SurfaceOptions:
     """Prior of the surface, without a log."""
 
@@ -59,8 +55,7 @@ class SurfaceOptions:
     "Speed of a moving surface, m/s."
 
 
-@Parameter(name="*", group=Group("The press", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("The press", 3)
 class PressOptions:
     """Desired force and its limit."""
 
@@ -127,8 +122,7 @@ class SlideLimits:
         return replace(gains, slide=slide)
 
 
-@Parameter(name="*", group=Group("A slide along the surface", sort_key=4))
-@dataclass(frozen=True, kw_only=True)
+@options("A slide along the surface", 4)
 class SlideTuningOptions(SlideLimits):
     """A slide, for palpate slide and palpate.force.SlidingLoop."""
 
@@ -139,11 +133,15 @@ class SlideTuningOptions(SlideLimits):
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        return self.gains_with(gains, self.radius.si) if self.slide else gains
+        from palpate.cli.press import only
+
+        if self.slide:
+            return self.gains_with(gains, self.radius.si)
+        only(self, "a slide; add --slide")
+        return gains
 
 
-@Parameter(name="*", group=Group("Signals of the logs", sort_key=4))
-@dataclass(frozen=True, kw_only=True)
+@options("Signals of the logs", 4)
 class ColumnOptions:
     """Columns of a log of a press, and of the one that --loop-from names."""
 
@@ -167,8 +165,7 @@ class ColumnOptions:
         return {name: value for name, value in {**own, "payload": self.payload}.items() if value is not None}
 
 
-@Parameter(name="*", group=WRITTEN)
-@dataclass(frozen=True, kw_only=True)
+@options(WRITTEN)
 class TuningOutputOptions(FileOptions):
     """Files to write, and how much to print."""
 

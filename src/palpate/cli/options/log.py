@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 from palpate.cli.options.common import QUIET, Model
-from palpate.cli.options.values import FLAG, SIGNED, Angles, Interval, Point, lag_of, si, vector, with_std
+from palpate.cli.options.values import (
+    FLAG,
+    SIGNED,
+    Angles,
+    Interval,
+    Point,
+    lag_of,
+    options,
+    si,
+    vector,
+    with_std,
+)
 from palpate.errors import InputError
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
@@ -20,8 +30,7 @@ if TYPE_CHECKING:
     from palpate.identification.indenter import Indenter
 
 
-@Parameter(name="*", group=Group("Signals of the log", sort_key=1))
-@dataclass(frozen=True, kw_only=True)
+@options("Signals of the log", 1)
 class LogOptions(Signals):
     """Columns or topics of a log, and which rows of it."""
 
@@ -33,8 +42,7 @@ class LogOptions(Signals):
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
 
 
-@Parameter(name="*", group=Group("Wrench and pose, and the sign of the force", sort_key=2))
-@dataclass(frozen=True, kw_only=True)
+@options("Wrench and pose, and the sign of the force", 2)
 class FrameOptions:
     """Axes, points and signs of a wrench and a pose."""
 
@@ -64,11 +72,6 @@ class FrameOptions:
             return None
         return -1 if self.force_sign in {"reaction", "-1"} else 1
 
-    @property
-    def of_space(self) -> bool:
-        """Whether an option was given that needs a wrench and a pose."""
-        return replace(self, force_sign=None) != FrameOptions()
-
     def frame(self, hung: Payload | None = None) -> ContactFrame | None:
         """The contact frame; None if not given."""
         from palpate.contact_frame.signals_in_base import ContactFrame
@@ -97,8 +100,7 @@ class FrameOptions:
         )
 
 
-@Parameter(name="*", group=Group("The arm", sort_key=3))
-@dataclass(frozen=True, kw_only=True)
+@options("The arm", 3)
 class ArmOptions:
     """Mass and stiffness between the sensors and the surface."""
 
@@ -137,8 +139,7 @@ class ArmOptions:
         )
 
 
-@Parameter(name="*", group=Group("Young's modulus", sort_key=5))
-@dataclass(frozen=True, kw_only=True)
+@options("Young's modulus", 5)
 class IndenterOptions:
     """Shape of the indenter, if it is known."""
 
@@ -171,8 +172,7 @@ class IndenterOptions:
         return with_std("poisson", self.poisson, "0.45:0.05")
 
 
-@Parameter(name="*", group=Group("The model", sort_key=4))
-@dataclass(frozen=True, kw_only=True)
+@options("The model", 4)
 class ModelOptions:
     """The model, the lag, and the priors."""
 

@@ -43,6 +43,11 @@ def directions(
     return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
 
 
+def duration(path: str, seconds: float, speed: float, extent: float) -> float:
+    """Of a slide [s]: a line ends at its length; arguments as of `directions`."""
+    return min(seconds, extent / speed) if path == "line" else seconds
+
+
 def check_directions(ways: Array, gains: Gains, into: ArrayLike) -> None:
     """Refuses a path that the true normal may point along, as far as the given one may be wrong.
 

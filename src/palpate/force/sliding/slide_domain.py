@@ -107,11 +107,11 @@ def slide_sentence(gains: Gains) -> str:
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )
     floor = (
-        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} F at rest; a step costs "
-        f"0.5 F at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap / 1e3:.3g} kN/m"
+        f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} times the force at rest; "
+        f"a step costs half the force at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap / 1e3:.4g} kN/m"
     )
     if domain is None:
         better = "slow down, or give a better normal"
         return f"no surface lies in the domain of a slide {least}{slide.mu_max:g}: {better}; {floor}"
-    low, high = (f"{end / 1e3:.3g}" for end in domain)
+    low, high = (f"{end / 1e3:.4g}" for end in domain)
     return f"the domain of a slide is {low} to {high} kN/m {least}{slide.mu_max:g}; {floor}"

@@ -37,15 +37,7 @@ class Prediction:
     def of(
         cls, model: Model, motion: Motion, force: Array, theta: dict[str, float], lag: float
     ) -> Prediction:
-        """By a model; an offset that is not among the parameters is that of the mean.
-
-        Args:
-            model: which.
-            motion: the position.
-            force: measured, shape (n,).
-            theta: its parameters.
-            lag: of the force [s].
-        """
+        """By a model, of a force, shape (n,); an offset that is not among the parameters is that of the mean."""
         columns = model.columns(motion, theta, lag)
         predicted = sum(
             (theta.get(n, 0.0) * c for n, c in zip(model.linear, columns, strict=True)), np.zeros(len(force))
@@ -59,12 +51,7 @@ class Prediction:
         return cls(model, theta, lag, predicted, residuals, 1 - rmse**2 / spread if spread else 0.0, rmse)
 
     def in_time(self, motion: Motion, force: Array) -> Prediction:
-        """The same model, its linear parameters by least squares in time, which see a motion that no octave has.
-
-        Args:
-            motion: the position.
-            force: measured, shape (n,).
-        """
+        """The same model, its linear parameters by least squares in time, which see a motion that no octave has."""
         columns = np.column_stack(self.model.columns(motion, self.theta, self.lag))
         size = np.abs(columns).max(axis=0)
         scaled, *_ = np.linalg.lstsq(columns / np.where(size > 0, size, 1.0), force, rcond=1e-9)
@@ -89,6 +76,7 @@ class Answer:
         unexplained: rms of what is left beyond the sensor's noise [N].
         hidden: share of the force's amplitude in contact that the other forces beside the model do not explain either.
         noise: mean square of what both channels' own noise leaves of the force [N^2].
+        friction: forces whose squares add up to the mean square of what may be friction, shape (m, f) [N].
         problem: the rows that it was fitted to.
     """
 
@@ -101,6 +89,7 @@ class Answer:
     unexplained: float
     hidden: float
     noise: float
+    friction: Array
     problem: Problem
 
     def __getitem__(self, name: str) -> float:
@@ -117,21 +106,11 @@ class Answer:
         return float(self.half[self.names.index(name)])
 
     def with_cause(self, cause: str, effect: Array) -> Answer:
-        """The same with one more cause of error.
-
-        Args:
-            cause: its name.
-            effect: standard deviation of each parameter by it, shape (p,).
-        """
+        """The same with one more cause of error: the standard deviation of each parameter by it, shape (p,)."""
         return replace(self, budget={**self.budget, cause: Spread(effect**2)})
 
     def through(self, jacobian: Array, theta: Array) -> Answer:
-        """Functions of the parameters instead, covariance and budget through their derivatives.
-
-        Args:
-            jacobian: their derivatives by the parameters, shape (p, p).
-            theta: their values, shape (p,).
-        """
+        """Functions of the parameters instead, shape (p,): covariance and budget through their derivatives, (p, p)."""
         budget = {
             cause: Spread(np.einsum("ij,j->i", jacobian**2, part.variance), part.freedom)
             for cause, part in self.budget.items()

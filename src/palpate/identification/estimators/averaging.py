@@ -6,8 +6,8 @@ hardly counts; one that it could not show widens the interval as if it were ther
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise, product
 
 import numpy as np
@@ -48,11 +48,7 @@ class Member:
 
 
 def members(
-    system: System,
-    noise: Array,
-    sensor: Array,
-    forces: list[list[int]],
-    use: Mask | None = None,
+    system: System, noise: Array, sensor: Array, forces: list[list[int]], use: Mask | None = None
 ) -> list[Member]:
     """Hypotheses and their weights, which add up to one.
 
@@ -66,7 +62,10 @@ def members(
         forces: places of the columns of each.
         use: octaves that count, shape (octaves,); all if not given.
     """
-    weights = np.array([_prior(system, forces, sizes) for sizes in product(_SIZES, repeat=len(forces))])
+    weights = np.array([system.prior_weight] * len(_SIZES) ** len(forces))
+    for own, sizes in zip(weights, product(_SIZES, repeat=len(forces)), strict=True):
+        for places, size in zip(forces, sizes, strict=True):
+            own[places] *= (LARGEST / size) ** 2
     counts = system.lines > 0 if use is None else use & (system.lines > 0)
     worth = np.where(counts, sensor / noise / noise, 0.0)
     whole = np.tensordot(worth, system.products, axes=1)
@@ -78,21 +77,11 @@ def members(
     return [Member(weight, own, solve(own, noise, use)) for weight, own in found]
 
 
-def _prior(system: System, forces: list[list[int]], sizes: tuple[float, ...]) -> Array:
-    """Weights of the prior with forces of such sizes, shape (p,)."""
-    found = system.prior_weight.copy()
-    for places, size in zip(forces, sizes, strict=True):
-        found[places] *= (LARGEST / size) ** 2
-    return found
-
-
 def _evidence(whole: Array, weights: Array, mean: Array) -> Array:
     """Log of the probability of the log under each prior, but for a constant, shape (priors,).
 
-    Args:
-        whole: normal equations with the force in the last place, shape (p + 1, p + 1).
-        weights: of the priors, shape (priors, p).
-        mean: of the priors, shape (p,).
+    Of the normal equations with the force in the last place, shape (p + 1, p + 1), and the priors' weights, (priors,
+    p), and mean, (p,).
     """
     size = np.sqrt(np.maximum(np.diag(whole)[:-1] + weights, 1e-300))
     normal = (whole[:-1, :-1] + weights[:, :, None] * np.eye(len(mean))) / size[:, :, None] / size[:, None, :]
@@ -102,8 +91,7 @@ def _evidence(whole: Array, weights: Array, mean: Array) -> Array:
     along = np.einsum("mij,mi->mj", vector, right)
     explained = (np.where(value > _SINGULAR, along**2, 0.0) / value).sum(axis=1)
     spread = np.log(value).sum(axis=1) + 2 * np.log(size).sum(axis=1) - np.log(weights + 1e-300).sum(axis=1)
-    found: Array = (explained - weights @ mean**2 - spread) / 2
-    return found
+    return np.asarray((explained - weights @ mean**2 - spread) / 2)
 
 
 def averaged(parts: list[Member]) -> Solution:
@@ -119,11 +107,7 @@ def averaged(parts: list[Member]) -> Solution:
 def of_supposition(whole: Solution, parts: list[Member], system: System, place: int) -> float:
     """Variance of a parameter by the supposition that it may be small, which pulls it towards nothing.
 
-    Args:
-        whole: the answer over all members.
-        parts: the members.
-        system: of the log, each force's prior that of the largest size.
-        place: of the parameter, which counts with that prior beside the likeliest sizes of the others.
+    It counts with the prior of the largest size, which `system` has, beside the likeliest sizes of the others.
     """
     likeliest = max(parts, key=lambda part: part.weight)
     weights = likeliest.system.prior_weight.copy()
@@ -138,14 +122,7 @@ def of_octaves(
 ) -> Spread:
     """Change of the answer when one octave is left out, beyond the growth of its covariance.
 
-    The rest has to tell by itself which other forces are there.
-
-    Args:
-        whole: the answer over all members, of all octaves.
-        system: of the log.
-        noise: variance of a line in each octave, shape (octaves,).
-        sensor: the same of the sensors' own noise, no larger.
-        forces: places of the columns of each.
+    The rest has to tell by itself which other forces are there; the arguments are those of `members`.
     """
     excess = np.zeros(system.size)
     for octave in np.flatnonzero(system.lines > 0):
@@ -157,13 +134,7 @@ def of_octaves(
 
 
 def mean_budget(parts: list[Member], budgets: list[Budget], theta: Array) -> Budget:
-    """The budget over all members: what they differ by is of the other forces.
-
-    Args:
-        parts: the members.
-        budgets: of each.
-        theta: the answer over all of them, shape (p,).
-    """
+    """The budget over all members, of those of each: what they differ by, about theta, is of the other forces."""
     weight = np.array([part.weight for part in parts])
     apart = np.stack([part.solution.theta for part in parts]) - theta
     budget = {cause: _mean(weight, [own[cause] for own in budgets]) for cause in budgets[0]}
@@ -191,32 +162,22 @@ _ROUNDED = 100.0
 def position_lines(motion: Motion, dt: float, longest: int, count: int, most: int) -> dict[int, Array]:
     """Power of the position's noise times omega^k in a line of each octave, shape (count,), by even k.
 
-    Args:
-        motion: of the log.
-        dt: from row to row [s].
-        longest: rows of the block of the first octave.
-        count: of the octaves.
-        most: the highest derivative; k goes up to twice that.
+    `dt` is from row to row [s], `longest` the rows of the block of the first octave; k goes up to twice the highest
+    derivative, `most`.
     """
     chain = motion.chain
 
-    def power(k: int) -> Callable[[Array], Array]:
-        return lambda f: (
-            motion.noise.power(f, chain.dt)
-            * chain.position_gain(f) ** 2
-            * (2 * np.pi * f) ** k
-            * chain.dt
-            / dt
-        )
+    def power(k: int, f: Array) -> Array:
+        passed = motion.noise.power(f, chain.dt) * chain.position_gain(f) ** 2
+        return passed * (2 * np.pi * f) ** k * chain.dt / dt
 
-    return {k: lines_of(power(k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
+    return {k: lines_of(partial(power, k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
 
 
 def derivative_products(noisy: dict[int, Array]) -> Array:
     """Products of the noise of derivative i with that of j by octave, shape (octaves, d, d); others are in quadrature.
 
-    Args:
-        noisy: as `position_lines` has it.
+    Of the powers that `position_lines` gives.
     """
     order = np.arange(1 + max(noisy) // 2)
     both, apart = np.add.outer(order, order), np.abs(np.subtract.outer(order, order))
@@ -229,11 +190,7 @@ def derivative_products(noisy: dict[int, Array]) -> Array:
 def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]) -> Mask:
     """Octaves but those in which a column is mostly the position's noise, which pulls its parameter to zero.
 
-    Args:
-        motion: of the log.
-        noisy: as `position_lines` has it.
-        octaves: of the columns.
-        derivatives: place of a column, and which derivative of the position it is.
+    `noisy` is as `position_lines` has it; `derivatives` has the place of a column, and which derivative it is.
     """
     rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
     omega2 = (2 * np.pi * octaves.frequency) ** 2
@@ -243,24 +200,12 @@ def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives:
 
 
 def sensor_lines(
-    problem: Problem,
-    segments: list[Segment],
-    octaves: Octaves,
-    use: Mask,
-    system: System,
-    solution: Solution,
+    problem: Problem, segments: list[Segment], octaves: Octaves, use: Mask, system: System, solution: Solution
 ) -> tuple[Array, Array]:
     """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
 
     Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
-
-    Args:
-        problem: of the log.
-        segments: of its rows.
-        octaves: sums of the columns, the force last.
-        use: octaves that count, shape (octaves,).
-        system: the normal equations of those.
-        solution: of them.
+    The octaves have the force last; those that count are in `use`, and the normal equations are theirs.
     """
     longest, dt = longest_of(segments), float(np.median(np.diff(problem.time)))
     passed = problem.motion.chain.force_gain

@@ -60,12 +60,7 @@ Budget = dict[str, Spread]
 def of_noise(system: System, solution: Solution, names: tuple[str, ...], own: int, lag: str) -> Budget:
     """Noise, lag, and other forces beside the model: the parts of the answer's own covariance.
 
-    Args:
-        system: of the log.
-        solution: of it.
-        names: of the parameters, those of the model first.
-        own: how many are the model's.
-        lag: name of the lag among them.
+    Of the parameters, the first `own` are the model's; `lag` is the name of the lag among them.
     """
     whole = np.diag(solution.cov)
     normal = inverse(solution.cov)
@@ -104,16 +99,11 @@ def _freedom(system: System, solution: Solution) -> Array:
 def of_position_noise(system: System, solution: Solution, noise: Array) -> Spread:
     """Bias by noise of the position, and the information that is only apparent.
 
-    The normal equations are A + P with the prior P, and N is what the noise adds to A. In the directions in which A + P
-    is 1 and N is diagonal, P is p and N is s, a solution z has the mean (1 - p - s) of the truth and the variance 1 - p
-    (errors in variables: Fuller, 1987, ch. 1). With the prior the truth has so the information
-    p + (1 - p - s)^2/(1 - p): what the columns tell by little more than their noise, as K from M at one frequency or a
-    lag from a damping, only the prior tells.
-
-    Args:
-        system: of the log.
-        solution: of it.
-        noise: N by octave, products of the columns' noise with each other, shape (octaves, p, p).
+    The normal equations are A + P with the prior P, and N is what the noise adds to A: products of the columns' noise
+    by octave, shape (octaves, p, p). In the directions in which A + P is 1 and N is diagonal, P is p and N is s, a
+    solution z has the mean (1 - p - s) of the truth and the variance 1 - p (errors in variables: Fuller, 1987, ch. 1).
+    With the prior the truth has so the information p + (1 - p - s)^2/(1 - p): what the columns tell by little more than
+    their noise, as K from M at one frequency or a lag from a damping, only the prior tells.
     """
     weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
     added = np.tensordot(weight, noise, axes=1)
@@ -168,20 +158,14 @@ def _scaling(normal: Array, cov: Array) -> Array:
     left = np.eye(len(root)) - half.T @ (cov / np.outer(size, size)) @ half
     less, turn = np.linalg.eigh(left)
     scale = turn * np.where(less > _ALONE, 1 / np.sqrt(np.maximum(less, _ALONE)), 0.0) @ turn.T
-    found: Array = (half @ scale @ (vector / root).T) * np.outer(1 / size, size)
-    return found
+    return np.asarray((half @ scale @ (vector / root).T) * np.outer(1 / size, size))
 
 
 def of_another(theta: Array, budget: Budget, other: Array, others: Budget) -> Spread:
     """By how much an answer contradicts one that rests on fewer rows: beyond their difference's 95 % interval.
 
-    The less precise of the two errs by the difference beside what both err by (Hausman, 1978).
-
-    Args:
-        theta: of the answer, shape (p,).
-        budget: of the answer.
-        other: parameters of the other, shape (p,).
-        others: its budget.
+    The less precise of the two errs by the difference beside what both err by (Hausman, 1978). Both have parameters of
+    shape (p,), and a budget.
     """
     own, less = (sum((part.variance for part in b.values()), np.zeros(len(theta))) for b in (budget, others))
     apart = np.abs(other - theta) - NORMAL * np.sqrt(np.abs(less - own))
@@ -192,13 +176,8 @@ def of_unexplained(system: System, solution: Solution, sensor: Array, told: Arra
     """Possible effect of a force hidden along the parameters' columns, as large as the residual beyond the noise.
 
     Seen is what chance would show in one of twenty logs at most, in any of their octaves: a level that n lines tell has
-    a relative deviation of 1/sqrt(n).
-
-    Args:
-        system: of the log.
-        solution: of it.
-        sensor: variance of a line by the sensor's own noise in each octave, shape (octaves,).
-        told: lines that those levels rest on, shape (octaves,).
+    a relative deviation of 1/sqrt(n). The variance of a line by the sensor's own noise in each octave rests on the
+    lines `told`, both of shape (octaves,).
     """
     from scipy.special import ndtri
 
@@ -214,9 +193,8 @@ def of_unexplained(system: System, solution: Solution, sensor: Array, told: Arra
 def white_level(level: Array, lines: Array) -> float:
     """Level of white noise: that of as many of the quietest octaves as differ by chance alone.
 
-    Args:
-        level: variance of a line in each octave, over that of white noise of variance 1.
-        lines: that each level rests on, shape (octaves,); one is not 0 at least.
+    Of the variance of a line in each octave, over that of white noise of variance 1, and the lines that each rests on,
+    shape (octaves,); one is not 0 at least.
 
     Source: Bartlett's test of equal variances, at 95 %.
     """
@@ -242,14 +220,7 @@ the stiffness on. Without them K took the spring that friction is before it slip
 
 
 def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segment]) -> dict[str, Array]:
-    """Columns by name, each of shape (m,), of what the model has not got itself.
-
-    Args:
-        motion: of the log.
-        model: that they stand beside.
-        lag: of the force behind the position [s].
-        segments: of the rows.
-    """
+    """Columns by name, each of shape (m,), of what a model has not got itself; the lag is that of the force [s]."""
     x = motion.moved(0, lag)
     inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
     reach = float(np.ptp(x[inside])) or 1.0

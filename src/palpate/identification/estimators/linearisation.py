@@ -22,8 +22,7 @@ from palpate.identification.estimators.averaging import (
     sensor_lines,
 )
 from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
-from palpate.identification.estimators.descent import linearised, slope_of_lag
-from palpate.identification.estimators.fit import nonlinear_fit
+from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
     Octaves,
     Segment,
@@ -55,6 +54,7 @@ class Linearisation:
         at: its parameters that they are formed about; none for a model that is linear in all of them.
         about: parameters that the column of the lag is formed with, by name.
         names: of the parameters: the model's own, then those of other forces.
+        friction: columns of those that are friction, shape (m, f).
         own: how many are the model's.
         prior: mean and deviation of what is known of some of them.
         segments: rows without a gap.
@@ -70,6 +70,7 @@ class Linearisation:
     at: dict[str, float]
     about: dict[str, float]
     names: tuple[str, ...]
+    friction: Array
     own: int
     prior: dict[str, tuple[float, float]]
     segments: list[Segment]
@@ -89,14 +90,9 @@ class Linearisation:
     ) -> Linearisation:
         """Linearise a model about some parameters, and sum its columns by octave.
 
-        Args:
-            problem: of the log.
-            model: which.
-            segments: rows without a gap.
-            theta: the parameters, the other forces' and the lag's among them; what is not is looked for (those that
-                the force is not linear in), zero (the others), or its prior's value (the lag).
-            use: octaves that count, shape (octaves,): likelihoods compare over the same; None for those in which the
-                columns are more than noise.
+        Among the parameters are the other forces' and the lag's; what is not is looked for (those that the force is not
+        linear in), zero (the others), or its prior's value (the lag). Octaves that count are given, shape (octaves,),
+        where likelihoods compare over the same; None for those in which the columns are more than noise.
         """
         motion = problem.motion
         dt = float(np.median(np.diff(problem.time)))
@@ -124,9 +120,23 @@ class Linearisation:
         if use is None:
             use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
         names = (*free, *effects, *bending)
+        friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
         return cls(
-            problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system
+            problem,
+            model,
+            lag,
+            at,
+            theta,
+            names,
+            friction,
+            len(free),
+            prior,
+            segments,
+            octaves,
+            use,
+            noisy,
+            system,
         )
 
     @property
@@ -136,12 +146,7 @@ class Linearisation:
         return {self.names.index(name): value for name, value in at.items() if name in self.names}
 
     def moved(self, theta: Array, step: Array) -> dict[str, float]:
-        """Parameters with those that are searched a step farther, within their limits.
-
-        Args:
-            theta: shape (p,).
-            step: of those that are searched, shape (s,).
-        """
+        """Parameters, shape (p,), with those that are searched a step farther, shape (s,), within their limits."""
         found = dict(zip(self.names, theta.tolist(), strict=True))
         lag = self.problem.lag
         limits = {LAG: (lag.value - 3 * lag.std, lag.value + 3 * lag.std)}
@@ -149,16 +154,14 @@ class Linearisation:
         for place, change in zip(self.searched, step.tolist(), strict=True):
             name = self.names[place]
             low, high = limits[name]
-            found[name] = float(
-                np.clip(found[name] + change, max(low, found[name] / 3) if low > 0 else low, high)
-            )
+            least = max(low, found[name] / 3) if low > 0 else low
+            found[name] = float(np.clip(found[name] + change, least, high))
         return found
 
     def misfit(self, solution: Solution) -> float:
         """-2 log of the likelihood, but for a constant: of a solution's noise levels, and the prior of the lag.
 
-        Args:
-            solution: with what is searched held.
+        The solution is that with what is searched held.
         """
         seen, std = self.system.lines > 0, self.problem.lag.std
         prior = ((self.lag - self.problem.lag.value) / std) ** 2 if std > 0 else 0.0
@@ -172,7 +175,7 @@ class Linearisation:
         both = self._with_position(solution, sensor)
         explained, left, hidden = self._explained_part(
             solution, both
-        )  # of what may be another force's, nothing
+        )  # what may be another force's does not count
         question = self.system, solution.noise, both, self._forces()
         likely = members(*question)
         solution = averaged(likely)
@@ -189,8 +192,17 @@ class Linearisation:
         noise = float(both @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(
-            names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise, self.problem
-        )
+            names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise,
+            self._friction(solution), self.problem,
+        )  # fmt: skip
+
+    def _friction(self, solution: Solution) -> Array:
+        """Forces whose squares add up to the mean square of the friction's, its uncertainty included, shape (m, f)."""
+        places = [i for i, name in enumerate(self.names) if name.startswith(FRICTION)]
+        theta = solution.theta[places]
+        value, vector = np.linalg.eigh(solution.cov[np.ix_(places, places)] + np.outer(theta, theta))
+        found: Array = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
+        return found
 
     def _forces(self) -> list[list[int]]:
         """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
@@ -208,21 +220,19 @@ class Linearisation:
         budget = causes.of_noise(system, solution, self.names, self.own, LAG)
         budget["position noise"] = causes.of_position_noise(system, solution, self._position_noise())
         budget["repetition"] = causes.of_stretches(system, solution)
-        budget["unexplained"] = causes.of_unexplained(
-            system, solution, self._with_position(solution, sensor), told
-        )
+        both = self._with_position(solution, sensor)
+        budget["unexplained"] = causes.of_unexplained(system, solution, both, told)
         if lag_open(self.problem) and LAG in self.names:
             budget["lag"] = self._by_prior_of_lag(member, budget["lag"])
         return budget
 
     def _with_position(self, solution: Solution, sensor: Array) -> Array:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
-        own = np.array(
-            [solution.theta[i] * (name in self.model.derivatives) for i, name in enumerate(self.names)]
-        )
+        own = solution.theta * [name in self.model.derivatives for name in self.names]
         by_position = np.einsum("i,oij,j->o", own, self._position_noise(), own)
-        found: Array = np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
-        return found
+        return np.asarray(
+            np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
+        )
 
     def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).
@@ -235,10 +245,8 @@ class Linearisation:
             of[i, k] = 1.0
             if LAG in self.names:
                 of[self.names.index(LAG), k + 1] = -self.about.get(name, 0.0)
-        return (
-            np.einsum("ai,oij,bj->oab", of, derivative_products(self.noisy), of)
-            * self.system.lines[:, None, None]
-        )
+        found = np.einsum("ai,oij,bj->oab", of, derivative_products(self.noisy), of)
+        return found * self.system.lines[:, None, None]
 
     def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
         """Parameters seen in time get the prior's uncertainty of an uncalibrated lag, no less.
@@ -274,8 +282,7 @@ class Linearisation:
         offset = np.zeros_like(full)
         offset[-1] = 1.0
         if LAG in self.names:  # the target counts the lag from zero
-            at = self.names.index(LAG)
-            offset[at] = -self.lag
+            offset[self.names.index(LAG)] = -self.lag
         noise = float(sensor @ self.system.lines)
         left = max(float(full @ total @ full) - noise, 0.0)
         whole = max(float(offset @ total @ offset) - noise, 1e-300)

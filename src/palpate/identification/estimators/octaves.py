@@ -71,31 +71,22 @@ class Octaves:
     @property
     def total(self) -> Array:
         """Sums over all groups, shape (octaves, p, p)."""
-        whole: Array = self.products.sum(axis=0)
-        return whole
+        return np.asarray(self.products.sum(axis=0))
 
     @property
     def all_lines(self) -> Array:
         """Lines of all groups, shape (octaves,)."""
-        whole: Array = self.lines.sum(axis=0)
-        return whole
+        return np.asarray(self.lines.sum(axis=0))
 
     def only(self, use: Mask) -> Octaves:
         """The same with some octaves alone, shape (octaves,)."""
         return Octaves(self.products * use[None, :, None, None], self.lines * use[None, :], self.frequency)
 
-    def without(self, group: int) -> Octaves:
-        """The same without one group."""
-        kept = np.arange(len(self.products)) != group
-        return Octaves(self.products[kept], self.lines[kept], self.frequency)
-
 
 def segments_of(rows: NDArray[np.intp], spans: NDArray[np.intp]) -> list[Segment]:
-    """Cut rows, shape (m,), at the ends of contacts and at gaps; too short pieces are left out.
+    """Cut rows at the ends of contacts and at gaps; too short pieces are left out.
 
-    Args:
-        rows: sample of each row.
-        spans: number of the contact of each row.
+    The sample of each row and the number of its contact have the shape (m,).
     """
     if not len(rows):
         return []
@@ -110,21 +101,13 @@ def longest_of(segments: Sequence[Segment]) -> int:
     return max(s.length for s in segments)
 
 
-def octave_count(longest: int) -> int:
-    """Octaves until a block has its fewest rows."""
-    return int(np.log2(longest / SHORTEST)) + 2
-
-
 def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: int) -> Octaves:
     """Sum the products of columns, shape (m, p), by octave.
 
-    Args:
-        columns: at the rows that the segments count.
-        segments: one at least.
-        dt: from row to row [s].
-        longest: rows of the block of the first octave.
+    The columns are at the rows that the segments count, one at least, `dt` from row to row [s]; `longest` is the rows
+    of the block of the first octave.
     """
-    count, p = octave_count(longest), columns.shape[1]
+    count, p = int(np.log2(longest / SHORTEST)) + 2, columns.shape[1]  # until a block has its fewest rows
     products, lines = np.zeros((GROUPS, count, p, p)), np.zeros((GROUPS, count))
     begins = np.cumsum([0, *(s.length for s in segments)])
     for number, segment in enumerate(segments):
@@ -143,9 +126,8 @@ def octaves_of(columns: Array, segments: Sequence[Segment], dt: float, longest: 
     frequency = PERIODS / (lengths * dt)
     frequency[0] = 2 / (longest * dt)
     seen = products.any(axis=(1, 2, 3))
-    return (
-        Octaves(products[seen], lines[seen], frequency) if seen.any() else Octaves(products, lines, frequency)
-    )
+    seen |= not seen.any()
+    return Octaves(products[seen], lines[seen], frequency)
 
 
 def _block(own: int, octave: int, longest: int) -> tuple[int, tuple[float, ...]]:
@@ -168,12 +150,8 @@ def lines_of(power: Callable[[Array], Array], dt: float, longest: int, count: in
     """Variance that a stationary noise has in a line of each octave, shape (count,).
 
     What a block's window leaks from where the noise is largest is in it: of a noise of accelerations, little else.
-
-    Args:
-        power: of the noise at frequencies [Hz], over that of white noise of variance 1.
-        dt: from row to row [s].
-        longest: rows of the block of the first octave.
-        count: of the octaves.
+    The power is that of the noise at frequencies [Hz], over that of white noise of variance 1; `dt` is from row to row
+    [s], `longest` the rows of the block of the first octave.
     """
     found = np.empty(count)
     for o in range(count):
@@ -279,10 +257,8 @@ class Solution:
 def system_of(octaves: Octaves, names: tuple[str, ...], prior: dict[str, tuple[float, float]]) -> System:
     """The normal equations of a log, or of a part of it.
 
-    Args:
-        octaves: sums over lines; the first columns are the parameters', the last is the force.
-        names: of the parameters.
-        prior: mean and standard deviation of what is known of some of them.
+    The first columns of the sums are the named parameters', the last is the force; the prior is mean and standard
+    deviation of what is known of some of them.
     """
     p, total = len(names), octaves.total
     power = np.diag(total.sum(axis=0))
@@ -295,13 +271,7 @@ def system_of(octaves: Octaves, names: tuple[str, ...], prior: dict[str, tuple[f
 
 
 def solve(system: System, noise: Array, use: Mask | None = None) -> Solution:
-    """Solve for given noise levels.
-
-    Args:
-        system: of the log.
-        noise: variance of a line in each octave, shape (octaves,).
-        use: octaves that count, shape (octaves,); all if not given.
-    """
+    """Solve for given variances of a line in each octave; `use` are those that count, all if not given; (octaves,)."""
     weight = np.where(system.lines > 0, 1 / noise, 0.0)
     if use is not None:
         weight = weight * use
@@ -312,12 +282,7 @@ def solve(system: System, noise: Array, use: Mask | None = None) -> Solution:
 
 
 def held(system: System, values: dict[int, float]) -> Solution:
-    """Estimate the other parameters and the noise levels with some parameters held where they are.
-
-    Args:
-        system: of the log.
-        values: of the parameters that are held, by place.
-    """
+    """Estimate the other parameters and the noise levels with some parameters held at values, by place."""
     places = list(values)
     free = [i for i in range(system.size) if i not in values]
     fewer = np.zeros((system.size + 1, len(free) + 1))

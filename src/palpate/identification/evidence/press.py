@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -24,7 +25,7 @@ from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.steady_press import Slopes, SteadyPress, few_points
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
 
@@ -52,10 +53,8 @@ def relaxation(
 def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
     """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
 
-    Args:
-        force: less what the position gives back meanwhile, shape (n,) [N].
-        doubt: what is not known of that [N].
-        time: shape (n,) [s].
+    The force, shape (n,) [N], is less what the position gives back meanwhile, of which `doubt` is not known [N]; the
+    time has the shape (n,) [s].
     """
     from scipy.optimize import isotonic_regression
 
@@ -73,29 +72,14 @@ def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None
 _FEWEST = 6
 
 
-@dataclass(frozen=True)
-class Unloading:
-    """Results of the unloadings.
+def _unloading_of(
+    problem: Problem, lag: float, segments: list[Segment]
+) -> tuple[Array, float | None, tuple[float, float] | None]:
+    """The unloadings of a log, the lag of the force taken out [s].
 
-    Args:
-        curve: depth [m] and force [N] on that of the deepest contact, shape (2, n); empty if there is none.
-        loss: share of the work put into it that does not come back; None without a unloading.
-        late: by how much the force is read after the position, if it gives back more work than it took, and the
-            half-width of that [s]; None if it does not, or if the contacts do not agree on it.
-    """
-
-    curve: Array
-    loss: float | None
-    late: tuple[float, float] | None
-
-
-def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloading:
-    """The unloadings of a log.
-
-    Args:
-        problem: of the log.
-        lag: of the force behind the position, taken out [s].
-        segments: of its rows, one at least.
+    Returns:
+        Depth [m] and force [N] on that of the deepest contact, shape (2, n), empty if there is none; the share of the
+        work put into it that does not come back, and by how much the force is read late, both as in `Press`.
     """
     motion = problem.motion
     depth, speed, force, time = motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time
@@ -103,12 +87,12 @@ def unloading_of(problem: Problem, lag: float, segments: list[Segment]) -> Unloa
     own = slice(s.first, s.last)
     turn = _turn(depth[own])
     if turn is None:
-        return Unloading(np.empty((2, 0)), None, None)
+        return np.empty((2, 0)), None, None
     rows = [slice(s.first, s.last) for s in segments if _turn(depth[s.first : s.last]) is not None]
     late = _late([(depth[r], speed[r], force[r], time[r]) for r in rows])
     x, f = depth[own], force[own]
     into, back = _works(x, f)
-    return Unloading(np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late)
+    return np.stack([x[turn:], f[turn:]]), 1 - back / into if into > 0 else None, late
 
 
 def _turn(x: Array) -> int | None:
@@ -122,10 +106,8 @@ def _ends(x: Array) -> tuple[int, int]:
     """The rows between which a contact goes in and out over the same depths."""
     top = int(np.argmax(x))
     start = max(float(x[0]), float(x[top:].min()))
-    beyond = x[top:] <= start
-    return int(np.argmax(x[: top + 1] >= start)), top + (
-        int(np.argmax(beyond)) if beyond.any() else len(x) - 1 - top
-    )
+    beyond = np.flatnonzero(x[top:] <= start)
+    return int(np.argmax(x[: top + 1] >= start)), top + int(beyond[0]) if len(beyond) else len(x) - 1
 
 
 def _works(x: Array, f: Array) -> tuple[float, float]:
@@ -140,10 +122,7 @@ def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, flo
     """Lateness of the force by the work that it gives back beyond what it took.
 
     A force that is read T late does less work in loading and unloading, by T times the integral of F' x'; no passive
-    surface gives back more than it takes.
-
-    Args:
-        contacts: depth, speed, force and time of each, shape (n,).
+    surface gives back more than it takes. Of each contact, depth, speed, force and time have the shape (n,).
     """
     late = []
     for x, v, f, t in contacts:
@@ -170,24 +149,21 @@ def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | N
     loading = max(loadings, key=lambda loading: len(loading.depth))
     later = read_later(problem, lag, segments, loadings)
     slopes = (slope_between(loadings, later, level) for level in _LEVELS)
-    back = unloading_of(problem, lag, segments)
+    unloading, loss, late = _unloading_of(problem, lag, segments)
     return Press(
         tuple(Tangent(own.force, own.stiffness) for own in slopes if own and own.stiffness.known_to(1.0)),
         few_points(np.stack([loading.depth, loading.force])),
-        few_points(back.curve),
-        back.loss,
+        few_points(unloading),
+        loss,
         relaxation(problem, lag, segments, slope_between(loadings, later)),
-        back.late,
+        late,
     )
 
 
 def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
-    """A press at constant speed, with the lost work and the relaxation that its log shows.
+    """A press at constant speed, with the lost work and the relaxation that the filtered contact shows, if it does.
 
-    Args:
-        steady: its strokes' tangents and curves.
-        seen: the press by the filtered contact, if that shows one.
-        origin: position of the surface [m].
+    The curves of its strokes count from the position of the surface [m].
     """
     known = [own for own in (*steady.others, steady.headline) if own.stiffness.known_to(1.0)]
     tangents = [Tangent(own.force, own.stiffness) for own in known]
@@ -202,27 +178,31 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
-def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
+def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | None = None) -> Evidence:
     """Dynamic stiffness, press and working point of the surface.
 
     Args:
         problem: of the log.
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
-        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
+        answer: with the forces beside the contact; None if nothing is known of them.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         return (), None, None
     lag = problem.lag
-    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
+    at = problem.motion.instants
+    friction = (
+        [np.interp(at, answer.problem.motion.instants, own) for own in answer.friction.T] if answer else []
+    )
+    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std, friction)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
-    headline = (
-        None if steady is None else replace(steady.headline, depth=steady.headline.depth - problem.origin)
-    )
+    headline = None
     if steady is not None:
+        headline = _among_loadings(steady.headline, whole)
+        headline = replace(headline, depth=headline.depth - problem.origin)
         press = at_constant_speed(steady, press, problem.origin)
     series = SeriesSpring.of(options)
     if series is not None:
@@ -231,17 +211,34 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
         headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
-    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
+    return spectrum, press, working_point(whole, spectrum, options, unit, answer.hidden if answer else 0.0)
+
+
+def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
+    """A tangent of strokes at constant speed, no more certain than the log's other loadings agree with it.
+
+    The square of their difference, less what their intervals let it be, is the variance between them (Paule and Mandel,
+    1982, of two): a stroke may be the second on a surface that has yielded.
+    """
+    segments, lag = segments_of(problem.motion.rows, problem.spans), problem.lag.value
+    loadings = loadings_in(problem, lag, segments)
+    if not loadings:
+        return headline
+    rest = 0.0 if problem.counted else problem.contacts.resting
+    low, high = np.percentile(np.concatenate([own.force for own in loadings]), [2, 98])
+    level = (headline.force + rest - low) / (high - low or 1.0)
+    other = slope_between(loadings, read_later(problem, lag, segments, loadings), level)
+    if other is None:
+        return headline
+    own, both = headline.stiffness, other.stiffness
+    between = max((both.value - own.value) ** 2 - both.half**2 - own.half**2, 0.0)
+    return replace(
+        headline, stiffness=own.with_cause("loadings", Contribution.within(float(np.sqrt(between))))
+    )
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:
-    """Stiffness at a working point by another force at the same rows [N/m]; None if it shows none.
-
-    Args:
-        problem: of the log.
-        force: as a model foretells it, shape (m,).
-        point: an octave, or the press.
-    """
+    """Stiffness at a working point by another force, shape (m,), at the same rows [N/m]; None if it shows none."""
     problem = replace(problem, force=force)
     segments = segments_of(problem.motion.rows, problem.spans)
     if point.source == "press":

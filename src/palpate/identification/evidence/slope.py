@@ -128,24 +128,13 @@ _WIDE = 0.15
 
 
 def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
-    """The slope of a log's loadings; with it what it moves by if the force is later than assumed.
-
-    Args:
-        problem: of the log.
-        segments: of its rows.
-    """
+    """The slope of a log's loadings; with it what it moves by if the force is later than assumed."""
     loadings = loadings_in(problem, problem.lag.value, segments)
     return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
 def slope_between(loadings: list[Loading], later: list[Loading], level: float | None = None) -> Slopes | None:
-    """The slope of some loadings; its interval reaches that of the same with the force later.
-
-    Args:
-        loadings: the loadings.
-        later: the same with the force later, or the same list if the lag is exact.
-        level: as `slope_of` has it.
-    """
+    """The slope of some loadings; its interval reaches that with the force later, where the lag is not exact."""
     found = slope_of(loadings, level)
     other = slope_of(later, level) if found is not None and later is not loadings else None
     if found is None or other is None:
@@ -155,16 +144,12 @@ def slope_between(loadings: list[Loading], later: list[Loading], level: float | 
 
 
 def slope_of(loadings: list[Loading], level: float | None = None) -> Slopes | None:
-    """Slope in the upper part of the force, or about a share of it; None without a loading that rises.
+    """Slope in the upper part of the force, or about a share of it (`level`); None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
     the interval reaches both. It has the scatter of each loading, what it differs by from the slope of the channels as
     they were read, and the variance between loadings (a random effect, Student's t); of the upper part, the change of
     the slope over it.
-
-    Args:
-        loadings: the loadings.
-        level: share of the force; None for the upper part.
     """
     every = [own for loading in loadings if (own := _slope_in(loading, level)) is not None]
     if not every:

@@ -52,25 +52,20 @@ class PositionNoise:
         jumps = _IN_BAND * self.jump**2 / np.maximum(step, 1e-12)
         if self.count and self.jump:
             jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
-        found: Array = self.white**2 + jumps
-        return found
+        return np.asarray(self.white**2 + jumps)
 
     def spread(self, weights: Array) -> Array:
-        """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k).
+        """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k), by the weights, (k, n), k > 2.
 
         Jumps have no power of their own in the position itself, but a position that wanders has its acceleration
         against it: E[e e''] = -E[e'^2]. Of their power half is counted: an encoder's error never leaves its count, so
         its jumps undo each other, and toward the low frequencies of a motion their power falls below what it is above.
-
-        Args:
-            weights: of the filter's samples, shape (k, n), k of 3 or more.
         """
         steps = np.cumsum(weights, axis=1)
         steps[0] = 0.0
         of_jumps = steps @ steps.T
         of_jumps[0, 2] = of_jumps[2, 0] = -of_jumps[1, 1]
-        found: Array = self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps
-        return found
+        return np.asarray(self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps)
 
 
 NOISELESS = PositionNoise(0.0, 0.0)
@@ -82,11 +77,13 @@ def position_noise(stretches: list[Array]) -> PositionNoise:
 
     power, weight = np.zeros(_SEGMENT // 2 + 1), 0.0
     frequency = np.fft.rfftfreq(_SEGMENT)
-    for stretch in stretches:
-        if len(stretch) >= 16:
-            own, count = _power(np.diff(stretch))
-            power += count * np.interp(frequency, np.linspace(0, 0.5, len(own)), own)
-            weight += count
+    for steps in (np.diff(stretch) for stretch in stretches if len(stretch) >= 16):
+        size = min(_SEGMENT, len(steps))
+        segments = np.lib.stride_tricks.sliding_window_view(steps, size)[:: max(size // 2, 1)]
+        window = np.hanning(size + 2)[1:-1]
+        own = (np.abs(np.fft.rfft(segments * window, axis=1)) ** 2).mean(axis=0) / float(window @ window)
+        power += len(steps) * np.interp(frequency, np.linspace(0, 0.5, len(own)), own)
+        weight += len(steps)
     if weight == 0:
         return NOISELESS
     above = frequency >= _FROM
@@ -98,13 +95,7 @@ def position_noise(stretches: list[Array]) -> PositionNoise:
 
 
 def noise_within(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp]) -> PositionNoise:
-    """That of a position in contact.
-
-    Args:
-        position: shape (n,).
-        rows: in contact, shape (m,).
-        spans: number of the contact that each is in, one after the other, shape (m,).
-    """
+    """That of a position, shape (n,), at rows in contact, and the number of each one's contact, shape (m,)."""
     inside = np.split(rows, np.flatnonzero(np.diff(spans)) + 1)
     return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
 
@@ -121,16 +112,7 @@ def _count(stretches: list[Array]) -> float:
     return float(np.sum(found**3) / np.sum(found**2)) if len(found) >= _FEWEST else 0.0
 
 
-def _power(increments: Array) -> tuple[Array, float]:
-    """Mean periodogram of overlapping windowed segments, shape (size // 2 + 1,), and the samples it stands for."""
-    size = min(_SEGMENT, len(increments))
-    segments = np.lib.stride_tricks.sliding_window_view(increments, size)[:: max(size // 2, 1)]
-    window = np.hanning(size + 2)[1:-1]
-    spectra = np.abs(np.fft.rfft(segments * window, axis=1)) ** 2
-    return spectra.mean(axis=0) / float(window @ window), float(len(increments))
-
-
-DERIVATIVES = 5
+_DERIVATIVES = 5
 _NEAR = 0.25
 """Steps of time within which a lag is reached by Taylor's series from one that was read before."""
 _FORGOTTEN = 10.0
@@ -173,7 +155,7 @@ class SensorPath:
 
     @property
     def _taps(self) -> Taps:
-        return taps(self.low_pass, self.dt, DERIVATIVES)
+        return taps(self.low_pass, self.dt, _DERIVATIVES)
 
     @property
     def reach(self) -> tuple[int, int]:
@@ -182,8 +164,7 @@ class SensorPath:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the position's first sample."""
-        found: Array = self.instants[rows] * self.dt
-        return found
+        return np.asarray(self.instants[rows] * self.dt)
 
     def force_gain(self, frequency: Array) -> Array:
         """Of the amplitude of the readings' own noise: they are taken as they are."""
@@ -194,34 +175,27 @@ class SensorPath:
         return np.abs(self.low_pass.at(2 * pi * frequency))
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
-        """The filtered signal or a derivative of it at the samples `rows` of the force, shape (len(rows),).
+        """The filtered signal or its first or second derivative at the samples `rows` of the force, shape (len(rows),).
 
-        Args:
-            signal: at the samples of the position, shape (n,).
-            derivative: 0 to 2.
-            lag: how much later than the signal the force stands in the log, the low-pass included [s].
-            rows: shape (k,).
+        The signal, shape (n,), is at the samples of the position; `lag` is how much later than it the force stands in
+        the log, the low-pass included [s].
         """
-        base, stack = self._stack(signal, lag, rows)
-        value, slope, curve = stack[derivative : derivative + 3]
-        step = base - lag
-        series: Array = value if step == 0 else value + step * slope + step * step / 2 * curve
-        return series
-
-    def _stack(self, signal: Array, lag: float, rows: NDArray[np.intp]) -> tuple[float, Array]:
-        """Signal and derivatives at some samples for a lag near by, and that lag."""
         near = [
             (base, stack)
             for own, at, base, stack in self._kept
             if own is signal and at is rows and abs(base - lag) <= _NEAR * self.dt
         ]
-        if near:
-            return min(near, key=lambda kept: abs(kept[0] - lag))
-        late = (lag - self.low_pass.lag) / self.dt
-        stack = read(signal, self.instants[rows] - late, self._taps)
-        stack /= self.dt ** np.arange(DERIVATIVES)[:, None]
-        self._kept = [*self._kept[-_MOST_KEPT:], (signal, rows, lag, stack)]
-        return lag, stack
+        if not near:
+            late = (lag - self.low_pass.lag) / self.dt
+            stack = read(signal, self.instants[rows] - late, self._taps)
+            stack /= self.dt ** np.arange(_DERIVATIVES)[:, None]
+            self._kept = [*self._kept[-_MOST_KEPT:], (signal, rows, lag, stack)]
+            near = [(lag, stack)]
+        base, stack = min(near, key=lambda kept: abs(kept[0] - lag))
+        value, slope, curve = stack[derivative : derivative + 3]
+        step = base - lag
+        series: Array = value if step == 0 else value + step * slope + step * step / 2 * curve
+        return series
 
     def noise_spread(self, noise: PositionNoise) -> Array:
         """Covariance of what noise of the position leaves in the derivatives 0 to 3 of one reading, shape (4, 4)."""

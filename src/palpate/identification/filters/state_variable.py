@@ -50,17 +50,13 @@ class Chain:
 
     def times(self, rows: NDArray[np.intp]) -> Array:
         """Of rows [s] from the first sample, less the chain's own delay."""
-        found: Array = rows.astype(np.float64) * self.dt - self.delay
-        return found
+        return np.asarray(rows.astype(np.float64) * self.dt - self.delay)
 
     def force_gain(self, frequency: Array) -> Array:
         """Of its amplitude at frequencies [Hz]."""
-        found: Array = (1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2)
-        return found
+        return np.asarray((1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2))
 
-    def position_gain(self, frequency: Array) -> Array:
-        """The same: both channels go the same way."""
-        return self.force_gain(frequency)
+    position_gain = force_gain
 
     @property
     def delay(self) -> float:
@@ -78,15 +74,10 @@ class Chain:
         return 20.0 / self.rate
 
     def __call__(self, signal: Array, derivative: int = 0, lag: float = 0.0) -> Array:
-        """The filtered signal, or one of its derivatives, at the times t - lag.
+        """The filtered signal, or one of its derivatives 0 to 4, at the times t - lag [s], shape (n,).
 
-        Args:
-            signal: shape (n,); before its first and after its last sample it is taken to rest there.
-            derivative: 0 to 4.
-            lag: how much earlier the signal is read [s]; may be negative.
-
-        Returns:
-            Shape (n,).
+        Before its first and after its last sample the signal, shape (n,), is taken to rest there; the lag may be
+        negative.
         """
         taps, first = _taps(self, derivative, lag)
         reach = len(taps) + abs(first)
@@ -105,7 +96,9 @@ class Chain:
         """
         if not len(rows):
             return np.empty(0)
-        memory = _memory(self, lag)
+        memory = (
+            int(np.ceil(_LENGTH / (self.rate * self.dt) + abs(lag) / self.dt)) + 5
+        )  # samples on either side
         cuts = np.flatnonzero(np.diff(rows) > 2 * memory) + 1
         stretches = np.split(rows, cuts) if len(cuts) else [rows]
         begins = [max(int(own[0]) - memory, 0) for own in stretches]
@@ -142,7 +135,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
 
 
 def _integrate(w: float, derivative: int, time: Array) -> Array:
-    """The impulse response integrated twice and then differentiated `derivative` times."""
+    """The impulse response integrated twice and then differentiated `derivative` times, 0 to 4."""
     tau = w * np.maximum(time, 0.0)
     if derivative == 0:
         return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
@@ -157,11 +150,6 @@ def _integrate(w: float, derivative: int, time: Array) -> Array:
     raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
 
 
-def _memory(chain: Chain, lag: float) -> int:
-    """Samples around a row that a reading of it rests on."""
-    return int(np.ceil(_LENGTH / (chain.rate * chain.dt) + abs(lag) / chain.dt)) + 5
-
-
 def _erlang(order: int, tau: Array) -> Array:
     """Impulse response of `order` unit lags in a row."""
     return tau ** (order - 1) * np.exp(-tau) / factorial(order - 1)
@@ -169,11 +157,9 @@ def _erlang(order: int, tau: Array) -> Array:
 
 def _erlang_cdf(order: int, tau: Array) -> Array:
     """Step response of `order` unit lags in a row."""
-    total = np.zeros_like(tau)
-    term = np.ones_like(tau)
-    for k in range(order):
-        if k:
-            term = term * tau / k
+    total, term = np.ones_like(tau), np.ones_like(tau)
+    for k in range(1, order):
+        term = term * tau / k
         total += term
     return 1.0 - total * np.exp(-tau)
 
@@ -183,11 +169,9 @@ def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     from scipy.linalg import solve_banded
 
     decay = np.exp(-dt / time_constant)
-    b1 = 1 - time_constant / dt * (1 - decay)
-    b0 = time_constant / dt * (1 - decay) - decay
+    b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
     driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
-    found: Array = solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven)
-    return found
+    return np.asarray(solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven))
 
 
 def white_noise(signal: Array) -> float:
@@ -195,18 +179,14 @@ def white_noise(signal: Array) -> float:
 
     An upper bound: what is left of the motion itself in the differences counts as noise.
     """
-    differences = np.diff(signal, 8)
-    if not len(differences):
-        return 0.0
-    gain = float(np.sqrt(12870))  # root of the sum of the squared weights of an eighth difference
-    return float(GAUSSIAN * np.median(np.abs(differences)) / gain)
+    differences = np.diff(signal, 8)  # the sum of whose squared weights is 12870
+    return float(GAUSSIAN * np.median(np.abs(differences)) / np.sqrt(12870)) if len(differences) else 0.0
 
 
 def block_means(signal: Array, size: int) -> Array:
     """Means of neighbouring blocks of `size` samples, shape (n // size,); the rest at the end is dropped."""
     count = len(signal) // size
-    means: Array = signal[: count * size].reshape(count, size).mean(axis=1)
-    return means
+    return np.asarray(signal[: count * size].reshape(count, size).mean(axis=1))
 
 
 def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
@@ -214,9 +194,8 @@ def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
     from scipy.signal import butter, cont2discrete, lfilter
 
     for order, cutoff in low_pass.sections:
-        numerator, denominator, _ = cont2discrete(
-            butter(order, 2 * np.pi * cutoff * dt, analog=True), 1.0, method="foh"
-        )
+        analog = butter(order, 2 * np.pi * cutoff * dt, analog=True)
+        numerator, denominator, _ = cont2discrete(analog, 1.0, method="foh")
         signal = lfilter(numerator.ravel(), denominator, signal - signal[0]) + signal[0]
     return signal
 
@@ -232,20 +211,16 @@ _SEGMENT = 8192
 
 
 def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> float:
-    """The cut-off [Hz] that passes what stands above the noise in both channels.
+    """The cut-off [Hz] that passes what stands above the noise in both channels of a stretch, each of shape (n,).
 
-    Args:
-        position: of the stretch that will be fitted, shape (n,).
-        force: likewise.
-        dt: their sampling period [s].
-        rate: fresh readings per second of the slower channel [1/s].
+    `dt` is their sampling period [s], `rate` the fresh readings per second of the slower one [1/s].
     """
     highest = FASTEST * rate
     if len(position) < FEWEST_SEGMENT:
         return highest
     edge = 2 * min(
         _edge(position, dt), _edge(force, dt)
-    )  # five lags in a row halve the power at 0.39 of their cut-off
+    )  # five lags halve the power at 0.39 of their cut-off
     lowest = min(highest, 10 / (len(position) * dt))
     return float(np.clip(edge, max(lowest, highest / 50), highest))
 
@@ -253,12 +228,8 @@ def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> floa
 def _edge(signal: Array, dt: float) -> float:
     """The highest frequency at which the spectrum stands well above its own floor near the end of the band [Hz]."""
     size = min(len(signal), _SEGMENT)
-    window = np.hanning(size)
-    hop = max(size // 2, 1)
-    starts = range(0, len(signal) - size + 1, hop)
-    power = np.zeros(size // 2 + 1)
-    line = np.linspace(0, 1, size)
-    for begin in starts:
+    window, line, power = np.hanning(size), np.linspace(0, 1, size), np.zeros(size // 2 + 1)
+    for begin in range(0, len(signal) - size + 1, max(size // 2, 1)):
         part = signal[begin : begin + size]
         part = part - part[0] - line * (part[-1] - part[0])
         power += np.abs(np.fft.rfft(part * window)) ** 2

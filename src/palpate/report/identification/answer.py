@@ -38,8 +38,7 @@ from palpate.report.identification.words import (
     unit_warnings,
 )
 from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
-from palpate.report.page import CommandAnswer
-from palpate.report.terminal import print_hanging
+from palpate.report.page import CommandAnswer, print_hanging
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 

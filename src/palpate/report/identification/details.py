@@ -1,7 +1,5 @@
 """All evidence of an identification on the terminal: parameters, reasons, warnings, uncertainty budgets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple
 

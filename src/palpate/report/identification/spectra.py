@@ -1,7 +1,5 @@
 """Residual of a model by frequency, and a test whether it is noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any

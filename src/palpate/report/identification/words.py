@@ -1,7 +1,5 @@
 """An identification in words: the sentence, then each number and its limits."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Many logs in a sentence and as tables: of every output, and of a paper."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

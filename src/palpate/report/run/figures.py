@@ -1,7 +1,5 @@
 """Charts of a run: of its figures and of its page alike."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +12,9 @@ from palpate.bench.summary import CONTACT, LOST
 from palpate.files import write_text
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import PageAnswer, answer_page
 from palpate.report.chart import KNOWN, Band, Chart, Interval, Mark, Series, figure_of, panels
 from palpate.report.numbers import NONE, quantity
-from palpate.report.page import Table
+from palpate.report.page import PageAnswer, Table, answer_page
 from palpate.report.run.table import alerts, sentence, settling
 from palpate.signals.types import NORMAL
 
@@ -110,7 +107,7 @@ def charts_of(record: Record) -> dict[str, Chart]:
             record[f"{name}_matched"] + sign * NORMAL * record[f"{name}_matched_std"] for sign in (-1.0, 1.0)
         ]
         charts[name] = _chart(
-            title, f"{name} [{unit}]", [Series(t, value, name, "on line")], _known(truth.get(name)),
+            title, f"{name} [{unit}]", [Series(t, value, name, "on line")], _true_value(truth.get(name)),
             intervals=[interval], ylim=_settled_range(record, late, truth.get(name)), marks=lost,
         )  # fmt: skip
     fronts = {"thesis": ("measured", "--", "thesis' signals"), "raw": ("measured", "", "raw signals")}
@@ -121,7 +118,7 @@ def charts_of(record: Record) -> dict[str, Chart]:
             Series(t, estimate(f"K_{front}"), colour, label, 1.6 if front == "matched" else 1.1, dash)
             for front, (colour, dash, label) in fronts.items()
         ],
-        _known(truth.get("K")), marks=lost,
+        _true_value(truth.get("K")), marks=lost,
         ylim=_settled_range(record, [record[f"K_{front}"] for front in fronts], truth.get("K")),
     )  # fmt: skip
     return charts
@@ -133,7 +130,7 @@ def _chart(
     return Chart(y, [one for one in series if one is not None], bands, title=title, x="time [s]", **more)
 
 
-def _known(value: float | None) -> list[Band]:
+def _true_value(value: float | None) -> list[Band]:
     return [] if value is None else [Band(value, value, label="truth", **KNOWN)]
 
 

@@ -1,7 +1,5 @@
 """A serial arm out of a MuJoCo model: the joints from the world to a site, and all that they carry."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path

@@ -3,8 +3,6 @@
 Meshes of URDF are left out: they say nothing of how an arm moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib.resources import files
 from math import inf

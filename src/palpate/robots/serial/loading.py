@@ -1,7 +1,5 @@
 """A MuJoCo model from its source, with the inertias as they are published, and refusals in one line."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Any serial arm for use outside a control loop: arrays in, arrays out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -95,7 +93,7 @@ class SerialArm(Readable):
         _check_moves(self)
 
     @classmethod
-    def named(cls, name: str) -> SerialArm:
+    def named(cls, name: str) -> "SerialArm":
         """An arm that comes with palpate: ur5e, panda, fr3, iiwa14.
 
         Raises:
@@ -106,7 +104,7 @@ class SerialArm(Readable):
         return load_shipped(name)
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> SerialArm:
+    def from_toml(cls, path: str | Path) -> "SerialArm":
         """An arm from a file as those that come with palpate.
 
         Raises:
@@ -117,7 +115,7 @@ class SerialArm(Readable):
         return read(Path(path))
 
     @classmethod
-    def from_mujoco(cls, model: Any, site: str | None = None) -> SerialArm:
+    def from_mujoco(cls, model: Any, site: str | None = None) -> "SerialArm":
         """An arm from MJCF, or from a `mujoco.MjModel`; needs the extra `arms`.
 
         Args:
@@ -132,7 +130,7 @@ class SerialArm(Readable):
         return from_mujoco(model, site)
 
     @classmethod
-    def from_urdf(cls, path: str | Path, link: str) -> SerialArm:
+    def from_urdf(cls, path: str | Path, link: str) -> "SerialArm":
         """An arm from URDF, its tip the origin of a link; read by MuJoCo, needs the extra `arms`.
 
         Meshes are neither needed nor read.
