@@ -54,9 +54,9 @@ def answer(problem: Problem, model: Model) -> Answer:
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
         return plain
-    apart = of_another(found.theta, found.budget, plain.theta, plain.budget)
-    best = found if found.half_of("K") < plain.half_of("K") else plain
-    return replace(best, budget={**best.budget, "touch": apart})
+    apart = of_another(found.theta, found.budget, plain.theta, plain.budget)  # it alone rests on the approach
+    found = replace(found, budget={**found.budget, "touch": apart})
+    return found if found.half_of("K") < plain.half_of("K") else plain
 
 
 def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
@@ -133,12 +133,13 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
     at = problem.motion.instants.astype(np.intp)
     way = problem.motion.position[at[~inside[at]]]  # in which the surface lies
     theta = dict(zip(known.names, found.theta, strict=True))
-    surface = 0.0
+    surface, use = 0.0, None
     for _ in range(_ROUNDS if len(way) else 0):
         motion = from_surface(problem.motion, inside, surface)
         local = Linearisation.of(
-            replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}
+            replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}, use
         )
+        use = local.use  # else an octave that comes and goes keeps the surface from resting
         solution = estimate(local.system)
         theta = dict(zip(local.names, solution.theta, strict=True))
         i = local.names.index(TOUCH)
