@@ -216,16 +216,16 @@ def test_coulomb_has_a_straight_line_through_zero(v, share):
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
 def test_levels_must_be_positive(name, value):
     with pytest.raises(InputError, match=f"{name} of the friction must be positive, got"):
-        JOINTS._replace(**{name: Vec3(1.0, value, 1.0)}).checked()
+        JOINTS._replace(**{name: Vec3(1.0, value, 1.0)}).validate()
 
 
 @pytest.mark.parametrize("name", ["sigma0", "sigma1", "sigma2"])
 def test_sigmas_must_not_be_negative(name):
     with pytest.raises(InputError, match=f"{name} of the friction must be zero or positive, got -1"):
-        ONE._replace(**{name: -1.0}).checked()
+        ONE._replace(**{name: -1.0}).validate()
 
 
 def test_static_must_not_lie_under_coulomb():
     with pytest.raises(InputError, match="static - coulomb of the friction must be zero or positive"):
-        ONE._replace(static=0.2).checked()
-    assert JOINTS.checked() is JOINTS
+        ONE._replace(static=0.2).validate()
+    assert JOINTS.validate() is JOINTS

@@ -88,7 +88,7 @@ class LuGre(NamedTuple):
             self.asymmetry,
         )
 
-    def checked(self):
+    def validate(self):
         """Itself; an InputError where a value is out of its range."""
         for name in ("coulomb", "static", "stribeck"):
             _require(name, getattr(self, name), "positive", lambda v: v > 0.0)

@@ -63,7 +63,7 @@ def test_friction_is_higher_forward_than_backward_by_its_asymmetry():
     assert tuple(uneven.steady(-v)) == pytest.approx([-0.75 * x for x in LuGre().steady(v)])
     assert uneven.scaled_by(2.0).asymmetry == 0.25
     with pytest.raises(InputError, match="asymmetry"):
-        LuGre(asymmetry=1.0).checked()
+        LuGre(asymmetry=1.0).validate()
 
 
 def test_what_lies_beyond_the_sensor_is_read_as_its_mass_times_its_acceleration():

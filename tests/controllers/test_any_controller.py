@@ -5,7 +5,7 @@ import pytest
 
 from palpate._vector import ZERO3, Vec3
 from palpate.controllers import Hybrid, alone, join
-from palpate.controllers.any_controller import members
+from palpate.controllers.controller import members
 from palpate.errors import InputError
 from palpate.robots.arm3 import Arm3
 from palpate.signals.types import Sense, Task

@@ -15,7 +15,7 @@ from palpate.files import MADE, check_place, fresh_folder, ours, whole, with_aut
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import PageAnswer, answer_page
+from palpate.report.page import PageAnswer, answer_page
 
 
 def names(folder):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,14 +13,14 @@ from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
 from palpate.identification.estimators.octaves import segments_of
-from palpate.identification.evidence.press import press_of
+from palpate.identification.evidence.press import evidence_of, press_of
 from palpate.identification.evidence.slope import Loading, slope_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
 from palpate.identification.filters.state_variable import low_pass_once
 from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
-from palpate.identification.steady_press import WINDOW, Curve, slopes_at
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.steady_press import WINDOW, Curve, Slopes, SteadyPress, slopes_at
+from palpate.identification.uncertainty import Contribution, Measurement
 
 DT = 1e-3
 COUNT = 6000
@@ -322,6 +324,42 @@ def test_several_presses_foretell_the_next():
     assert low < mean_low < point.stiffness.value < mean_high < high
     assert 3000 < low < 4500
     assert 5500 < high < 7000
+
+
+@pytest.mark.parametrize("play", [0.0, 5e-5])
+def test_play_before_the_position_sensor_is_in_the_interval_of_an_octave(play):
+    """Steps of 0.6 mm: over 0.55 mm that are read the force is a tenth stiffer, and only its friction says so."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0, 12, DT)
+    target = np.where(time < 0.5, -5e-4, 7e-4 + 3e-4 * np.sign(np.sin(2 * np.pi * 0.7 * time)))
+    x, read = np.empty_like(time), np.empty_like(time)
+    speed, at = 0.0, target[0]
+    back = at
+    for i, to in enumerate(target):
+        speed += DT * (900 * (to - at) - 60 * speed)
+        at += DT * speed
+        back = min(max(back, at - play / 2), at + play / 2)
+        x[i], read[i] = at, back
+    force = 3000 * np.maximum(x, 0) + rng.normal(0, 0.01, len(x))
+    found = identify(record(time, read + rng.normal(0, 2e-7, len(x)), force), lag=0.0).working_point
+    low, high = found.stiffness.ci95
+    assert found.source == "octave"
+    assert low < 3000 < high
+    assert high - low < (1500 if play else 60)
+
+
+@pytest.mark.parametrize(("claimed", "half"), [(5000.0, 10.0), (9000.0, 4000.0)])
+def test_strokes_at_constant_speed_are_no_more_certain_than_the_other_loadings_agree(claimed, half):
+    """A surface that has yielded is stiffer in its second stroke, and that alone may go at constant speed."""
+    time, x = press_path(2.0)
+    force = 5000 * np.maximum(x, 0) + np.random.default_rng(0).normal(0, 0.02, len(x))
+    asked = problem(record(time, x, force), 0.0)
+    stroke = Measurement(claimed, {"noise": Contribution.within(10.0), "repetition": Contribution(0.0)})
+    press = SteadyPress(Slopes(5.0, 1e-3, stroke, (claimed,), None, 1.0), (), *np.empty((2, 2, 1)))
+    asked = replace(asked, contacts=replace(asked.contacts, press=press))
+    found = evidence_of(asked, Options.of(), "N/m")[2].stiffness
+    assert found.value == claimed
+    assert found.ci95 == pytest.approx((claimed - half, claimed + half), abs=60)
 
 
 def test_the_json_of_all_of_it():

@@ -89,7 +89,7 @@ def test_a_power_of_the_depth_is_refused_where_no_surface_is_seen():
 @pytest.mark.parametrize("source", ["octave", "press"])
 def test_half_the_force_shows_half_the_stiffness(source):
     own = problem(tissue(TIME, once))
-    point = evidence_of(own, Options.of(), "N/m", 0.0)[2]
+    point = evidence_of(own, Options.of(), "N/m")[2]
     assert point is not None
     point = replace(point, source=source)
     own = own.with_touches if source == "press" else own

@@ -24,7 +24,7 @@ from palpate.identification.uncertainty import (
 def answer(names, theta, cov):
     """Parameters with a covariance alone."""
     budget = {"noise": Spread(np.diag(cov))}
-    return Answer(names, np.asarray(theta), cov, budget, None, 1.0, 0.0, 0.0, 0.0, None)
+    return Answer(names, np.asarray(theta), cov, budget, None, 1.0, 0.0, 0.0, 0.0, np.empty((0, 0)), None)
 
 
 def test_the_end_gauge_of_annex_h1():

@@ -206,13 +206,13 @@ def test_frames_of_transforms(tmp_path):
 
 
 @pytest.mark.long
-def test_ten_thousand_columns(tmp_path):
-    """Each column used to be looked for in the file by itself."""
+@pytest.mark.parametrize("names", [("c",), ("position_", "force_")])
+def test_ten_thousand_columns(tmp_path, names):
+    """Each column used to be looked for in the file by itself, and later to be compared with all others."""
     path = tmp_path / "wide.csv"
-    rows = 1e-3 * np.arange(10)[:, None] + np.arange(10_000)
-    np.savetxt(
-        path, rows, delimiter=",", header=",".join(f"c{i}" for i in range(10_000)), comments="", fmt="%.3f"
-    )
+    rows = 1e-3 * np.arange(10)[:, None] ** (1 + np.arange(10_000) % 2) + np.arange(10_000)
+    header = ",".join(f"{names[i % len(names)]}{i}" for i in range(10_000))
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.3f")
     listing = list_log(path)
     assert len(listing.entries) == 10_000
     assert all(entry.count == 10 for entry in listing.entries)

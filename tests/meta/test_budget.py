@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=257, lines=49985, tokens=340855),
+    "src/palpate": Weight(files=256, lines=49850, tokens=340855),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1926, tokens=12577),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=9499, tokens=78911),
@@ -40,7 +40,7 @@ LARGEST = {
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 37, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 35, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 UNTESTED = 240
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""

@@ -186,7 +186,7 @@ def _plant(arm: Arm3, e: Experiment) -> Plant:
         triple(f.static),
         triple(f.stribeck),
         float(f.asymmetry),
-    ).checked()
+    ).validate()
     side = StickSlip(e.wall.side_stiffness, e.wall.side_damping, e.wall.side_friction)
     mode = RIGID if e.elastic is None else elastic_mode(**msgspec.structs.asdict(e.elastic))
     beyond = float(e.force_sensor.beyond)

@@ -5,9 +5,8 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Literal
 
-from palpate.cli.options import options
 from palpate.cli.options.common import WRITTEN, FileOptions
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, options
 from palpate.errors import InputError
 
 

@@ -13,10 +13,9 @@ from cyclopts import Parameter
 from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
-from palpate.cli.options import options
 from palpate.cli.options.common import WRITTEN, CellOptions, PictureOptions
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.errors import InputError, PalpateError
 from palpate.files import check_place, write_text
 

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.cli._program import print_result
-from palpate.cli.options import options
 from palpate.cli.options.common import WRITTEN, CellOptions, FileOptions, ReportOption
 from palpate.cli.options.log import FrameOptions, LogOptions
-from palpate.cli.options.values import Point, si
+from palpate.cli.options.values import Point, options, si
 from palpate.errors import InputError
 from palpate.files import write_text
 

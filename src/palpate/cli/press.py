@@ -9,9 +9,9 @@ from palpate.cli import _terminal
 from palpate.cli._program import command, option_of, print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
-from palpate.cli.options import options, values
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options, si
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable

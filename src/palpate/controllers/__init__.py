@@ -4,9 +4,15 @@ A controller is a part: a frozen NamedTuple of gains with ``start()``, the state
 ``step(state, sense, task, model) -> (torque, state)``. Gains are `Vec3` for the planar arm, or arrays of shape (m,).
 """
 
-from palpate.controllers.any_controller import AnyController, alone, controller_of, join
 from palpate.controllers.cautious_press import CautiousController, CautiousPress, cautious_on_bench
-from palpate.controllers.controller import ControllerTable, controller
+from palpate.controllers.controller import (
+    AnyController,
+    ControllerTable,
+    alone,
+    controller,
+    controller_of,
+    join,
+)
 from palpate.controllers.decoupled_hybrid import DecoupledHybrid, DecoupledHybridController
 from palpate.controllers.hybrid import Hybrid, HybridController
 from palpate.controllers.impedance import Impedance, ImpedanceController

@@ -30,6 +30,8 @@ _CAUSES = {
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
     ),
+    "loadings": Cause("differences between loadings", "press more often, at one speed", "A"),
+    "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
     "blocks": Cause(

@@ -282,15 +282,11 @@ def steady_press(
     windows = [(level - NEAR, min(level + NEAR, 1.0)) for level in LEVELS]
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
     known = tuple(own for own in others if own.stiffness.known_to(1.0))
-    pairs = [[own for own in curves if own.loads is loads] for loads in (True, False)]
-    return SteadyPress(headline, known, *(_draw(own) for own in pairs))
-
-
-def _draw(curves: Sequence[Curve]) -> Array:
-    if not curves:
-        return np.empty((2, 0))
-    curve = max(curves, key=lambda own: own.span)
-    return few_points(np.stack([curve.depth, curve.force]))
+    drawn = []
+    for loads in (True, False):
+        longest = max((own for own in curves if own.loads is loads), key=lambda own: own.span, default=None)
+        drawn.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
+    return SteadyPress(headline, known, *map(few_points, drawn))
 
 
 def few_points(curve: Array) -> Array:
@@ -389,9 +385,8 @@ class _Window:
             return self
         x = self.middle + self.reach * self.scaled[near]
         middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
-        return _Window(
-            self.time[near], (x - middle) / reach, self.force[near], self.drift[near], middle, reach
-        )
+        time, force, drift = self.time[near], self.force[near], self.drift[near]
+        return _Window(time, (x - middle) / reach, force, drift, middle, reach)
 
 
 def _within(curve: Curve, low: float, high: float) -> _Window | None:

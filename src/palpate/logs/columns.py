@@ -52,6 +52,16 @@ class ColumnStatistics:
         return self.values if mark is None else np.where(self.values == mark, np.nan, self.values)
 
     @cached_property
+    def unit_readings(self) -> Array:
+        """The readings about their mean, of unit length, shape (n,); NaN where one is missing or all are equal."""
+        return _of_unit_length(self.readings)
+
+    @cached_property
+    def unit_rate(self) -> Array:
+        """Likewise of the readings' rate, from row to row."""
+        return _of_unit_length(np.gradient(self.unit_readings))
+
+    @cached_property
     def step(self) -> float:
         """From value to value, the typical one."""
         step = np.diff(self.values)
@@ -102,6 +112,13 @@ class ColumnStatistics:
         fits = symbol is not None and known_unit(symbol) and unit(symbol).quantity == quantity
         contradicts = bool(self.unit) and not fits and self.unit != "1"
         return 2 * fits + bool(re.search(NAMES[role], self.name, re.I)) - 3 * contradicts
+
+
+def _of_unit_length(values: Array) -> Array:
+    if not (np.isfinite(values).all() and np.ptp(values) > 0):
+        return np.full(len(values), np.nan)
+    away = values - values.mean()
+    return away / float(np.linalg.norm(away))
 
 
 def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float:
@@ -155,11 +172,10 @@ def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
 
 def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
     """Whether a column is the velocity of a position rather than one itself."""
-    a, b = column.readings, position.readings
-    if len(a) != len(b) or not (np.isfinite(a).all() and np.isfinite(b).all()):
-        return False
-    rate = np.gradient(b)
-    return bool(np.ptp(rate) > 0 and np.ptp(a) > 0 and np.corrcoef(a, rate)[0, 1] > _RATE)
+    return (
+        len(column.values) == len(position.values)
+        and float(column.unit_readings @ position.unit_rate) > _RATE
+    )
 
 
 def roughness(column: ColumnStatistics) -> float:

@@ -4,6 +4,8 @@ import re
 import shlex
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from hashlib import blake2b
+from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,8 @@ the rows and is noise in the others, so that a contact over a ninth of the log i
 _COHERENT = 0.5
 """Share of the power of a column that is named a force above which it follows a filtered position: of two columns of
 noise it is under a tenth (`explained_power`)."""
+_PAIRS = 800
+"""Most pairs of columns that are compared, the 780 of 40 columns without names among them: that takes seconds."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
 _JOINTS_ONLY = (
     "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
@@ -101,7 +105,10 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return Proposal(None, (_JOINTS_ONLY,))
     others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
-    others = [own for i, own in enumerate(others) if not any(_same(own, other) for other in others[:i])]
+    unique: dict[tuple[bool, bool, bytes], ColumnStatistics] = {}
+    for column in others:
+        unique.setdefault(_identity(column), column)
+    others = list(unique.values())
     space = _in_space(table, others, guesses)
     if space:
         return Proposal({**options, **timing, **space}, tuple(guesses))
@@ -113,13 +120,13 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
 
 
-def _same(own: ColumnStatistics, other: ColumnStatistics) -> bool:
-    """Whether a column repeats another's numbers, and its name is of the same quantity: 1 N/mm has them, too."""
-    quantity = [
-        [bool(re.search(NAMES[kind], c.name, re.IGNORECASE)) for kind in ("position", "force")]
-        for c in (own, other)
-    ]
-    return quantity[0] == quantity[1] and np.array_equal(own.values, other.values, equal_nan=True)
+def _identity(column: ColumnStatistics) -> tuple[bool, bool, bytes]:
+    """Quantities of a column's name, and a digest of its numbers: those of 1 N/mm are the same in two quantities."""
+    position, force = (
+        bool(re.search(NAMES[kind], column.name, re.IGNORECASE)) for kind in ("position", "force")
+    )
+    numbers = np.where(np.isnan(column.values), np.nan, column.values) + 0.0  # one NaN, one zero
+    return position, force, blake2b(numbers).digest()
 
 
 def _stem(column: ColumnStatistics) -> str:
@@ -225,14 +232,13 @@ def _pair(
         [column for column in moving if column not in forces[:1]],
         lambda column: column.score("position", "length"),
     )
+    places = places[:_PAIRS]
     places = [own for own in places if not any(own is not p and is_rate(own, p) for p in places)]
-    pairs = [(a, b) for a in places or moving for b in forces or columns if a is not b]
+    candidates = ((a, b) for a in places or moving for b in forces or columns if a is not b)
     by_name = bool(places and forces)
-    if not (places or forces):
-        pairs = [(a, b) for i, a in enumerate(moving[:40]) for b in moving[i + 1 : 40]]
     follow = [
         pair
-        for pair in pairs[:800]
+        for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _PAIRS)
         if rank_correlation(*pair) > _FOLLOWS or (by_name and explained_power(*pair) > _COHERENT)
     ]
     pairs = [pair for pair in follow if not is_one_reading(*pair)]

@@ -1,12 +1,13 @@
-"""A page that opens without a network: everything it shows is in it."""
+"""A page that opens without a network: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
 
 from __future__ import annotations
 
 import base64
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from math import ceil, floor, inf, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,9 @@ from rich.console import Console
 from rich.text import Text
 
 from palpate.files import SIGNATURE
-from palpate.text import OPTION
+from palpate.report.chart import page_figures
+from palpate.report.numbers import quantity
+from palpate.text import OPTION, printable
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -124,3 +127,181 @@ def print_hanging(lines: Iterable[Text], console: Console) -> None:
                 console.print(Text(" " * indent).append(part))
         else:
             console.print(line, soft_wrap=True)
+
+
+@dataclass(frozen=True)
+class Card:
+    """One number: its name, its unit and half-width, its verdict, and what limits it or what it is of.
+
+    Args:
+        name: of the quantity.
+        number: text; empty for none.
+        unit, half: of it.
+        why: a sentence.
+        tone: `ok`, `warn`, `none` or `fail`; empty without a verdict.
+        verdict: the word for it.
+        colour: the quantity's, `K`, `B` or `M`.
+    """
+
+    name: str
+    number: str = ""
+    unit: str = ""
+    half: str = ""
+    why: str = ""
+    tone: str = ""
+    verdict: str = ""
+    colour: str = ""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """A stretch of a logarithmic scale.
+
+    Args:
+        name: of the row.
+        low, high: ends; 0 and infinite are open.
+        kind: `proved`, `estimate`, `assumed` or `exact`.
+        text: what stands at the row's right.
+    """
+
+    name: str
+    low: float
+    high: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class PageAnswer:
+    """Content of a page.
+
+    Args:
+        title: what it is of.
+        sentence: the answer.
+        about: how it came about.
+        alerts: what is wrong: tone, title, text and advice.
+        cards: groups of cards, by the title of each, which may be empty.
+        lower: likewise, below the figures.
+        scale: `log_scale`; None without.
+        pairs: pictures that stand beside each other: source and caption.
+        figures: as `report.chart.page_figures` takes them.
+        tables: below the cards, above the figures.
+        folds: tables that are folded: title, a word about them, rows.
+        source: a file's text, and its title.
+    """
+
+    title: str
+    sentence: str
+    about: str = ""
+    alerts: Sequence[Mapping[str, str]] = ()
+    cards: Mapping[str, Sequence[Card]] = field(default_factory=dict)
+    lower: Mapping[str, Sequence[Card]] = field(default_factory=dict)
+    scale: Mapping[str, Any] | None = None
+    pairs: Sequence[Mapping[str, str]] = ()
+    figures: Sequence[Mapping[str, Any]] = ()
+    tables: Sequence[Table] = ()
+    folds: Sequence[tuple[str, str, Sequence[Sequence[str]]]] = ()
+    source: tuple[str, str] = ("", "")
+
+
+def warning_alerts(notes: Iterable[str]) -> list[dict[str, str]]:
+    """Warnings of a page, each a sentence, whether its capital and its full stop are there or not."""
+    return [
+        {"tone": "warn", "title": "", "text": f"{note[:1].upper()}{note[1:].removesuffix('.')}."}
+        for note in notes
+    ]
+
+
+def answer_page(
+    answer: PageAnswer,
+    *,
+    room: str,
+    command: str,
+    package: str = "",
+    codes: Sequence[str] = (),
+    **values: Any,
+) -> str:
+    """The page as HTML.
+
+    Args:
+        answer: its content.
+        room: what it is of, in the page's head.
+        command: that made it.
+        package: of a template with the room's name, which extends `page.html`; none where there is nothing to add.
+        codes: scripts of that template, beside the page's own.
+        values: what that template shows.
+    """
+    shown = page_figures(answer.figures)
+    return render(
+        f"{room}.html" if package else "page.html",
+        *filter(None, [package]),
+        title=printable(answer.title),
+        sentence=printable(answer.sentence),
+        about=printable(answer.about),
+        alerts=answer.alerts,
+        cards=_groups(answer.cards),
+        lower=_groups(answer.lower),
+        scale=answer.scale,
+        pairs=answer.pairs,
+        folds=[{"title": title, "about": about, "rows": rows} for title, about, rows in answer.folds if rows],
+        source=answer.source[1],
+        source_title=answer.source[0],
+        tables=answer.tables,
+        room=room,
+        command=printable(command),
+        **shown | {"scripts": (*shown["scripts"], *codes)},
+        **values,
+    )
+
+
+def _groups(groups: Mapping[str, Sequence[Card]]) -> list[dict[str, Any]]:
+    return [
+        {"title": title, "cards": [asdict(card) for card in cards]}
+        for title, cards in groups.items()
+        if cards
+    ]
+
+
+def log_scale(
+    title: str, caption: str, unit: str, extents: Sequence[Extent], mark: float | None = None
+) -> dict[str, Any]:
+    """Stretches under each other over one logarithmic axis, as plain values in per cent of its width.
+
+    Args:
+        title: of the whole.
+        caption: under it.
+        unit: of the axis.
+        extents: the rows.
+        mark: where a line goes through all of them; None for none.
+    """
+    ends = [end for e in extents for end in (e.low, e.high) if 0.0 < end < inf] + ([mark] if mark else [])
+    low, high = floor(log10(min(ends)) - 0.2), ceil(log10(max(ends)) + 0.2)
+
+    def place(value: float) -> float:
+        if not isfinite(value):
+            return 100.0
+        return (
+            round(100.0 * min(max((log10(value) - low) / (high - low), 0.0), 1.0), 2) if value > 0.0 else 0.0
+        )
+
+    rows = [
+        {
+            "name": e.name,
+            "text": e.text,
+            "kind": e.kind,
+            "left": place(e.low),
+            "width": round(place(e.high) - place(e.low), 2),
+            "open_low": e.low <= 10.0**low,
+            "open_high": e.high >= 10.0**high,
+        }
+        for e in extents
+    ]
+    powers = range(low, high + 1)
+    ticks = [{"at": place(10.0**n), "text": quantity(10.0**n, unit)} for n in powers]
+    return {
+        "title": title,
+        "caption": caption,
+        "rows": rows,
+        "ticks": ticks,
+        "mark": place(mark) if mark else None,
+    }

@@ -14,13 +14,20 @@ from palpate.press.pressing import Asked
 from palpate.press.setting import Place
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity
-from palpate.report.page import CommandAnswer, Table, data_address
+from palpate.report.page import (
+    Card,
+    CommandAnswer,
+    PageAnswer,
+    Table,
+    answer_page,
+    data_address,
+    warning_alerts,
+)
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm

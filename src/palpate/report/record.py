@@ -9,11 +9,10 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
-from palpate.report.answer import PageAnswer, answer_page
 from palpate.report.chart import Chart, Series, figure_of, panels
 from palpate.report.look.assets import with_peaks
 from palpate.report.numbers import as_html, as_text
-from palpate.report.page import Table
+from palpate.report.page import PageAnswer, Table, answer_page
 from palpate.text import printable
 
 if TYPE_CHECKING:

@@ -12,10 +12,18 @@ from rich.text import Text
 from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
-from palpate.report.answer import Card, Extent, PageAnswer, answer_page, log_scale, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
-from palpate.report.page import CommandAnswer, print_hanging
+from palpate.report.page import (
+    Card,
+    CommandAnswer,
+    Extent,
+    PageAnswer,
+    answer_page,
+    log_scale,
+    print_hanging,
+    warning_alerts,
+)
 from palpate.text import printable
 
 if TYPE_CHECKING:

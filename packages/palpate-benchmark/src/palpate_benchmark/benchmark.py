@@ -9,9 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from palpate.cli.options import options
 from palpate.cli.options.common import PluginOptions
-from palpate.cli.options.values import FLAG, WHOLE, Force, StiffnessRange, quantity_default, spread_default
+from palpate.cli.options.values import (
+    FLAG,
+    WHOLE,
+    Force,
+    StiffnessRange,
+    options,
+    quantity_default,
+    spread_default,
+)
 from palpate.cli.toolkit import (
     COMPILING,
     command,

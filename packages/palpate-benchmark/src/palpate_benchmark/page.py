@@ -8,8 +8,7 @@ import numpy as np
 
 from palpate.files import with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.answer import PageAnswer, answer_page
-from palpate.report.page import Table, with_captions
+from palpate.report.page import PageAnswer, Table, answer_page, with_captions
 from palpate_benchmark.simulated import ForceResult
 from palpate_benchmark.summary import (
     as_values,

@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from palpate.cli.options import options
 from palpate.cli.options.common import ReportOption
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
-from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, si
+from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, options, si
 from palpate.cli.toolkit import command, console, print_lines, print_result
 from palpate.errors import InputError
 from palpate.files import MADE, read_text, write_text

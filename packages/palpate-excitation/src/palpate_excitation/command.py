@@ -6,9 +6,9 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from palpate.cli.options import options, values
+from palpate.cli.options import values
 from palpate.cli.options.common import WRITTEN, FileOptions, PictureOptions
-from palpate.cli.options.values import FLAG, SIGNED, si
+from palpate.cli.options.values import FLAG, SIGNED, options, si
 from palpate.cli.toolkit import command, print_result
 from palpate.errors import InputError
 from palpate.files import write_text

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, validators
 
-from palpate.cli.options import options
 from palpate.cli.options.common import FolderOptions
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.cli.toolkit import console, place, print_answer, progress_of_pieces, say, show_table
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ import numpy as np
 
 from palpate.files import MADE, with_author, write_json, write_text
 from palpate.report import style
-from palpate.report.answer import PageAnswer, answer_page, warning_alerts
-from palpate.report.page import Table, with_captions
+from palpate.report.page import PageAnswer, Table, answer_page, warning_alerts, with_captions
 from palpate_laboratory.judge import Judged
 from palpate_laboratory.result import (
     Contradiction,

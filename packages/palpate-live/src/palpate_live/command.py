@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from palpate.cli.options import options
 from palpate.cli.options.common import QUIET, Experiment, PluginOptions, SerialArm
 from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options
 from palpate.cli.toolkit import COMPILING, print_lines, say
 from palpate.errors import InputError
 

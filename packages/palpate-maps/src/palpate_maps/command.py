@@ -12,10 +12,9 @@ from cyclopts import Group
 
 from palpate.cli._streams import notice_signals
 from palpate.cli.identify import OneLog
-from palpate.cli.options import options
 from palpate.cli.options.common import QUIET, WRITTEN, JsonOption, ReportOption
 from palpate.cli.options.log import ArmOptions, FrameOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, Length, Stiffness, quantity, si
+from palpate.cli.options.values import FLAG, Length, Stiffness, options, quantity, si
 from palpate.cli.toolkit import bar, command, console, print_result
 from palpate.errors import InputError
 from palpate.files import check_place, fresh_folder, with_author, write_json, write_text

@@ -8,11 +8,18 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.chart import KNOWN, Band, Chart, Series, panels
 from palpate.report.look.assets import data, text_of
 from palpate.report.numbers import plain, quantity, quantity_between
-from palpate.report.page import CommandAnswer, Table, data_address
+from palpate.report.page import (
+    Card,
+    CommandAnswer,
+    PageAnswer,
+    Table,
+    answer_page,
+    data_address,
+    warning_alerts,
+)
 from palpate.report.style import svg
 from palpate_maps.presses import AXES
 from palpate_maps.result import Lump, MapResult

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from palpate.cli.options import options
 from palpate.cli.options.common import (
     QUIET,
     FigureOptions,
@@ -22,7 +21,7 @@ from palpate.cli.options.common import (
     shipped_names,
     source_of,
 )
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.cli.toolkit import (
     COMPILING,
     confirmed,

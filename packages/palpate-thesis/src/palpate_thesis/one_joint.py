@@ -264,7 +264,7 @@ def one_joint(
     """
     require_positive(rate=rate, steps=steps)
     force = force_input(ForceSensorTable(noise=noise), rate * steps)
-    joint = Joint(float(link.inertia), float(link.lever), link.friction.checked(), join(surface))
+    joint = Joint(float(link.inertia), float(link.lever), link.friction.validate(), join(surface))
     smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
     return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from palpate.cli._terminal import confirmed, console, print_lines
-from palpate.cli.options import options
-from palpate.cli.options.values import FLAG
+from palpate.cli.options.values import FLAG, options
 from palpate.errors import InputError
 from palpate.files import check_place, read_bytes
 from palpate.text import printable

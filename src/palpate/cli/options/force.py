@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from palpate.cli.options import options, values
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import FLAG, SIGNED
+from palpate.cli.options.values import FLAG, SIGNED, options
 from palpate.errors import InputError
 
 if TYPE_CHECKING:

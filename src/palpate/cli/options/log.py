@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from palpate.cli.options import options
 from palpate.cli.options.common import QUIET, Model
-from palpate.cli.options.values import FLAG, SIGNED, Angles, Interval, Point, lag_of, si, vector, with_std
+from palpate.cli.options.values import (
+    FLAG,
+    SIGNED,
+    Angles,
+    Interval,
+    Point,
+    lag_of,
+    options,
+    si,
+    vector,
+    with_std,
+)
 from palpate.errors import InputError
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
@@ -62,11 +71,6 @@ class FrameOptions:
         if self.force_sign is None:
             return None
         return -1 if self.force_sign in {"reaction", "-1"} else 1
-
-    @property
-    def of_space(self) -> bool:
-        """Whether an option was given that needs a wrench and a pose."""
-        return replace(self, force_sign=None) != FrameOptions()
 
     def frame(self, hung: Payload | None = None) -> ContactFrame | None:
         """The contact frame; None if not given."""

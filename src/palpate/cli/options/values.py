@@ -1,13 +1,14 @@
-"""Values of options: flags and whole numbers, quantities with units (`3:8:N/mm`, `15:N`, `10%`), VALUE:STD, x,y,z."""
+"""Groups of options and their values: flags, quantities with units (`3:8:N/mm`, `15:N`, `10%`), VALUE:STD, x,y,z."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import isfinite, isnan
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar, dataclass_transform
 
-from cyclopts import Parameter, Token
+from cyclopts import Group, Parameter, Token
 
 from palpate.errors import InputError, PalpateError, unknown
 from palpate.units import UNITS, unit
@@ -236,6 +237,18 @@ def _numbers(words: list[str]) -> list[float] | None:
 
 
 T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def options(group: str | Group, rank: int = 0) -> Callable[[type[T]], type[T]]:
+    """Makes a class a frozen dataclass of keyword options, under a heading of the help.
+
+    Args:
+        group: the heading, or a group that several classes share.
+        rank: of a new heading among those of a command.
+    """
+    heading = Group(group, sort_key=rank) if isinstance(group, str) else group
+    return lambda cls: Parameter(name="*", group=heading)(dataclass(frozen=True, kw_only=True)(cls))
 
 
 class Typed(str, Generic[T]):

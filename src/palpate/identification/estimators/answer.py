@@ -76,6 +76,7 @@ class Answer:
         unexplained: rms of what is left beyond the sensor's noise [N].
         hidden: share of the force's amplitude in contact that the other forces beside the model do not explain either.
         noise: mean square of what both channels' own noise leaves of the force [N^2].
+        friction: forces whose squares add up to the mean square of what may be friction, shape (m, f) [N].
         problem: the rows that it was fitted to.
     """
 
@@ -88,6 +89,7 @@ class Answer:
     unexplained: float
     hidden: float
     noise: float
+    friction: Array
     problem: Problem
 
     def __getitem__(self, name: str) -> float:

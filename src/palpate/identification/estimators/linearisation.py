@@ -54,6 +54,7 @@ class Linearisation:
         at: its parameters that they are formed about; none for a model that is linear in all of them.
         about: parameters that the column of the lag is formed with, by name.
         names: of the parameters: the model's own, then those of other forces.
+        friction: columns of those that are friction, shape (m, f).
         own: how many are the model's.
         prior: mean and deviation of what is known of some of them.
         segments: rows without a gap.
@@ -69,6 +70,7 @@ class Linearisation:
     at: dict[str, float]
     about: dict[str, float]
     names: tuple[str, ...]
+    friction: Array
     own: int
     prior: dict[str, tuple[float, float]]
     segments: list[Segment]
@@ -118,9 +120,23 @@ class Linearisation:
         if use is None:
             use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
         names = (*free, *effects, *bending)
+        friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
         return cls(
-            problem, model, lag, at, theta, names, len(free), prior, segments, octaves, use, noisy, system
+            problem,
+            model,
+            lag,
+            at,
+            theta,
+            names,
+            friction,
+            len(free),
+            prior,
+            segments,
+            octaves,
+            use,
+            noisy,
+            system,
         )
 
     @property
@@ -153,9 +169,8 @@ class Linearisation:
 
     def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
-        sensor, told = sensor_lines(
-            self.problem, self.segments, self.octaves, self.use, self.system, solution
-        )
+        lines = self.octaves, self.use, self.system
+        sensor, told = sensor_lines(self.problem, self.segments, *lines, solution)
         both = self._with_position(solution, sensor)
         explained, left, hidden = self._explained_part(
             solution, both
@@ -176,8 +191,17 @@ class Linearisation:
         noise = float(both @ self.system.lines) / max(float(self.system.lines.sum()), 1.0)
         cov = solution.cov[np.ix_(kept, kept)]
         return Answer(
-            names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise, self.problem
-        )
+            names, solution.theta[kept], cov, budget, predicted, explained, left, hidden, noise,
+            self._friction(solution), self.problem,
+        )  # fmt: skip
+
+    def _friction(self, solution: Solution) -> Array:
+        """Forces whose squares add up to the mean square of the friction's, its uncertainty included, shape (m, f)."""
+        places = [i for i, name in enumerate(self.names) if name.startswith(FRICTION)]
+        theta = solution.theta[places]
+        value, vector = np.linalg.eigh(solution.cov[np.ix_(places, places)] + np.outer(theta, theta))
+        found: Array = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
+        return found
 
     def _forces(self) -> list[list[int]]:
         """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
@@ -205,9 +229,8 @@ class Linearisation:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
         own = solution.theta * [name in self.model.derivatives for name in self.names]
         by_position = np.einsum("i,oij,j->o", own, self._position_noise(), own)
-        return np.asarray(
-            np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
-        )
+        both = sensor + by_position / np.maximum(self.system.lines, 1.0)
+        return np.asarray(np.minimum(both, solution.noise))
 
     def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.identification.estimators.answer import Answer
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
@@ -24,39 +25,28 @@ from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
 from palpate.identification.steady_press import Slopes, SteadyPress, few_points
-from palpate.identification.uncertainty import Measurement
+from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 
 
 def relaxation(
     problem: Problem, lag: float, segments: list[Segment], slope: Slopes | None
 ) -> Relaxation | None:
-    """Of the longest hold after a loading, what the position gives back by its slope left aside."""
-    depth = problem.motion.moved(0, lag)
-    speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
-    still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
-    best: tuple[int, int] | None = None
-    for s in segments:
-        for a, b in runs(still[s.first : s.last]):
-            if b - a >= 4 * FEWEST and a > 0 and (best is None or b - a > best[1] - best[0]):
-                best = (s.first + a, s.first + b)
-    if best is None:
-        return None
-    rows = slice(*best)
-    moved = depth[rows] - depth[best[1] - 1]
-    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
-    given, doubt = stiffness.value * moved, stiffness.half
-    return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
+    """Of the longest hold after a loading, what the position gives back by its slope left aside.
 
-
-def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
-    """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
-
-    The force, shape (n,) [N], is less what the position gives back meanwhile, of which `doubt` is not known [N]; the
-    time has the shape (n,) [s].
+    A monotone fall of the force; None if that is within its noise and the uncertainty of what the position gives back.
     """
     from scipy.optimize import isotonic_regression
 
+    depth, speed = problem.motion.moved(0, lag), problem.motion.moved(1, lag)
+    still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
+    holds = [(s.first + a, s.first + b) for s in segments for a, b in runs(still[s.first : s.last]) if a > 0]
+    first, last = max(holds, key=lambda hold: hold[1] - hold[0], default=(0, 0))
+    if last - first < 4 * FEWEST:
+        return None
+    moved, time = depth[first:last] - depth[last - 1], problem.time[first:last]
+    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
+    force, doubt = problem.force[first:last] - stiffness.value * moved, stiffness.half * float(np.ptp(moved))
     falls = np.asarray(isotonic_regression(force, increasing=False).x)
     noise = noise_of(force - falls, np.arange(len(force)), 2)
     few = max(len(force) // 20, 2)
@@ -177,27 +167,31 @@ def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) ->
 Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None]
 
 
-def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) -> Evidence:
+def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | None = None) -> Evidence:
     """Dynamic stiffness, press and working point of the surface.
 
     Args:
         problem: of the log.
         options: with the tolerance, and the stiffness in series with the surface.
         unit: of a stiffness.
-        hidden: share of the force's amplitude in contact that nothing explains, beyond its noise.
+        answer: with the forces beside the contact; None if nothing is known of them.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
         return (), None, None
     lag = problem.lag
-    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std)
+    at = problem.motion.instants
+    friction = (
+        [np.interp(at, answer.problem.motion.instants, own) for own in answer.friction.T] if answer else []
+    )
+    spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std, friction)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
     press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
-    headline = (
-        None if steady is None else replace(steady.headline, depth=steady.headline.depth - problem.origin)
-    )
+    headline = None
     if steady is not None:
+        headline = _among_loadings(steady.headline, whole)
+        headline = replace(headline, depth=headline.depth - problem.origin)
         press = at_constant_speed(steady, press, problem.origin)
     series = SeriesSpring.of(options)
     if series is not None:
@@ -206,7 +200,30 @@ def evidence_of(problem: Problem, options: Options, unit: str, hidden: float) ->
         headline = None if headline is None else series.slopes(headline)
     if headline is not None:
         return spectrum, press, point_of(headline, "press", problem, options, unit)
-    return spectrum, press, working_point(whole, spectrum, options, unit, hidden)
+    return spectrum, press, working_point(whole, spectrum, options, unit, answer.hidden if answer else 0.0)
+
+
+def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
+    """A tangent of strokes at constant speed, no more certain than the log's other loadings agree with it.
+
+    The square of their difference, less what their intervals let it be, is the variance between them (Paule and Mandel,
+    1982, of two): a stroke may be the second on a surface that has yielded.
+    """
+    segments, lag = segments_of(problem.motion.rows, problem.spans), problem.lag.value
+    loadings = loadings_in(problem, lag, segments)
+    if not loadings:
+        return headline
+    rest = 0.0 if problem.counted else problem.contacts.resting
+    low, high = np.percentile(np.concatenate([own.force for own in loadings]), [2, 98])
+    level = (headline.force + rest - low) / (high - low or 1.0)
+    other = slope_between(loadings, read_later(problem, lag, segments, loadings), level)
+    if other is None:
+        return headline
+    own, both = headline.stiffness, other.stiffness
+    between = max((both.value - own.value) ** 2 - both.half**2 - own.half**2, 0.0)
+    return replace(
+        headline, stiffness=own.with_cause("loadings", Contribution.within(float(np.sqrt(between))))
+    )
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:

@@ -55,12 +55,14 @@ class _Blocks:
 
     Args:
         rounded: what an encoder may have added to the position, one for each phase of its counts.
+        friction: forces whose squares add up to that of a friction.
     """
 
     position: Complex
     velocity: Complex
     force: Complex
     rounded: tuple[Complex, ...]
+    friction: tuple[Complex, ...]
     noise: float
 
     @property
@@ -90,26 +92,36 @@ class _Line:
 
 
 def dynamic_stiffness(
-    problem: Problem, segments: list[Segment], lag: float, lag_std: float
+    problem: Problem, segments: list[Segment], lag: float, lag_std: float, friction: Sequence[Array] = ()
 ) -> tuple[DynamicStiffness, ...]:
     """Storage and loss in each octave that a contact is long enough for and has motion in, lowest first.
+
+    A force that turns with the way is friction, of the surface or of a guide, or play before the position's sensor, and
+    the part of it that follows the position is stiffness or none: the share is within 0 to 1 (JCGM 100, 4.3.7).
 
     Args:
         problem: of the log.
         segments: of its rows, one at least.
         lag: of the force behind the position [s], taken out.
         lag_std: what is not known of it [s].
+        friction: forces whose squares add up to what friction may be, each of shape (m,) [N].
     """
     dt = float(np.median(np.diff(problem.time)))
     position = problem.motion.moved(0, lag)
-    channels = position, problem.motion.moved(1, lag), problem.force, *_round(problem, position, lag)
+    channels = (
+        position,
+        problem.motion.moved(1, lag),
+        problem.force,
+        *friction,
+        *_round(problem, position, lag),
+    )
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
     length = longest_of(segments)
     for _ in range(_MOST):
         if length < SHORTEST:
             break
-        blocks = _blocks(problem, channels, segments, length)
+        blocks = _blocks(problem, channels, segments, length, len(friction))
         octave = _octave(blocks, length, dt, variance, lag_std)
         if _LOWEST <= octave.frequency * length * dt <= _HIGHEST:
             found.append(octave)
@@ -136,7 +148,9 @@ def _round(problem: Problem, position: Array, lag: float) -> list[Array]:
     return found
 
 
-def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int) -> _Blocks:
+def _blocks(
+    problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int, besides: int
+) -> _Blocks:
     """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
     seen, count = transform_of(length, LINES), len(LINES)
 
@@ -152,8 +166,10 @@ def _blocks(problem: Problem, channels: tuple[Array, ...], segments: list[Segmen
     chain, dt = problem.motion.chain, float(np.median(np.diff(problem.time)))
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
-    x, v, f, *rounded = (lines(values) for values in channels)
-    return _Blocks(x, v, f, tuple(rounded), 2 * float(line[0]) * chain.dt / dt)
+    x, v, f, *others = (lines(values) for values in channels)
+    return _Blocks(
+        x, v, f, tuple(others[besides:]), tuple(others[:besides]), 2 * float(line[0]) * chain.dt / dt
+    )
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
@@ -168,10 +184,13 @@ def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: f
         "within the octave": np.abs(line.change),
     }
     scatter = np.sqrt(line.variance)
+    turned = [_fit(replace(blocks, force=own)).parts for own in blocks.friction]
+    turning = np.sqrt(np.square(turned).sum(axis=0) / 3) if turned else np.zeros(2)
     storage, loss = (
         Measurement(
             float(parts[i]),
             {"blocks": Contribution(float(scatter[i]), line.freedom)}
+            | {"friction": Contribution(float(turning[i]))}
             | {cause: Contribution.within(float(half[i])) for cause, half in bounds.items()},
         )
         for i in range(2)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from palpate.errors import InputError
 from palpate.identification.pooling import Pooled, PooledParameter
 from palpate.report import style
-from palpate.report.answer import Card, PageAnswer, answer_page, warning_alerts
 from palpate.report.identification.figure import LETTERS, WIDE
 from palpate.report.identification.page import HALF, TONES, split
 from palpate.report.identification.words import CALLED, Source, full_number, interval
@@ -31,7 +30,7 @@ from palpate.report.many.table import (
     together,
 )
 from palpate.report.numbers import NONE, as_html, as_text, quantity
-from palpate.report.page import data_address
+from palpate.report.page import Card, PageAnswer, answer_page, data_address, warning_alerts
 from palpate.report.style import svg
 from palpate.text import printable
 

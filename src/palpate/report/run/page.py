@@ -9,14 +9,13 @@ from palpate.arrays import Array
 from palpate.bench.summary import CONTACT
 from palpate.identification.result import Identification
 from palpate.records import Record
-from palpate.report.answer import Card
 from palpate.report.chart import figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, full_number
 from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
 from palpate.report.numbers import quantity
-from palpate.report.page import data_address, render
+from palpate.report.page import Card, data_address, render
 from palpate.report.run.figures import BEFORE, PARAMETERS, charts_of, figures_of, window_of
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
 from palpate.report.style import svg

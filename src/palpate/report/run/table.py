@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from palpate.identification.result import Identification
-from palpate.report.answer import Card
 from palpate.report.identification.words import CALLED
 from palpate.report.numbers import NONE, plain, quantity, with_half
-from palpate.report.page import CommandAnswer, Table
+from palpate.report.page import Card, CommandAnswer, Table
 from palpate.signals.types import NORMAL
 from palpate.text import printable
 

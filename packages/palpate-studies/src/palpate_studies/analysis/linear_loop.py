@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Complex
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, LoopState, compiled_march
-from palpate.controllers.any_controller import AnyController
+from palpate.controllers.controller import AnyController
 
 
 def leaves(tree: Any, path: str = "") -> Iterator[tuple[str, float]]:

@@ -64,10 +64,10 @@ def run(runs: Runs) -> Data:
         return watch(*case, LONG, lambda _: None, runs.waiting)
 
     def with_rates(e: Experiment) -> dict[float, list[Case]]:
-        return {r: _seeded(runs, PER_RATE, e, {"controller.learning_rate": r}) for r in RATES}
+        return {r: _runs_of_seeds(runs, PER_RATE, e, {"controller.learning_rate": r}) for r in RATES}
 
     def with_sizes(surface: str, seeds: int) -> dict[tuple[int, ...], list[Case]]:
-        return {s: _seeded(runs, seeds, SURFACES[surface], {"controller.layers": s}) for s in SIZES}
+        return {s: _runs_of_seeds(runs, seeds, SURFACES[surface], {"controller.layers": s}) for s in SIZES}
 
     first = runs.seeds[0]
     plain = {name: {r: [(with_values(e, _pi(r)), first)] for r in RATES} for name, e in SURFACES.items()}
@@ -81,7 +81,7 @@ def run(runs: Runs) -> Data:
     )
 
 
-def _seeded(runs: Runs, seeds: int, experiment: Experiment, changes: Mapping[str, Any]) -> list[Case]:
+def _runs_of_seeds(runs: Runs, seeds: int, experiment: Experiment, changes: Mapping[str, Any]) -> list[Case]:
     """The experiment with these changes, with other weights for each of the first so many seeds."""
     changed = with_values(experiment, changes)
     return [(with_values(changed, {"controller.weights_seed": s}), s) for s in runs.seeds[:seeds]]

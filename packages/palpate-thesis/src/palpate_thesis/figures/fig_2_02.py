@@ -10,7 +10,7 @@ from palpate.bench import Experiment, load, with_values
 from palpate.bench.plant import Loop, LoopState
 from palpate.bench.summary import losses
 from palpate.controllers import Impedance
-from palpate.controllers.any_controller import AnyController
+from palpate.controllers.controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often
