@@ -139,7 +139,7 @@ def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatc
 
 def test_a_slides_own_record_is_read_with_its_frames_and_without_its_touches(tmp_path, capsys):
     """Three touches before the slide are no free motion, and the slide at the end of the record is none either."""
-    quick = ["--shape", "plane", "--surface", "K=8000,mu=0.3", "--path", "line", "--seconds", "4"]
+    quick = ["--shape", "plane", "--surface", "K=8000,mu=0.3", "--path", "line", "--length", "120:mm"]
     assert main(["slide", *quick, "--out", str(tmp_path / "out"), "--json"]) == 0
     capsys.readouterr()
     main(["identify", str(tmp_path / "out" / "record.parquet"), "--json"])
