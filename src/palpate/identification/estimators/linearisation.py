@@ -123,21 +123,8 @@ class Linearisation:
         friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
         return cls(
-            problem,
-            model,
-            lag,
-            at,
-            theta,
-            names,
-            friction,
-            len(free),
-            prior,
-            segments,
-            octaves,
-            use,
-            noisy,
-            system,
-        )
+            problem, model, lag, at, theta, names, friction, len(free), prior, segments, octaves, use, noisy, system,
+        )  # fmt: skip
 
     @property
     def searched(self) -> dict[int, float]:
