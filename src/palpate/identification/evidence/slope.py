@@ -13,7 +13,7 @@ from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.steady_press import Slopes
+from palpate.identification.steady_press import NEAR, Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
@@ -115,8 +115,6 @@ def _last_of(columns: Array, force: Array) -> float:
 
 _UPPER = 0.4
 """Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
-_WIDE = 0.15
-"""Half of the share of the force about a level over which its slope is taken: the levels of a press lie .2 apart."""
 
 
 def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
@@ -181,7 +179,7 @@ def _rows(force: Array, level: float | None) -> NDArray[np.intp]:
     low, high = np.percentile(force, [2, 98])
     share = (force - low) / (high - low or 1.0)
     if level is not None:
-        return np.flatnonzero(np.abs(share - level) < _WIDE)
+        return np.flatnonzero(np.abs(share - level) < NEAR)
     below = np.flatnonzero(share <= _UPPER)
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
