@@ -24,6 +24,7 @@ from palpate.identification.estimators.averaging import (
 from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
 from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
+    LARGEST,
     Octaves,
     Segment,
     Solution,
@@ -187,8 +188,9 @@ class Linearisation:
         places = [i for i, name in enumerate(self.names) if name.startswith(FRICTION)]
         theta = solution.theta[places]
         value, vector = np.linalg.eigh(solution.cov[np.ix_(places, places)] + np.outer(theta, theta))
-        found: Array = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
-        return found
+        found = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
+        most = LARGEST * np.std(self.problem.force)  # of a column that no octave shows nothing else is known
+        return np.asarray(found * np.minimum(1.0, most / np.maximum(np.abs(found).max(axis=0), 1e-300)))
 
     def _forces(self) -> list[list[int]]:
         """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
