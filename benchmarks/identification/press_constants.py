@@ -4,8 +4,8 @@
 
 Presses of `plain_presses.py`, and logs of the foreign simulator that are shaken. For each value of a constant: how many
 of the presses are taken for one (seen), in how many of these the 95 % interval of the tangent holds the truth (hold);
-of the shaken logs, how many are taken for a press (taken), and in how many of these the tangent there holds (hold). The
-value in use is marked.
+of the shaken logs, how many are taken for a press (taken), and in how many of these the tangent there holds (hold). Of
+the constant of the tangents beside these, the tangents are counted instead of the presses. The value in use is marked.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ VALUES: dict[str, tuple[float, ...]] = {
     "_STILL": (0.0, 0.05, 0.1, 0.3),
     "_SHARE": (0.4, 0.6, 0.8, 0.95),
     "_SEEN": (3.0, 5.0, 8.0, 16.0),
+    "NEAR": (0.1, 0.15, 0.2, 0.3),
 }
-Case = tuple[Channels, Options, Callable[[Contacts], tuple[float, float] | None]]
+Case = tuple[Channels, Options, Callable[[Contacts, float], tuple[float, float] | None]]
 
 
 def pressed(world: World, seed: int) -> Case:
-    """A press, and its true tangent by what was found of it."""
+    """A press, and its true tangent at a force by what was found of it."""
 
-    def truth(contacts: Contacts) -> tuple[float, float] | None:
+    def truth(contacts: Contacts, force: float) -> tuple[float, float] | None:
         codes = {warn.code.word for warn in contacts.warnings}
         sign = -1.0 if "force-sign-reversed" in codes else 1.0
-        assert contacts.press is not None
-        slope = world.tangent(contacts.press.headline.force, sign, "contact-at-start" not in codes)
+        slope = world.tangent(force, sign, "contact-at-start" not in codes)
         return None if slope is None else (slope, slope)
 
     record = world.log(np.random.default_rng([seed, 0]))
@@ -59,26 +59,27 @@ def pressed(world: World, seed: int) -> Case:
 
 
 def shaken(log: Log) -> Case:
-    """A log of the foreign simulator, and its true tangent."""
+    """A log of the foreign simulator, and its true tangent at a force."""
     told = {name: value for name, value in log.options.items() if name in NAMED}
 
-    def truth(contacts: Contacts) -> tuple[float, float] | None:
-        assert contacts.press is not None
-        return working_truth(log, "press", None, contacts.press.headline.force)
+    def truth(_: Contacts, force: float) -> tuple[float, float] | None:
+        return working_truth(log, "press", None, force)
 
     return channels_of(record_of(log)), Options.of(**told), truth
 
 
-def count(cases: list[Case]) -> tuple[int, int]:
-    """How many of some logs are taken for a press, and in how many of these the tangent holds."""
+def count(cases: list[Case], beside: bool) -> tuple[int, int]:
+    """How many of some logs are taken for a press, and in how many of these the tangent holds; or of those beside."""
     seen = holds = 0
     for channels, options, truth_of in cases:
         try:
             contacts = contacts_of(channels, options)[2]
         except InputError:
             continue
-        if contacts.press is not None:
-            own, truth = contacts.press.headline.stiffness, truth_of(contacts)
+        if contacts.press is None:
+            continue
+        for slopes in contacts.press.others if beside else (contacts.press.headline,):
+            own, truth = slopes.stiffness, truth_of(contacts, slopes.force)
             seen += 1
             holds += (
                 truth is not None and own.value - own.half <= truth[1] and own.value + own.half >= truth[0]
@@ -113,7 +114,7 @@ def main() -> None:
         for value in values:
             setattr(steady_press, name, value)
             mark = "*" if np.isclose(value, own) else " "
-            (seen, hold), (taken, held) = count(presses), count(others)
+            (seen, hold), (taken, held) = (count(logs, name == "NEAR") for logs in (presses, others))
             print(
                 f"{mark} {name.strip('_').lower():8} {value:<5g} seen {seen:3d} hold {hold:3d}"
                 f"   taken {taken:3d} hold {held:3d}", flush=True,

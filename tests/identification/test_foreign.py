@@ -167,6 +167,13 @@ def test_a_knowing_estimator_scatters_as_the_bound_says():
     assert 1.96 * found[:, :2].std(0) == pytest.approx([bound["K"], bound["B"]], rel=0.2)
 
 
+def test_a_knowing_estimator_learns_nothing_of_a_probe_at_rest():
+    log = make_log(Cell("mass", "glued"), 970)
+    assert np.ptp(log.dense.depth) < 1e-6 * log.dense.depth.mean()
+    bound = half_widths(log)
+    assert all(bound[name] > abs(log.truth[name][0]) for name in bound)
+
+
 def test_confidently_wrong_is_far_off_or_many_half_widths():
     assert not judged("K", 100, (95, 105), (104, 104)).wrong
     assert judged("K", 100, (60, 140), (130, 130)).holds
@@ -214,3 +221,17 @@ def test_a_lag_that_nobody_gave_is_found_in_a_narrow_valley_of_the_likelihood(na
     own = found["K"]
     assert abs(own.value - own.truth[0]) < 1.5 * own.half  # 3 of 1000 true intervals are farther off
     assert own.half < 0.01 * own.value
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "seed", "parameter"),
+    [
+        ("mass/spikes", 971, "M"),  # the answer in contact was charged with the approach's error
+        ("mass/ms-stamps", 971, "M"),  # the slope of a tap has inertia in it
+        ("mass/never-leaves", 970, "K"),  # a dither, of which the lowest octaves hold nothing
+    ],
+)
+def test_a_parameter_that_the_log_shows_is_given(name, seed, parameter):
+    found = {a.name: a for a in score(Cell(*name.split("/")), seed).answers}
+    assert found[parameter].holds

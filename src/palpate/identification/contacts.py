@@ -280,9 +280,8 @@ def _orient(
         way = 1.0 if apart >= 0 else -1.0
     told = _reversed_signs(sign < 0, way < 0)
     if not signed:
-        text = (
-            "the sign of the force contradicts --force-sign: in contact it goes to the other side of its rest"
-        )
+        side = "in contact it goes to the other side of its rest"
+        text = f"the sign of the force contradicts --force-sign: {side}"
         told = (*told, Warn(Code.NEGATIVE_STIFFNESS, text))
     if spans[0][0] == 0:
         text = "the log begins in contact: the depth of that contact is not known"

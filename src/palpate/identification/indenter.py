@@ -55,9 +55,8 @@ class Indenter:
             size = "half angle" if self.shape == "cone" else "radius"
             raise InputError(f"the {size} of a {self.shape} must be more than 0, got {self.size:g}")
         if self.shape == "cone" and self.size >= pi / 2:
-            raise InputError(
-                f"the half angle of a cone must be under 90 deg, got {np.degrees(self.size):g} deg"
-            )
+            angle = np.degrees(self.size)
+            raise InputError(f"the half angle of a cone must be under 90 deg, got {angle:g} deg")
 
     @classmethod
     def parse(cls, text: str) -> Indenter:

@@ -197,9 +197,8 @@ def standard_linear_solid(motion: Motion) -> Model:
 
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
         x = motion.position
-        return _relaxing(
-            motion, x if motion.bonded else np.maximum(x - nonlinear["x0"], 0.0), nonlinear["tau"], lag
-        )
+        depth = x if motion.bonded else np.maximum(x - nonlinear["x0"], 0.0)
+        return _relaxing(motion, depth, nonlinear["tau"], lag)
 
     nonlinear = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
     return Model(NAMES[2], _RELAXING, columns, nonlinear, _PASSIVE)
@@ -243,11 +242,7 @@ def at_rest_before(model: Model) -> Model:
 
     An offset and the place of the surface do the same to a straight spring, and nearly the same to a curved one.
     """
-
-    def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
-        return model.columns(motion, nonlinear, lag)[:-1]
-
-    return replace(model, linear=model.linear[:-1], columns=columns)
+    return replace(model, linear=model.linear[:-1], columns=lambda *at: model.columns(*at)[:-1])
 
 
 def begun_before(model: Model) -> Model:

@@ -214,15 +214,13 @@ def _doubts(
         found.append(Warn(Code.FORCE_LAGS_POSITION, text))
     stiffness = parameters["K"].value if "K" in parameters else None
     if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
-        text = (
-            f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: is a unit off, as by a factor of 1000?"
-        )
+        off = "is a unit off, as by a factor of 1000?"
+        text = f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: {off}"
         found.append(Warn(Code.UNIT_DOUBTFUL, text))
     series = options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
-        text = (
-            f"K = {stiffness:.3g} against {series:.3g} N/m in series with it: K depends on that calibration"
-        )
+        beside = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it"
+        text = f"{beside}: K depends on that calibration"
         found.append(Warn(Code.SERIES_COMPLIANCE, text))
     position = problem.motion.position
     at = np.clip(np.round(problem.motion.instants).astype(np.intp), 0, len(position) - 1)

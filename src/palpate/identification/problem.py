@@ -175,9 +175,8 @@ def touching(problem: Problem, memory: Memory, reach: int = 0) -> Problem | None
 
 def with_fewer_rows(problem: Problem) -> Problem:
     """The same with so many rows at most, in evenly spaced unbroken pieces."""
-    touches, approach = (
-        own and with_fewer_rows(own) for own in (problem.with_touches, problem.with_approach)
-    )
+    wider = problem.with_touches, problem.with_approach
+    touches, approach = (own and with_fewer_rows(own) for own in wider)
     rows, fewer = problem.motion.rows, problem
     if len(rows) > _MOST_ROWS:
         pieces = -(-len(rows) // _PIECE)

@@ -54,9 +54,9 @@ def answer(problem: Problem, model: Model) -> Answer:
     found = None if wider is None else _over_approach(wider, problem.in_contact, local, solution)
     if found is None:
         return plain
-    apart = of_another(found.theta, found.budget, plain.theta, plain.budget)
-    best = found if found.half_of("K") < plain.half_of("K") else plain
-    return replace(best, budget={**best.budget, "touch": apart})
+    apart = of_another(found.theta, found.budget, plain.theta, plain.budget)  # it alone rests on the approach
+    found = replace(found, budget={**found.budget, "touch": apart})
+    return found if found.half_of("K") < plain.half_of("K") else plain
 
 
 def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
@@ -89,9 +89,8 @@ def _descent(start: Linearisation) -> tuple[Linearisation, float]:
             step = step / 2
         if np.all(np.abs(step) <= rests):
             break
-        local = Linearisation.of(
-            start.problem, start.model, start.segments, best.moved(theta, step), best.use
-        )
+        about = best.moved(theta, step)
+        local = Linearisation.of(start.problem, start.model, start.segments, about, best.use)
     return best, least
 
 
@@ -113,13 +112,9 @@ def _starts(local: Linearisation) -> list[Linearisation]:
         here = held(other.system, other.searched)
         misfits.append(other.misfit(here))
         tried.append(dict(zip(other.names, here.theta.tolist(), strict=True)))
-    return [
-        Linearisation.of(problem, local.model, local.segments, tried[i], local.use)
-        for i, (before, own, after) in enumerate(
-            zip(misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
-        )
-        if own < before and own <= after
-    ]
+    beside = zip(tried, misfits, misfits[1:], [*misfits[2:], np.inf], strict=False)
+    least = [about for about, before, own, after in beside if own < before and own <= after]
+    return [Linearisation.of(problem, local.model, local.segments, about, local.use) for about in least]
 
 
 def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: Solution) -> Answer | None:
@@ -138,12 +133,13 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
     at = problem.motion.instants.astype(np.intp)
     way = problem.motion.position[at[~inside[at]]]  # in which the surface lies
     theta = dict(zip(known.names, found.theta, strict=True))
-    surface = 0.0
+    surface, use = 0.0, None
     for _ in range(_ROUNDS if len(way) else 0):
         motion = from_surface(problem.motion, inside, surface)
         local = Linearisation.of(
-            replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}
+            replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}, use
         )
+        use = local.use  # else an octave that comes and goes keeps the surface from resting
         solution = estimate(local.system)
         theta = dict(zip(local.names, solution.theta, strict=True))
         i = local.names.index(TOUCH)

@@ -151,8 +151,8 @@ WINDOW = (0.35, 0.97)
 """Shares of a stroke's force about the tangent that is named: below, a surface is still being met."""
 LEVELS = (0.3, 0.5, 0.9)
 """Shares of the force whose tangents are listed beside it."""
-_WIDE = 0.2
-"""Half of the share of the force about these."""
+NEAR = 0.2
+"""Half of the share of the force about a level in which its tangent is taken: the levels beside it lie so far off."""
 _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
 _FOLLOWED = 0.5
@@ -279,18 +279,14 @@ def steady_press(
         headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
-    windows = [(level - _WIDE, min(level + _WIDE, 1.0)) for level in LEVELS]
+    windows = [(level - NEAR, min(level + NEAR, 1.0)) for level in LEVELS]
     others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
     known = tuple(own for own in others if own.stiffness.known_to(1.0))
-    pairs = [[own for own in curves if own.loads is loads] for loads in (True, False)]
-    return SteadyPress(headline, known, *(_draw(own) for own in pairs))
-
-
-def _draw(curves: Sequence[Curve]) -> Array:
-    if not curves:
-        return np.empty((2, 0))
-    curve = max(curves, key=lambda own: own.span)
-    return few_points(np.stack([curve.depth, curve.force]))
+    drawn = []
+    for loads in (True, False):
+        longest = max((own for own in curves if own.loads is loads), key=lambda own: own.span, default=None)
+        drawn.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
+    return SteadyPress(headline, known, *map(few_points, drawn))
 
 
 def few_points(curve: Array) -> Array:
@@ -383,15 +379,14 @@ class _Window:
     reach: float
 
     def about(self, depth: float) -> _Window:
-        """The half of it about a depth; the whole where that has too few blocks."""
+        """The half of it about a depth; the whole where that has blocks at too few depths."""
         near = np.abs(self.scaled - (depth - self.middle) / self.reach) <= 0.5
-        if np.count_nonzero(near) < _FEWEST:
+        if len(np.unique(self.scaled[near])) < _FEWEST:
             return self
         x = self.middle + self.reach * self.scaled[near]
         middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
-        return _Window(
-            self.time[near], (x - middle) / reach, self.force[near], self.drift[near], middle, reach
-        )
+        time, force, drift = self.time[near], self.force[near], self.drift[near]
+        return _Window(time, (x - middle) / reach, force, drift, middle, reach)
 
 
 def _within(curve: Curve, low: float, high: float) -> _Window | None:
@@ -408,7 +403,8 @@ def _within(curve: Curve, low: float, high: float) -> _Window | None:
     parts = curve.time, curve.depth, curve.force, curve.drift
     time, x, f, gone = (np.add.reduceat(part[rows], edges[:-1]) / np.diff(edges) for part in parts)
     middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
-    return _Window(time, (x - middle) / reach, f, gone, middle, reach) if reach > 0 else None
+    few = len(np.unique(x)) <= _DEGREES[0]
+    return None if few else _Window(time, (x - middle) / reach, f, gone, middle, reach)
 
 
 def _fit(window: _Window, degree: int) -> Array:
@@ -422,7 +418,8 @@ def _tangent(window: _Window, level: float) -> tuple[float, ...]:
         Slope [N/m] and its variance; relative change of the speed [1/s]; part of the slope that a removed drift would
         be [N/m]; depth [m]; share of the force that the curve follows.
     """
-    degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < len(window.force)]
+    depths = len(np.unique(window.scaled))
+    degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < depths]
     fine = np.linspace(-1, 1, 201)
     curve = chebyshev.chebval(fine, _fit(window, degrees[min(1, len(degrees) - 1)]))
     at = float(fine[int(np.argmin(np.abs(curve - level)))])

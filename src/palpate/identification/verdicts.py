@@ -120,24 +120,17 @@ def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
 
 
 def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
-    """An answer with the gap between its stiffness at the working point and the log's own there as a cause.
+    """An answer with the gap between the stiffness of its force at the working point and of the log's as a cause.
 
+    Both are read in the same way: the slope of a press has a mass and a damping in it, in the log as in the answer.
     A parameter may be off by as much as it moves if the answer is made to agree: theta + C g (g' C g)^-1 gap, C the
     covariance and g the stiffness' derivatives (a measurement without error in a Kalman filter). Nothing is compared
     without a working point that has an interval.
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
-    slope: Array = np.zeros(len(found.names))
-    if found.fit.model.nonlinear:
-        shown = stiffness_of(found.problem, found.problem.force, point)
-        own, slope = _model_stiffness(found, point)
-    elif {"K", "M"} <= set(found.names):  # K - omega^2 M
-        slope[found.names.index("K")] = 1.0
-        slope[found.names.index("M")] = -((2 * np.pi * point.frequency_Hz) ** 2)
-        shown, own = point.stiffness.value, float(slope @ found.theta)
-    else:
-        return found
+    shown = stiffness_of(found.problem, found.problem.force, point)
+    own, slope = _model_stiffness(found, point)
     if shown is None or own is None:
         return found
     common = "calibration", "friction", "loadings"  # of the answer, too

@@ -11,6 +11,8 @@ from foreign.recording import at_times
 Array = NDArray[np.float64]
 
 _KNOWN = {"kelvin-voigt", "mass"}
+_NOTHING = 1e30
+"""Variance along a direction that the log does not show, over what noise alone would leave: a probe at rest."""
 
 
 def half_widths(log: Log) -> dict[str, float]:
@@ -39,7 +41,9 @@ def half_widths(log: Log) -> dict[str, float]:
     if "lag" in plan.told and plan.told.get("lag_std"):
         information[-1, -1] += plan.told["lag_std"] ** -2
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    covariance = scale[:, None] * np.linalg.pinv(scale[:, None] * information * scale, 1e-12) * scale
+    value, vector = np.linalg.eigh(scale[:, None] * information * scale)
+    variance = np.where(value > 1e-12 * value[-1], 1 / np.maximum(value, 1e-300), _NOTHING)
+    covariance = scale[:, None] * (vector * variance) @ vector.T * scale
     again = plan.repeats**2 / max(log.dense.contact.sum() * log.dense.dt, 1.0)
     arm = plan.told.get("series_std", 0.0) * (stiff / r.series) ** 2 / stiff
     # K k/(k - K) of the apparent K: dK/dk = -(K/k)^2; B and M with twice the relative error.

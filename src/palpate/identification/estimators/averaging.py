@@ -146,9 +146,8 @@ def _mean(weight: Array, spreads: list[Spread]) -> Spread:
     """Of the variances, and of their degrees of freedom as each adds to it."""
     variance = np.stack([own.variance for own in spreads]) * weight[:, None]
     whole = variance.sum(axis=0)
-    loss = sum(
-        (own / spread.each for own, spread in zip(variance, spreads, strict=True)), np.zeros(len(whole))
-    )
+    losses = (own / spread.each for own, spread in zip(variance, spreads, strict=True))
+    loss = sum(losses, np.zeros(len(whole)))
     return Spread(whole, np.where(loss > 0, whole / np.where(loss > 0, loss, 1.0), np.inf))
 
 
@@ -188,7 +187,7 @@ def derivative_products(noisy: dict[int, Array]) -> Array:
 
 
 def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]) -> Mask:
-    """Octaves up to the first in which a column is mostly the position's noise, which pulls its parameter to zero.
+    """Octaves but those in which a column is mostly the position's noise, which pulls its parameter to zero.
 
     `noisy` is as `position_lines` has it; `derivatives` has the place of a column, and which derivative it is.
     """
@@ -196,7 +195,7 @@ def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives:
     omega2 = (2 * np.pi * octaves.frequency) ** 2
     power = np.stack([octaves.total[:, place, place] for place in derivatives])
     noise = [np.maximum(octaves.all_lines * noisy[2 * k], rounding * omega2**k) for k in derivatives.values()]
-    return np.logical_and.accumulate(np.all(power >= _SEEN * np.stack(noise), axis=0))
+    return np.all(power >= _SEEN * np.stack(noise), axis=0)
 
 
 def sensor_lines(

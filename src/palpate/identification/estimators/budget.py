@@ -231,9 +231,8 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
         found[TOUCH] = motion.filtered(motion.touched, 0, lag)
         found["free inertia"] = motion.filtered(motion.free, 2, lag)
     depth = (x - float(x[inside].mean())) / reach
-    shapes = {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
-    slow = _summed(depth, motion, segments)
-    return found | shapes | ({"hysteresis, slow": slow} if slow.any() else {})
+    found |= {"depth^2": depth**2, "depth^3": depth**3, "hysteresis": _in_quadrature(x, segments)}
+    return found | {"hysteresis, slow": _relaxation(depth, segments)}
 
 
 def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
@@ -251,20 +250,14 @@ def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str,
     return {FRICTION: turned[-1]} | {name: column for name, column in sooner.items() if column.any()}
 
 
-_SLOW = 1.0
-"""Shortest contact with a slow force [s]: in a tap it is no other than its damping, or a lag. Amplifiers of charge and
-load cells take seconds and more."""
-
-
-def _summed(x: Array, motion: Motion, segments: list[Segment]) -> Array:
+def _relaxation(x: Array, segments: list[Segment]) -> Array:
     """A force that goes on under a position that stays, shape (m,): the slow beginning of any relaxation or creep.
 
     Of the surface, or of a load cell that creeps or whose amplifier lets its charge go.
     """
-    found, time = np.zeros(len(x)), motion.instants * motion.chain.dt
+    found = np.zeros(len(x))
     for s in segments:
-        if time[s.last - 1] - time[s.first] >= _SLOW:
-            found[s.first : s.last] = np.cumsum(x[s.first : s.last])
+        found[s.first : s.last] = np.cumsum(x[s.first : s.last])
     return found
 
 

@@ -31,16 +31,10 @@ _FOURTH_ORDER = ((2 / 3, 1), (-2 / 3, -1), (-1 / 12, 2), (1 / 12, -2))
 
 @dataclass(frozen=True)
 class Point:
-    """A model at some nonlinear parameters and a lag, with the linear ones that fit best there.
+    """A model at some nonlinear parameters and a lag [s], with the linear ones, shape (p,), that fit best there.
 
-    Args:
-        nonlinear: parameters by name.
-        lag: of the force [s].
-        columns: of the regression, shape (n, p).
-        theta: linear parameters, shape (p,).
-        residuals: of the force, shape (n,).
-        rss: sum of their squares.
-        cost: the same with what the knowledge from before has against it.
+    The columns of the regression have the shape (n, p), the residuals of the force (n,); rss is the sum of their
+    squares, cost the same with what the knowledge from before has against it.
     """
 
     nonlinear: dict[str, float]
@@ -54,13 +48,9 @@ class Point:
 
 @dataclass(frozen=True)
 class Descent:
-    """The search for the parameters of a model.
+    """The search for the parameters of a model: of a filtered force at the motion's rows, shape (n,).
 
-    Args:
-        model: which.
-        motion: the position.
-        force: filtered, at the motion's rows, shape (n,).
-        known: from before, as observations beside the log's.
+    What is known from before counts as observations beside the log's.
     """
 
     model: Model
@@ -130,9 +120,8 @@ class Descent:
             value = point.nonlinear[parameter.name]
             step = parameter.step * value if parameter.logarithmic else parameter.step
             beside = [(w, {**point.nonlinear, parameter.name: value + k * step}) for w, k in _FOURTH_ORDER]
-            columns = (
-                w * np.column_stack(self.model.columns(self.motion, at, point.lag)) for w, at in beside
-            )
+            each = ((w, self.model.columns(self.motion, at, point.lag)) for w, at in beside)
+            columns = (w * np.column_stack(own) for w, own in each)
             found.append(sum(columns) @ point.theta / parameter.step)
         return np.column_stack(found)
 

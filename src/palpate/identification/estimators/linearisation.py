@@ -169,9 +169,8 @@ class Linearisation:
 
     def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
-        sensor, told = sensor_lines(
-            self.problem, self.segments, self.octaves, self.use, self.system, solution
-        )
+        lines = self.octaves, self.use, self.system
+        sensor, told = sensor_lines(self.problem, self.segments, *lines, solution)
         both = self._with_position(solution, sensor)
         explained, left, hidden = self._explained_part(
             solution, both
@@ -230,9 +229,8 @@ class Linearisation:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
         own = solution.theta * [name in self.model.derivatives for name in self.names]
         by_position = np.einsum("i,oij,j->o", own, self._position_noise(), own)
-        return np.asarray(
-            np.minimum(sensor + by_position / np.maximum(self.system.lines, 1.0), solution.noise)
-        )
+        both = sensor + by_position / np.maximum(self.system.lines, 1.0)
+        return np.asarray(np.minimum(both, solution.noise))
 
     def _position_noise(self) -> Array:
         """Products of what noise of the position makes of the columns by octave, shape (octaves, p, p).

@@ -32,32 +32,21 @@ from palpate.signals.samples import runs
 def relaxation(
     problem: Problem, lag: float, segments: list[Segment], slope: Slopes | None
 ) -> Relaxation | None:
-    """Of the longest hold after a loading, what the position gives back by its slope left aside."""
-    depth = problem.motion.moved(0, lag)
-    speed, force, time = problem.motion.moved(1, lag), problem.force, problem.time
-    still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
-    best: tuple[int, int] | None = None
-    for s in segments:
-        for a, b in runs(still[s.first : s.last]):
-            if b - a >= 4 * FEWEST and a > 0 and (best is None or b - a > best[1] - best[0]):
-                best = (s.first + a, s.first + b)
-    if best is None:
-        return None
-    rows = slice(*best)
-    moved = depth[rows] - depth[best[1] - 1]
-    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
-    given, doubt = stiffness.value * moved, stiffness.half
-    return _relaxation_of(force[rows] - given, doubt * float(np.ptp(moved)), time[rows])
+    """Of the longest hold after a loading, what the position gives back by its slope left aside.
 
-
-def _relaxation_of(force: Array, doubt: float, time: Array) -> Relaxation | None:
-    """Relaxation of a force in a hold, as a monotone fall; None if that is within its noise and uncertainty.
-
-    The force, shape (n,) [N], is less what the position gives back meanwhile, of which `doubt` is not known [N]; the
-    time has the shape (n,) [s].
+    A monotone fall of the force; None if that is within its noise and the uncertainty of what the position gives back.
     """
     from scipy.optimize import isotonic_regression
 
+    depth, speed = problem.motion.moved(0, lag), problem.motion.moved(1, lag)
+    still = np.abs(speed) < STILL * float(np.percentile(np.abs(speed), 98))
+    holds = [(s.first + a, s.first + b) for s in segments for a, b in runs(still[s.first : s.last]) if a > 0]
+    first, last = max(holds, key=lambda hold: hold[1] - hold[0], default=(0, 0))
+    if last - first < 4 * FEWEST:
+        return None
+    moved, time = depth[first:last] - depth[last - 1], problem.time[first:last]
+    stiffness = Measurement(0.0, {}) if slope is None else slope.stiffness
+    force, doubt = problem.force[first:last] - stiffness.value * moved, stiffness.half * float(np.ptp(moved))
     falls = np.asarray(isotonic_regression(force, increasing=False).x)
     noise = noise_of(force - falls, np.arange(len(force)), 2)
     few = max(len(force) // 20, 2)

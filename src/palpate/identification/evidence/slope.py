@@ -13,22 +13,18 @@ from palpate.identification.filters.state_variable import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.steady_press import Slopes
+from palpate.identification.steady_press import NEAR, Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
 
 _MET = 0.15
 """Share of the force above which its bend over the depth is looked for: the lowest that a slope is taken of."""
-
 _FULL = 0.95
 """Share of the force at which a loading is over: what is left of it is rounding off."""
-
 FEWEST = 6
-
-LINE = 4
+_LINE = 4
 """Readings that a slope with a bend and a noise of its own needs."""
-
 STILL = 0.02
 """Share of the highest speed below which a probe rests: encoders and loops leave a per cent or so."""
 
@@ -56,23 +52,19 @@ def loadings_in(problem: Problem, lag: float, segments: list[Segment]) -> list[L
 
     What comes after the peak force is a hold: the probe creeps on under a constant force, or the force relaxes.
     """
-    motion = problem.motion
-    channels = (motion.moved(0, lag), motion.moved(1, lag), problem.force, problem.time)
-    depth = channels[0]
+    x, v, f, t = problem.motion.moved(0, lag), problem.motion.moved(1, lag), problem.force, problem.time
     found = []
-    reach = max((float(np.ptp(depth[s.first : s.last])) for s in segments), default=0.0)
+    reach = max((float(np.ptp(x[s.first : s.last])) for s in segments), default=0.0)
     for s in segments:
-        own = depth[s.first : s.last]
-        force = problem.force[s.first : s.last]
+        force = f[s.first : s.last]
         low, high = np.percentile(force, [2, 98])
         full = int(np.argmax(force >= low + _FULL * (high - low)))
-        top = s.first + min(int(np.argmax(own)), max(full, FEWEST))
-        if top - s.first < FEWEST or depth[top] - depth[s.first] < 0.5 * reach:
+        top = s.first + min(int(np.argmax(x[s.first : s.last])), max(full, FEWEST))
+        if top - s.first < FEWEST or x[top] - x[s.first] < 0.5 * reach:
             continue
-        begin = s.first + int(np.argmin(depth[s.first : top]))
+        begin = s.first + int(np.argmin(x[s.first : top]))
         if top - begin >= FEWEST:
-            advance = slice(*_one_way(depth, channels[1], begin, top, reach))
-            x, v, f, t = channels
+            advance = slice(*_one_way(x, v, begin, top, reach))
             whole = Loading(x[begin:top], v[begin:top], f[begin:top], t[begin:top])
             loading = Loading(x[advance], v[advance], f[advance], t[advance], whole)
             found.append(replace(loading, read=_as_read(problem, lag, loading)))
@@ -97,7 +89,7 @@ def _as_read(problem: Problem, lag: float, loading: Loading) -> Array | None:
     top = int(np.argmax(depth)) + 1
     begin, top = _one_way(depth, np.gradient(depth), int(np.argmin(depth[:top])), top, float(np.ptp(depth)))
     steps = np.diff(depth[begin:top])
-    if np.count_nonzero(steps > STILL * steps.max(initial=0.0)) < LINE:
+    if np.count_nonzero(steps > STILL * steps.max(initial=0.0)) < _LINE:
         top = begin  # a jump between readings
     return np.stack([depth, force[first : last + 1]])[:, begin:top]
 
@@ -123,8 +115,6 @@ def _last_of(columns: Array, force: Array) -> float:
 
 _UPPER = 0.4
 """Share of the force above which a loading counts for its stiffness: below, a surface is still being met."""
-_WIDE = 0.15
-"""Half of the share of the force about a level over which its slope is taken: the levels of a press lie .2 apart."""
 
 
 def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
@@ -161,10 +151,8 @@ def slope_of(loadings: list[Loading], level: float | None = None) -> Slopes | No
     if level is not None:
         del causes["curvature"]
     causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
-    at = float(forces.mean()), float(depths.mean())
-    return Slopes(
-        *at, Measurement(mean.value, causes), tuple(slopes.tolist()), mean.next_half, float(rises.mean())
-    )
+    at, found = (float(forces.mean()), float(depths.mean())), Measurement(mean.value, causes)
+    return Slopes(*at, found, tuple(slopes.tolist()), mean.next_half, float(rises.mean()))
 
 
 def _slope_in(loading: Loading, level: float | None) -> tuple[float, ...] | None:
@@ -191,7 +179,7 @@ def _rows(force: Array, level: float | None) -> NDArray[np.intp]:
     low, high = np.percentile(force, [2, 98])
     share = (force - low) / (high - low or 1.0)
     if level is not None:
-        return np.flatnonzero(np.abs(share - level) < _WIDE)
+        return np.flatnonzero(np.abs(share - level) < NEAR)
     below = np.flatnonzero(share <= _UPPER)
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
@@ -203,7 +191,7 @@ def _apart(read: Array, level: float | None, slope: float, variance: float) -> f
     """
     depth, force = read
     rows = _rows(force, level) if len(force) else np.empty(0, np.intp)
-    if len(rows) < LINE or np.ptp(depth[rows]) <= 0:
+    if len(rows) < _LINE or np.ptp(depth[rows]) <= 0:
         return abs(slope)
     own, doubt, _ = _line(depth[rows], force[rows])
     return max(abs(own - slope) - NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)

@@ -103,11 +103,9 @@ def noise_within(position: Array, rows: NDArray[np.intp], spans: NDArray[np.intp
 def _count(stretches: list[Array]) -> float:
     """From changes with none before and none after them. Of several encoders the coarsest counts most."""
     alone = []
-    for stretch in stretches:
-        steps = np.abs(np.diff(stretch))
-        if len(steps) > 2:
-            still = steps == 0
-            alone.append(steps[1:-1][still[:-2] & still[2:] & ~still[1:-1]])
+    for steps in (np.abs(np.diff(stretch)) for stretch in stretches if len(stretch) > 3):
+        still = steps == 0
+        alone.append(steps[1:-1][still[:-2] & still[2:] & ~still[1:-1]])
     found = np.concatenate(alone) if alone else np.zeros(0)
     return float(np.sum(found**3) / np.sum(found**2)) if len(found) >= _FEWEST else 0.0
 
