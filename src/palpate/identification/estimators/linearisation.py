@@ -257,11 +257,10 @@ class Linearisation:
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
     def _explained_part(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
-        """Share of the force in contact that the model explains, without noise.
+        """Share of the force's variance in contact that the model's own columns account for, without noise.
 
-        Returns:
-            Share of the variance that the model's own columns account for; rms of what they leave [N]; share of the
-            amplitude that nothing accounts for, the other forces included.
+        With it the rms of what they leave [N], and the share of the amplitude that nothing accounts for, the other
+        forces included.
         """
         total = self.system.products.sum(axis=0)
         full = np.zeros(total.shape[0])
