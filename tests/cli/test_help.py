@@ -199,3 +199,8 @@ def test_json_of_identify_is_complete(capsys, root):
     assert told["models"]
     assert all({"model", "r2", "note"} <= set(one) for one in told["models"])
     assert [one["model"] for one in told["models"] if one["chosen"]] == [told["model"]]
+
+
+def test_a_word_too_many_is_said(capsys):
+    assert main(["slide", "bowl"]) == 2
+    assert "Words that the command does not take: ['bowl']" in capsys.readouterr().err

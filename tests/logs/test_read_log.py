@@ -10,6 +10,7 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.logs import read_log, read_record, write_record
+from palpate.logs.tables.sheet import find_sentinel
 from palpate.records import Record
 
 COLUMNS = {"time": "t", "position": "x:mm", "force": "f:mN"}
@@ -109,6 +110,17 @@ def test_a_sentinel_is_found_and_named(tmp_path):
 def test_minus_one_among_negative_forces_is_a_force(tmp_path):
     log = write(tmp_path / "a.csv", [(t, x, [-2, -1, 0, 1][k % 4]) for k, (t, x, _) in enumerate(rows(60))])
     assert np.isfinite(read_log(log, **COLUMNS)["force"]).all()
+
+
+def test_a_sentinel_in_two_rows_of_thousands_is_found_and_a_step_below_zero_is_none():
+    """Whole grams whose noise at rest goes down to -1, which is one step of the scale; and a marker that is no step."""
+    rng = np.random.default_rng(0)
+    grams = np.round(500 * np.maximum(np.sin(np.arange(5000) / 400), 0) + 0.4 * rng.standard_normal(5000))
+    grams = np.maximum(grams, -1)
+    assert (grams == -1).sum() > 10
+    assert find_sentinel(grams) is None
+    grams[[700, 4000]] = -9999
+    assert find_sentinel(grams) == -9999
 
 
 def test_missing_values_that_are_said(tmp_path):

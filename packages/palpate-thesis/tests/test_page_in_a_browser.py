@@ -44,11 +44,24 @@ def test_claims_of_one_verdict_are_shown(browser, index):
         assert page.locator(".claim:visible").count() == every
 
 
+COVERED = """() => {
+    const box = (one) => one.getBoundingClientRect();
+    const meets = (a, b) => a.right > b.left && b.right > a.left && a.bottom > b.top && b.bottom > a.top;
+    return [...document.querySelectorAll(".chart")].filter((chart) => {
+        const list = chart.querySelector(".legend"), button = box(chart.querySelector("header button"));
+        return [...list.children].some((entry) => meets(box(entry), button));
+    }).length;
+}"""
+"""Charts whose button for the whole range covers an entry of the legend."""
+
+
 def test_lines_of_a_figure_are_zoomed_together_and_told(browser, tmp_path):
     t = np.linspace(0.0, 10.0, 5000)
     with style.ink():
         figure, (above, below) = style.figure(rows=2)
         above.plot(t, 20.0 + np.sin(t), color=style.F, label="true")
+        for k in range(12):
+            above.plot(t, 20.0 + np.sin(t + k), label=f"of trial {k}")
         below.plot(t, np.cos(t), label="angle")
         below.set_xlabel("time [s]")
     path = tmp_path / "index.html"
@@ -69,6 +82,7 @@ def test_lines_of_a_figure_are_zoomed_together_and_told(browser, tmp_path):
         page.mouse.move(box["x"] + 300, box["y"] + 60, steps=4)
         page.mouse.up()
         assert page.locator(".chart.zoomed").count() == 2
+        assert page.evaluate(COVERED) == 0
         page.locator(".chart.zoomed button").first.click()
         assert page.locator(".chart.zoomed").count() == 0
         assert page.wrong == []

@@ -303,7 +303,7 @@ def _without_danger(error: CycloptsError) -> str:
 
     A typing error must not suggest a destructive flag.
     """
-    text = str(error)
+    text = str(error).replace("Unused Tokens", "Words that the command does not take")
     guess = re.search(r" ?Did you mean \"?(--[\w-]+)\"?\??", text)
     if guess is None or guess[1].replace("--no-", "--") not in _DANGEROUS:
         return text

@@ -110,13 +110,9 @@ def free_motion_of(
     """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
 
     The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is
-    below) and far below that of the contact. Rows are chosen by position: chosen by force, they would follow its noise.
-
-    Args:
-        force: as it stands in the log, shape (n,): behind a filter a fast touch is a slow one.
-        position: likewise.
-        ends: of the force's range, outliers left aside [N].
-        none: whether the slope has to be that of none; if not, that of an inertia may do.
+    below, and may do where `none` is not asked for) and far below that of the contact. Rows are chosen by position:
+    chosen by force, they would follow its noise. Both are as they stand in the log, shape (n,): behind a filter a fast
+    touch is a slow one. The ends are of the force's range, outliers left aside [N].
     """
     from scipy.special import chdtri
 

@@ -80,16 +80,6 @@ class Indenter:
             )
         return cls(shape, float(match[1]) * own.factor)
 
-    @property
-    def power(self) -> float:
-        """Of the depth in the law of force."""
-        return _LAWS[self.shape][0]
-
-    @property
-    def factor(self) -> float:
-        """Of E* d^p in the law of force [m^(2-p)]."""
-        return _LAWS[self.shape][1](self.size)
-
     def contact_radius(self, depth: float) -> float:
         """Radius of the contact at a depth [m]."""
         if self.shape == "sphere":
@@ -159,7 +149,8 @@ def _modulus(
         return Parameter.unknown("Pa", "the slope is known at one force only; its growth is not")
     if press.tangent[0].force <= 0:
         return Parameter.unknown("Pa", "the force of the press is not above zero")
-    p, c = indenter.power, indenter.factor
+    p, factor = _LAWS[indenter.shape]  # F = c E* d^p, c in m^(2-p)
+    c = factor(indenter.size)
     force, slope, half = np.array([(t.force, t.stiffness, t.half) for t in press.tangent]).T
     by_force = slope**p / (p**p * c * force ** (p - 1))
     own = p * half / slope * by_force

@@ -26,11 +26,6 @@ class Noise:
     effective: float
     variance: float
 
-    @property
-    def long_run(self) -> float:
-        """Variance of a mean of n residuals, times n."""
-        return float(self.autocovariance[0] + 2 * self.autocovariance[1:].sum())
-
 
 _BEYOND = 1e6
 """Variance of a direction without information, over that of the least that rounding lets one see."""
@@ -90,7 +85,10 @@ def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Arr
     gram = scaled.T @ scaled
     meat = scaled.T @ _smooth(scaled, place, noise.autocovariance)
     if prior is not None:
-        level = max(noise.long_run, noise.variance)
+        curve = noise.autocovariance
+        level = max(
+            float(curve[0] + 2 * curve[1:].sum()), noise.variance
+        )  # of a mean of n residuals, times n
         weight = level / (prior * scale) ** 2
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)

@@ -75,11 +75,6 @@ class Motion:
         """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
         return isinstance(self.chain, SensorPath)
 
-    @property
-    def ones(self) -> Array:
-        """The column of the offset, shape (m,)."""
-        return np.ones(len(self.rows))
-
 
 def from_surface(motion: Motion, inside: Mask, surface: float) -> Motion:
     """The same motion counted from a surface [m]: nothing is pressed before it is met.
@@ -128,11 +123,6 @@ class Model:
     depth: float | None = None
 
     @property
-    def of_position(self) -> bool:
-        """Whether the force is made of the position and its derivatives alone, and so its noise too."""
-        return not self.nonlinear and {*self.derivatives, "offset"} == {*self.linear}
-
-    @property
     def of_power(self) -> bool:
         """Whether the force goes with a power of the depth."""
         return any(parameter.name == "n" for parameter in self.nonlinear)
@@ -159,7 +149,7 @@ NAMES = (
 
 def _of_derivatives(count: int) -> Columns:
     """f = K x + B v, with three M a as well."""
-    return lambda motion, _, lag: [*(motion.moved(k, lag) for k in range(count)), motion.ones]
+    return lambda motion, _, lag: [*(motion.moved(k, lag) for k in range(count)), np.ones(len(motion.rows))]
 
 
 KELVIN_VOIGT = Model(NAMES[0], ("K", "B", "offset"), _of_derivatives(2))
@@ -170,7 +160,7 @@ def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
     """f = K u + B u' + K1 y, shape (n,), where the spring K1 of a Maxwell branch is stretched by y: y' + y/tau = u'."""
     branch = u - u[0] - low_pass_once(u - u[0], tau, motion.chain.dt)
     columns = [motion.filtered(u, k, lag) for k in (0, 1)]
-    return [*columns, motion.filtered(branch, 0, lag), motion.ones]
+    return [*columns, motion.filtered(branch, 0, lag), np.ones(len(motion.rows))]
 
 
 _RELAXING = ("K", "B", "K1", "offset")
@@ -232,7 +222,11 @@ def hunt_crossley(motion: Motion) -> Model:
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
         n, d = nonlinear["n"], np.maximum(motion.position - nonlinear["x0"], 0.0)
         power = d**n
-        return [motion.filtered(power, 0, lag), motion.filtered(power * d / (n + 1), 1, lag), motion.ones]
+        return [
+            motion.filtered(power, 0, lag),
+            motion.filtered(power * d / (n + 1), 1, lag),
+            np.ones(len(motion.rows)),
+        ]
 
     return Model(NAMES[3], ("K", "B", "offset"), columns, (_POWER, _touch(motion)), ("K", "B", "Fc"))
 

@@ -54,7 +54,7 @@ def identify(record: Record, **given: Any) -> Identification:
     """
     options = Options.of(**given)
     channels = channels_of(record)
-    options.check_lag(channels.duration)
+    options.check_lag(len(channels.position) * channels.dt)
     channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
     warnings = (*channels.warnings, *contacts.warnings)

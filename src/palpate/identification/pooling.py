@@ -76,12 +76,9 @@ class Mean:
 
 
 def random_effects(values: Array, variances: Array, covariates: Array | None = None) -> Mean:
-    """Mean of effects that differ.
+    """Mean of effects that differ: one value of each, and the variance of its own error, shape (n,).
 
-    Args:
-        values: one of each effect, shape (n,).
-        variances: of their own errors, shape (n,).
-        covariates: of each effect, shape (n, c) with c < n - 1; none of them constant or a combination of the others.
+    Covariates of each effect have the shape (n, c) with c < n - 1; none is constant or a combination of the others.
     """
     n = len(values)
     if n == 1:

@@ -212,20 +212,22 @@ def at_limit(force: Array, place: Array, levels: Iterable[float], among: Mask | 
     return stuck if stuck.sum() >= _FEWEST_AT_LIMIT else np.zeros(len(force), bool)
 
 
-_MORE = 4.0
-"""Deviations of its noise by which a force goes beyond where it was when the position came to its end."""
-_FLANK = 0.4
-"""Share of that by which it does so in the quarter next to either end: a straight line has 0.25, half a sine 0.6."""
+_FLANK = 0.25 / 0.625
+"""Mean of the force in the quarter next to either end, beyond that end and by its mean in the whole stretch: 1/(4 s)
+where it rises in a straight line for a share s of the stretch and falls in the other; s is 3/8 to 5/8, so that the peak
+is in the middle quarter. Half a sine has 0.6, a force that goes one way 0.25."""
 
 
 def past_end(position: Array, force: Array) -> Mask:
     """Rows in unbroken stretches of exactly the lowest or highest position within which the force rises and falls back.
 
     A probe that rests has a force that stays, or goes one way as the surface relaxes; one beyond the end of its sensor
-    goes on and comes back. Position [m] and force [N] have the shape (n,).
+    goes on and comes back: on the mean by more than the largest of n normal deviates, sqrt(2 ln n). Position [m] and
+    force [N] have the shape (n,).
     """
     rise = np.sign(float(np.cov(position, force)[0, 1]))
     noise = float(np.median(np.abs(np.diff(force, 2)))) / 1.65  # of a normal distribution: 6^0.5 times 0.674
+    largest = noise * (2 * np.log(len(force))) ** 0.5
     past = np.zeros(len(force), bool)
     for level, way in ((position.max(), rise), (position.min(), -rise)):
         for begin, end in runs(at_limit(position, force, (level,))):
@@ -233,7 +235,7 @@ def past_end(position: Array, force: Array) -> Mask:
             inside, quarter = np.array(own), (end - begin + 3) // 4
             beyond = [float(inside.mean()) - at for at in (first, last)]
             near = float(inside[:quarter].mean()) - first, float(inside[-quarter:].mean()) - last
-            clear = min(beyond) > _MORE * noise * (1 + 1 / len(own)) ** 0.5
+            clear = min(beyond) > largest * (1 + 1 / len(own)) ** 0.5
             past[begin:end] = clear and all(n > _FLANK * b for n, b in zip(near, beyond, strict=True))
     return past
 

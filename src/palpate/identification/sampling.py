@@ -78,11 +78,6 @@ class Channels:
     rounding: tuple[float, float] = (0.0, 0.0)
 
     @property
-    def duration(self) -> float:
-        """Of the log [s]."""
-        return len(self.position) * self.dt
-
-    @property
     def time(self) -> Array:
         """Of each sample [s], shape (n,)."""
         return np.asarray(self.start + np.arange(len(self.position), dtype=np.float64) * self.dt)

@@ -121,13 +121,8 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
     """Over the approach too: how the force rises from nothing tells most of a press that then rests.
 
     The surface is looked for: what a wrong place of it does is a force that is there at once with the touch. None if it
-    is not found.
-
-    Args:
-        problem: with the rows of the approach.
-        inside: samples of the position that are in contact.
-        known: the linearisation over the rows in contact.
-        found: its answer.
+    is not found. The problem has the rows of the approach; samples of its position that are in contact are `inside`,
+    and the linearisation over the rows in contact and its answer are known.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     at = problem.motion.instants.astype(np.intp)

@@ -252,16 +252,9 @@ def steady_press(
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
-    The tangents are of the loadings; of the unloadings, where the log has no loading at any speed: a surface that
-    relaxes or yields gives back at another slope than it took.
-
-    Args:
-        channels: as logged.
-        strokes: of the log.
-        signs: of position and force, to multiply the channels with.
-        rest: the force out of contact, after the sign [N].
-        lag: prior of the lag.
-        drift: of the force, which was removed from the channels.
+    The tangents are of the loadings; of the unloadings, where the log has no other stroke. The channels are as logged,
+    less a drift of the force; signs of position and force are those to multiply them with, and the force out of contact
+    is after the sign [N].
     """
     every = curves_of(channels, strokes, signs, drift)
     deepest = max((own.span for own in every), default=0.0)

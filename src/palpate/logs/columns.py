@@ -23,8 +23,8 @@ _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
 
-_RATE = 0.9
-"""Correlation with the rate of a position, above which a column is its velocity: of a sine's own position it is 0."""
+_HALF = 0.5**0.5
+"""Correlation with the rate of a position above which that rate accounts for more than half of a column's power."""
 
 
 @dataclass(frozen=True)
@@ -171,11 +171,11 @@ def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
 
 
 def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
-    """Whether a column is the velocity of a position rather than one itself."""
-    return (
-        len(column.values) == len(position.values)
-        and float(column.unit_readings @ position.unit_rate) > _RATE
-    )
+    """Whether a column is the velocity of a position: it follows the rate, and that more closely than the position."""
+    if len(column.values) != len(position.values):
+        return False
+    own = column.unit_readings
+    return float(own @ position.unit_rate) > max(_HALF, abs(float(own @ position.unit_readings)))
 
 
 def roughness(column: ColumnStatistics) -> float:

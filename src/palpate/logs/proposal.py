@@ -126,7 +126,7 @@ def _identity(column: ColumnStatistics) -> tuple[bool, bool, bytes]:
         bool(re.search(NAMES[kind], column.name, re.IGNORECASE)) for kind in ("position", "force")
     )
     numbers = np.where(np.isnan(column.values), np.nan, column.values) + 0.0  # one NaN, one zero
-    return position, force, blake2b(numbers).digest()
+    return position, force, blake2b(numbers.tobytes()).digest()
 
 
 def _stem(column: ColumnStatistics) -> str:

@@ -53,14 +53,9 @@ def members(
     """Hypotheses and their weights, which add up to one.
 
     What is left beyond the sensor's noise is not chance, so that it counts as that much less evidence (a likelihood
-    raised to a power: Miller and Dunson, 2019).
-
-    Args:
-        system: of the log, each force's prior that of the largest size.
-        noise: variance of a line in each octave, shape (octaves,).
-        sensor: the same of the sensors' own noise, no larger.
-        forces: places of the columns of each.
-        use: octaves that count, shape (octaves,); all if not given.
+    raised to a power: Miller and Dunson, 2019). The system has each force's prior of the largest size; the variance of
+    a line in each octave, the same of the sensors' own noise, no larger, and the octaves that count have the shape
+    (octaves,); forces are places of columns.
     """
     weights = np.array([system.prior_weight] * len(_SIZES) ** len(forces))
     for own, sizes in zip(weights, product(_SIZES, repeat=len(forces)), strict=True):

@@ -137,7 +137,8 @@ def slope_of_lag(
 
     `theta` are the model's linear parameters, `lag` is that of the force [s].
     """
-    if model.of_position and isinstance(motion.chain, Chain):
+    of_position = not model.nonlinear and {*model.derivatives, "offset"} == {*model.linear}
+    if of_position and isinstance(motion.chain, Chain):
         parts = [theta.get(n, 0.0) * motion.moved(k + 1, lag) for n, k in model.derivatives.items()]
         return -sum(parts, np.zeros(len(motion.rows)))
     step = _lag_parameter(motion, Lag(lag)).step

@@ -24,6 +24,7 @@ from palpate.identification.estimators.averaging import (
 from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
 from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
+    LARGEST,
     Octaves,
     Segment,
     Solution,
@@ -123,21 +124,8 @@ class Linearisation:
         friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
         return cls(
-            problem,
-            model,
-            lag,
-            at,
-            theta,
-            names,
-            friction,
-            len(free),
-            prior,
-            segments,
-            octaves,
-            use,
-            noisy,
-            system,
-        )
+            problem, model, lag, at, theta, names, friction, len(free), prior, segments, octaves, use, noisy, system,
+        )  # fmt: skip
 
     @property
     def searched(self) -> dict[int, float]:
@@ -200,8 +188,9 @@ class Linearisation:
         places = [i for i, name in enumerate(self.names) if name.startswith(FRICTION)]
         theta = solution.theta[places]
         value, vector = np.linalg.eigh(solution.cov[np.ix_(places, places)] + np.outer(theta, theta))
-        found: Array = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
-        return found
+        found = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
+        most = LARGEST * np.std(self.problem.force)  # of a column that no octave shows nothing else is known
+        return np.asarray(found * np.minimum(1.0, most / np.maximum(np.abs(found).max(axis=0), 1e-300)))
 
     def _forces(self) -> list[list[int]]:
         """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
@@ -268,11 +257,10 @@ class Linearisation:
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
 
     def _explained_part(self, solution: Solution, sensor: Array) -> tuple[float, float, float]:
-        """Share of the force in contact that the model explains, without noise.
+        """Share of the force's variance in contact that the model's own columns account for, without noise.
 
-        Returns:
-            Share of the variance that the model's own columns account for; rms of what they leave [N]; share of the
-            amplitude that nothing accounts for, the other forces included.
+        With it the rms of what they leave [N], and the share of the amplitude that nothing accounts for, the other
+        forces included.
         """
         total = self.system.products.sum(axis=0)
         full = np.zeros(total.shape[0])

@@ -168,13 +168,10 @@ Evidence = tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None
 
 
 def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | None = None) -> Evidence:
-    """Dynamic stiffness, press and working point of the surface.
+    """Dynamic stiffness, press and working point of the surface, whose stiffness has a unit.
 
-    Args:
-        problem: of the log.
-        options: with the tolerance, and the stiffness in series with the surface.
-        unit: of a stiffness.
-        answer: with the forces beside the contact; None if nothing is known of them.
+    The options have the tolerance, and the stiffness in series with the surface; the answer, where there is one, the
+    forces beside the contact.
     """
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
@@ -221,9 +218,8 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
         return headline
     own, both = headline.stiffness, other.stiffness
     between = max((both.value - own.value) ** 2 - both.half**2 - own.half**2, 0.0)
-    return replace(
-        headline, stiffness=own.with_cause("loadings", Contribution.within(float(np.sqrt(between))))
-    )
+    differ = Contribution.within(float(np.sqrt(between)))
+    return replace(headline, stiffness=own.with_cause("loadings", differ))
 
 
 def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float | None:

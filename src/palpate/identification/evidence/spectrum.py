@@ -40,7 +40,6 @@ Complex = NDArray[np.complex128]
 
 _LOWEST, _HIGHEST = 2.0, 6.0
 """Lines that Hann's window lets into these three; a motion elsewhere has only leaked into them."""
-_MOST = 24
 _TIED = np.array([[1, -2 / 3, 1 / 6], [-2 / 3, 1, -2 / 3], [1 / 6, -2 / 3, 1]])
 """Correlation of white noise between the lines of a Hann block: little of it is left across a sine's own lines."""
 _PHASES = 4
@@ -75,13 +74,10 @@ class _Blocks:
 
 @dataclass(frozen=True)
 class _Line:
-    """Stiffness where the motion is, what it changes by over the octave, and variances of its two parts.
+    """Stiffness at the rms frequency of the motion [rad/s], its change over the octave, and variances of its two parts.
 
-    Args:
-        omega: rms frequency of the motion [rad/s].
-        parts, change: storage and loss at it, and their rms change over the lines, shape (2,).
-        variance: of storage and loss, shape (2,).
-        freedom: of the variance.
+    Storage and loss, their rms change over the lines and their variances have the shape (2,); the freedom is that of
+    the variances.
     """
 
     omega: float
@@ -97,30 +93,19 @@ def dynamic_stiffness(
     """Storage and loss in each octave that a contact is long enough for and has motion in, lowest first.
 
     A force that turns with the way is friction, of the surface or of a guide, or play before the position's sensor, and
-    the part of it that follows the position is stiffness or none: the share is within 0 to 1 (JCGM 100, 4.3.7).
+    the part of it that follows the position is stiffness or none: the share is within 0 to 1 (JCGM 100, 4.3.7). The
+    squares of the forces `friction`, each of shape (m,) [N], add up to what it may be.
 
-    Args:
-        problem: of the log.
-        segments: of its rows, one at least.
-        lag: of the force behind the position [s], taken out.
-        lag_std: what is not known of it [s].
-        friction: forces whose squares add up to what friction may be, each of shape (m,) [N].
+    The lag of the force [s], known to its deviation, is taken out of the segments, one at least.
     """
     dt = float(np.median(np.diff(problem.time)))
     position = problem.motion.moved(0, lag)
-    channels = (
-        position,
-        problem.motion.moved(1, lag),
-        problem.force,
-        *friction,
-        *_round(problem, position, lag),
-    )
+    besides = *friction, *_round(problem, position, lag)
+    channels = position, problem.motion.moved(1, lag), problem.force, *besides
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
     length = longest_of(segments)
-    for _ in range(_MOST):
-        if length < SHORTEST:
-            break
+    while length >= SHORTEST:
         blocks = _blocks(problem, channels, segments, length, len(friction))
         octave = _octave(blocks, length, dt, variance, lag_std)
         if _LOWEST <= octave.frequency * length * dt <= _HIGHEST:
@@ -155,11 +140,10 @@ def _blocks(
     seen, count = transform_of(length, LINES), len(LINES)
 
     def lines(values: Array) -> Complex:
-        views = [
-            np.lib.stride_tricks.sliding_window_view(values[s.first : s.last], length)[:: max(length // 2, 1)]
-            for s in segments
-            if s.length >= length
-        ]
+        parts = [values[s.first : s.last] for s in segments if s.length >= length]
+        views = (
+            np.lib.stride_tricks.sliding_window_view(own, length)[:: max(length // 2, 1)] for own in parts
+        )
         real = np.concatenate([own @ seen for own in views])
         return np.asarray(real[:, :count] + 1j * real[:, count:])
 
@@ -167,9 +151,8 @@ def _blocks(
     frequency = np.array([PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
     x, v, f, *others = (lines(values) for values in channels)
-    return _Blocks(
-        x, v, f, tuple(others[besides:]), tuple(others[:besides]), 2 * float(line[0]) * chain.dt / dt
-    )
+    rounded, friction = tuple(others[besides:]), tuple(others[:besides])
+    return _Blocks(x, v, f, rounded, friction, 2 * float(line[0]) * chain.dt / dt)
 
 
 def _octave(blocks: _Blocks, length: int, dt: float, variance: float, lag_std: float) -> DynamicStiffness:
@@ -250,13 +233,8 @@ def working_point(
     series = SeriesSpring.of(options)
     if press is not None and series is not None:
         press = series.slopes(press)
-    if press is not None and (
-        octave is None
-        or (
-            not octave.in_phase.known_to(tolerance)
-            and press.stiffness.relative_half < octave.in_phase.relative_half
-        )
-    ):
+    own = None if octave is None or octave.in_phase.known_to(tolerance) else octave.in_phase.relative_half
+    if press is not None and (octave is None or (own is not None and press.stiffness.relative_half < own)):
         found, source = press, "press"
     elif octave is not None:
         found, source = _at_octave(octave, problem, segments, hidden), "octave"

@@ -255,15 +255,6 @@ _USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 
 a marker that they do not see."""
 
 
-_LEAST_SHARE = 0.002
-"""Of the rows: a reading that is right by accident is rarer, one in the number of steps of its converter."""
-
-
-_APART = 0.5
-"""Least distance of such a value from the readings beside it, in the column's unit: half of the step between whole
-numbers, which these values are."""
-
-
 def find_sentinel(values: Array) -> float | None:
     """The value in a column, shape (n,), that plainly means "no reading"; None where there is none.
 
@@ -272,8 +263,7 @@ def find_sentinel(values: Array) -> float | None:
     """
     for value in _USUAL:
         here = values == value
-        share = float(np.mean(here))
-        if not max(_LEAST_SHARE, 2 / len(values)) <= share < 1 - 2 / len(values):
+        if not 2 <= np.count_nonzero(here) < len(values) - 2:
             continue
         others = values[~here & np.isfinite(values)]
         if len(others) > 1 and _outside(value, others) and _jumps(values, here, value):
@@ -290,9 +280,10 @@ def _outside(value: float, others: Array) -> bool:
 
 
 def _jumps(values: Array, here: Mask, value: float) -> bool:
-    """Whether the typical reading beside this value is far from it, measured by how far readings step otherwise."""
+    """Whether the typical reading beside this value is far from it, measured by their steps where they change."""
     beside = values[1:][here[:-1] & ~here[1:]]
     if not len(beside):
         return False
     steps = np.abs(np.diff(values[~here]))
-    return float(np.median(np.abs(beside - value))) > _APART + 3 * float(np.median(steps))
+    typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    return float(np.median(np.abs(beside - value))) > 3 * typical

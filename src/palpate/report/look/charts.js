@@ -99,7 +99,7 @@ const palpate = (() => {
   const chart = (host, spec, columns, group = new Group()) => {
     const self = { marks: spec.marks || [] };
     const whole = make("button", { type: "button", class: "screen" }, "whole range");
-    const head = make("header", {}, make("h3", {}, spec.title), legend([...spec.series, ...(spec.keys || [])]), whole);
+    const head = make("header", {}, make("div", {}, make("h3", {}, spec.title), legend([...spec.series, ...(spec.keys || [])])), whole);
     const read = make("span", { class: "read" });
     const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.alt || spec.title });
     host.classList.add("chart");
