@@ -34,7 +34,7 @@ LARGEST = {
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
     "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2502, tokens=19604),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1305, tokens=9043),
-    "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2897, tokens=25561),
+    "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2890, tokens=25561),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3168, tokens=18712),
     "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6284, tokens=42397),
 }
