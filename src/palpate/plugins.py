@@ -255,4 +255,6 @@ def _not_there(module: str, name: str) -> str:
     near = get_close_matches(module, sorted(here), n=1)
     hint = f"did you mean '{near[0]}:{name.partition(':')[2]}'? " if near else ""
     places = " and ".join(dict.fromkeys(map(str, _search())))
-    return f"{name}: there is no module {module!r}; {hint}It is looked for among the installed ones, and in {places}"
+    return (
+        f"{name}: there is no module {module!r}; {hint}looked for among the installed ones, and in {places}"
+    )

@@ -98,6 +98,8 @@ class Signals:
             return self, {}
         from palpate.logs.listing import list_log
 
+        if kind_of(path) is Kind.PARQUET and (about := stored_about(path)) is not None:
+            known_frame |= "wrench_frame" in about.meta
         proposal = list_log(path, self.delimiter, self.limits).proposal
         guesses = [guess for guess in proposal.guesses if not (known_frame and "--wrench-frame" in guess)]
         if bag and (proposal.options is None or guesses):

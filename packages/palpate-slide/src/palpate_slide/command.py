@@ -90,12 +90,11 @@ class SlideOptions(SlideLimits):
         from palpate_slide.ground import ground_of
 
         numbers: dict[str, float] = {}
+        names = dict(_SURFACE)
         for part in self.surface.split(","):
             key, _, text = (word.strip() for word in part.partition("="))
             try:
-                if _SURFACE[key] in numbers:
-                    raise KeyError(key)
-                numbers[_SURFACE[key]] = float(text)
+                numbers[names.pop(key)] = float(text)
             except (KeyError, ValueError):
                 raise InputError(
                     f"--surface needs K=..,B=..,mu=.. as numbers, each once, as K=20000,mu=0.3; got {self.surface!r}"
@@ -202,13 +201,12 @@ class SlideOptions(SlideLimits):
         wanted = 15.0 if self.force is None else self.force.si
         if self.gains is not None:
             gains = load_gains(self.gains)
-            given = options_given((self,)).keys()
-            twice = sorted(given & {field.name.replace("_", "-") for field in fields(SlideLimits)})
-            if self.has_no_joints and "arm" in given and load_arm(self.arm).title != gains.arm.title:
-                twice = ["arm"]
-            if twice:
+            own = {field.name.replace("_", "-") for field in fields(SlideLimits)}
+            if self.has_no_joints and load_arm(self.arm).title != gains.arm.title:
+                own.add("arm")
+            for name in sorted(own & options_given((self,)).keys()):
                 raise InputError(
-                    f"--{twice[0]} is of the gains, and {self.gains} has its own; leave it out, or tune again"
+                    f"--{name} is of the gains, and {self.gains} has its own; leave it out, or tune again"
                 )
             return gains if self.force is None else msgspec_replace(gains, force=wanted)
         if not wanted > 0.0:
@@ -270,8 +268,8 @@ def slide(
     seconds = duration(asked.path, asked.seconds, speed, asked.extent)
     if seconds < SHORTEST_TIME:
         raise InputError(
-            f"a line of {1e3 * asked.extent:g} mm ends after {seconds:.2g} s at {1e3 * speed:g} mm/s, and a slide is "
-            f"judged from {SHORTEST_TIME:g} s up; give a longer --length, or a lower --speed"
+            f"a line of {1e3 * asked.extent:g} mm ends after {seconds:.2g} s, and a slide is judged from "
+            f"{SHORTEST_TIME:g} s up; give a longer --length, or a lower --speed"
         )
     ways = directions(asked.path, seconds, gains.arm.rate, speed, asked.extent)
     check_directions(ways, gains, asked.into)

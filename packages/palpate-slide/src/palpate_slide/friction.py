@@ -32,9 +32,6 @@ PAYLOAD = 20.0
 """Standard deviation of a weight of which nothing is known [N]: robots carry tools of some kilograms."""
 BY_CHANCE = 1e-3
 """How probable a dependence on speed may be by chance."""
-LACKS = 0.5
-"""Of what friction lacks of gross slip, by one length of relaxation, that counts as uncertain: the column of mu in
-`benchmarks/force/sliding_logs.py` measures it."""
 CONTRARY = 0.05
 """Share of the windows in which friction may seem to push, against its noise."""
 ASKEW = np.radians(30.0)
@@ -251,10 +248,10 @@ def _coefficient(
     left = float(np.median(np.abs(found.angle[rows] * course.noise[rows] / size))) * 1.4826
     own = float(np.median(course.noise[rows] / size))
     spread = float(np.hypot(spread, np.sqrt(max(left**2 - own**2, 0.0))))
-    lacks = LACKS * float(np.mean(1.0 - share[rows, 0]))
+    lacks = float(np.mean(1.0 - share[rows, 0]))  # of gross slip, by one length: in doubt as a whole
 
     def half(values: Array, stds: Array, spread: float) -> Array:
-        return np.sqrt((t * stds) ** 2 + (2.0 * lacks * values) ** 2 + spread**2)
+        return np.sqrt((t * stds) ** 2 + (lacks * values) ** 2 + spread**2)
 
     whole = half(found.mu, np.sqrt(np.diag(found.covariance)[:1]), spread)
     value, wide = float(found.mu[0]), float(whole[0])

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.contact_frame.free_motion import FEWEST
-from palpate.contact_frame.load import known_load, load_of, no_load
+from palpate.contact_frame.load import known_load, load_of, no_load, robust_load
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 
@@ -30,8 +30,9 @@ BLOCKS = 24
 LENGTHS = 3e-5 * 2.2 ** np.arange(9)
 """Of relaxation, that are tried first [m]."""
 SHAPE = 1.5
-"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's. The column of K of slides
-in `benchmarks/force/sliding_logs.py` measures it."""
+"""Factor within which one length describes how friction relaxes: no contact is quite Dahl's. That of a sphere acts with
+the share 1 - (1 - 2x/3)^1.5 after a way of x lengths (Cattaneo, Mindlin): by its integral Dahl's on 0.6 of the length,
+and from 0.3 to 0.9 of the friction on 1.5 to 0.85 times that."""
 CHORD, GRAINS = 3e-4, 40.0
 """Path in a window: at least so long [m], and so many deviations of the position's noise."""
 MOVES = 0.1
@@ -44,8 +45,6 @@ SHORTEST = 2e-3
 """Slide that is one [m]."""
 MOST = 1500
 """Windows that are looked at."""
-MOST_MU = 5.0
-"""Friction of a fit, at most: a force along the motion is a press' and its angle no friction's."""
 STUCK = 0.98
 """Share of friction below which a row is of a contact that sticks."""
 
@@ -123,9 +122,6 @@ def nearest(time: Array, at: Array) -> NDArray[np.intp]:
     return found
 
 
-QUIET = 0.1
-"""Share of the contact's force within which free motion stays; `benchmarks/force/sliding_logs.py` measures it
-by its rows with and without free motion."""
 ALONG = np.sqrt(0.5)
 """Cosine of the angle between the approach and the force after it, at least: rather along it than across."""
 
@@ -144,7 +140,7 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
     n = max(round(0.05 / step), 3)
     kernel = np.ones(n) / n
     mean = np.column_stack([np.convolve(axis, kernel, "valid") for axis in raw[there].T])
-    chance = 6.0 * _noise(raw[there]) / np.sqrt(n)
+    chance = 6.0 * _noise(mean[::n])  # of means, however the noise is coloured
     if np.linalg.norm(mean - np.median(mean, axis=0), axis=1).max() <= chance:
         return None
     place = signals.place[there][n // 2 :][: len(mean)]
@@ -157,12 +153,11 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
         far = np.linalg.norm(own - level, axis=1)
         usual = float(np.quantile(far, 0.9))
         met = end = int(np.argmax(far > 0.5 * usual))
-        quiet = max(chance, min(3.0 * float(np.median(far[:brief])), QUIET * usual))
-        while end and far[end] > quiet:
+        while end and far[end] > chance:
             end -= 1
         if end < max(brief, FEWEST):
             continue
-        after = R[end] @ (np.median(own[end : end + max(round(0.5 / step), n)], axis=0) - level)
+        after = R[met] @ (np.median(own[met : met + max(round(0.5 / step), n)], axis=0) - level)
         came, went = at[end] - at[end - brief], at[min(met + brief, len(at) - 1)] - at[met]
         along = abs(came @ after) > ALONG * float(np.linalg.norm(came) * np.linalg.norm(after))
         # The force comes on a shorter way than it stayed away on, and the tip does not turn back, as friction would.
@@ -177,11 +172,17 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
     whole = np.zeros(len(time), bool)
     whole[rows[free]] = True
     whole &= whole.sum() >= FEWEST
+    weighs = not frame.gravity_compensated
+    if whole.any():  # what touches before the slide is not free
+        load = robust_load(raw[whole], signals.rotations[whole], weighs=weighs)
+        far = np.linalg.norm(load.taken_off(mean, rotations), axis=1)
+        touched = free & (far > max(chance, 3.0 * float(np.median(far[free]))))
+        whole[rows[np.convolve(touched, np.ones(2 * n + 1), "same") > 0.5]] = False
     read, at_rest = raw[whole], signals.rotations[whole]
     if frame.payload is not None:
         load = known_load(read, at_rest, frame.payload)
     else:
-        load = load_of(read, at_rest, weighs=not frame.gravity_compensated) if whole.any() else no_load()
+        load = load_of(read, at_rest, weighs=weighs) if whole.any() else no_load()
     force = load.taken_off(raw, signals.rotations)
     size = np.linalg.norm(load.taken_off(mean, rotations), axis=1)
     usual = float(np.median(size[~free])) if (~free).any() else 0.0
@@ -192,14 +193,12 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
 
 
 def _noise(values: Array) -> float:
-    """Standard deviation of a reading, by third differences of the rows and axes that change; rounding at least."""
-    changes = np.diff(values, axis=0) != 0.0
-    fresh = values[np.ix_(np.r_[True, changes.any(axis=1)], changes.any(axis=0))]
+    """Standard deviation of a reading of an axis, by third differences of the rows that differ."""
+    fresh = values[np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)]]
     if len(fresh) < 8:
         return 0.0
     third = np.diff(fresh, 3, axis=0)
-    noise = np.median(np.abs(third - np.median(third))) * 1.4826 / np.sqrt(20.0)
-    return float(max(noise, np.finfo(float).eps * np.abs(fresh).max()))
+    return float(np.median(np.abs(third - np.median(third))) * 1.4826 / np.sqrt(20.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,9 +395,11 @@ class Fit:
         classes = int(self.classes.max()) + 1
         enough = bool(np.bincount(self.classes[slips], minlength=classes).min() >= 2 * BLOCKS)
         rows = slips | (not enough)
+        psi = self.psi(self.lag, np.zeros(len(self.prior) - 1))[0]
+        x = np.r_[
+            np.full(classes, np.tan(np.median(psi[rows]))), 0.0, self.lag, np.zeros(len(self.prior) - 1)
+        ]
         center = np.r_[np.zeros(classes + 1), self.lag, np.zeros(len(self.prior) - 1)]
-        x, psi = center.copy(), self.psi(self.lag, center[classes + 2 :])[0]
-        x[:classes] = np.clip(np.tan(np.median(psi[rows])), -MOST_MU, MOST_MU)
         inverse = np.r_[np.zeros(classes + 1), 1.0 / self.prior]
         step = np.r_[np.full(classes, 1e-4), 1e-7, 1e-4, np.full(len(self.prior) - 1, 1e-3)]
         alike = 1.0
@@ -420,7 +421,7 @@ class Fit:
             A = J.T @ (w[:, None] * J) + np.diag(inverse**2)
             move = -np.linalg.solve(A, J.T @ (w * r) + inverse**2 * (x - center))
             x = x + move
-            x[:classes] = np.clip(x[:classes], -MOST_MU, MOST_MU)
+            x[:classes] = np.clip(x[:classes], -5.0, 5.0)
             if np.all(np.abs(move) < 0.01 * step):
                 break
         # Parts of the time, and of the place: what a path repeats on each lap is in every part of the time.

@@ -143,9 +143,7 @@ def ground_of(
         f"{name} of {value:g}" for name, value in numbers.items() if not least.get(name, 0.0) <= value < inf
     ]
     if low:
-        raise InputError(
-            f"a surface needs K and a radius above 0, and B, mu, mus, creep not below 0; got {low[0]}"
-        )
+        raise InputError(f"a surface needs K and a radius above 0, and nothing below 0; got {low[0]}")
     if numbers["sticking"] < numbers["friction"]:
         raise InputError(
             f"friction at rest (mus) must not be below that at speed (mu), got {numbers['sticking']:g} and {friction:g}"

@@ -88,13 +88,13 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
 
 def _content(path: Path) -> str:
     """Attributes of a mesh of MuJoCo: its file, or the triangles of an STL in text, which MuJoCo does not read."""
-    with path.open("rb") as file:
-        text = file.read(5) == b"solid" and b"facet" in file.read(1000)
-    corners = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", path.read_bytes()) if text else []
-    if path.suffix.lower() == ".obj" or not corners:
+    data = path.read_bytes()
+    in_text = re.match(rb"solid.*\s+facet", data)
+    corners = re.findall(rb"\bvertex\s+(\S+\s+\S+\s+\S+)", data) if in_text else []
+    if not corners:
         return f"file={quoteattr(str(path.resolve()))}"
-    numbers = " ".join(number.decode("ascii", "replace") for corner in corners for number in corner)
-    return f'vertex={quoteattr(numbers)} face="{" ".join(map(str, range(len(corners) // 3 * 3)))}"'
+    numbers = b" ".join(corners).decode("ascii", "replace")
+    return f'vertex={quoteattr(numbers)} face="{" ".join(map(str, range(len(corners))))}"'
 
 
 def _check(path: Path, grid: Array, half: int) -> None:

@@ -109,7 +109,8 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     columns = {"t": gains.arm.tick * np.arange(len(rows)), **dict(zip(COLUMNS, rows.T, strict=True))}
     columns = {name: column for name, column in columns.items() if not np.isnan(column).all()}
     units = {name: _UNITS.get(name, "1") for name in columns}
-    write_record(Record(columns, units, {"command": summary["command"]}), folder / RECORD)
+    about = {"command": summary["command"], "wrench_frame": "base"}
+    write_record(Record(columns, units, about), folder / RECORD)
     charts = _charts(rows, gains, summary)
     style.save(figure_of(charts), folder / "slide.png")
     shown = panels(charts)
@@ -142,27 +143,21 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     f, n, truth = summary["force"], summary["normal"], summary["truth"]
     if f is None:
         return [Card("Contact", "none", tone="fail")]
-    K, (mu, half), t = summary["stiffness"], _friction(summary), summary["tool"]
+    K, (mu, half) = summary["stiffness"], _friction(summary)
     lost = summary["contact_lost"]
     off = f"median error {n['median_error_deg']:.2g}\N{DEGREE SIGN}"
     error, most = f"{100 * f['rms_share']:.2g}", f"largest {100 * f['largest_share']:.2g} %, after 0.5 s"
     true = quantity(truth["stiffness"], "N/m") + ", with the arm in series" * (summary["mode"] == "position")
+    tool = [
+        Card("Tool", f"{t['median_angle_deg']:.2g}", "\N{DEGREE SIGN}", why=f"95 %: {t['angle95_deg']:.2g}")
+        for t in [summary["tool"]]
+        if t
+    ]
     return [
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
         Card("Normal", f"± {plain(n['cone95_deg'], 2)}", "\N{DEGREE SIGN}", why=off),
-        *(
-            [
-                Card(
-                    "Tool",
-                    f"{t['median_angle_deg']:.2g}",
-                    "\N{DEGREE SIGN}",
-                    why=f"95 %: {t['angle95_deg']:.2g}",
-                )
-            ]
-            if t
-            else []
-        ),
+        *tool,
         Card("Friction", mu, half=half, why=f"truth {truth['friction']:g}"),
         Card(
             "Stiffness", quantity_between(K["ci95"][0], K["ci95"][1], "N/m"), why=f"truth {true}", colour="K"
@@ -187,16 +182,12 @@ def _charts(rows: Array, gains: Gains, summary: dict[str, Any]) -> list[Chart]:
     step = np.linalg.norm(np.diff(np.stack([c[a] for a in "xyz"], 1), axis=0), axis=1)
     way = 1e3 * np.append(0.0, np.cumsum(step))
     within = 0.1 * gains.force
-    truth, asked, cone = (
-        summary["truth"],
-        1e3 * summary["slide"]["speed_m_s"],
-        np.degrees(CHI2_95 * c["cone"]),
-    )
-    slower = _slower(way, c["speed"], summary["slide"]["speed_m_s"]) if on.any() else []
+    truth, speed, cone = summary["truth"], summary["slide"]["speed_m_s"], np.degrees(CHI2_95 * c["cone"])
+    slower = _slower(way, c["speed"], speed) if on.any() else []
     charts = []
     for label, value, ends, known, colour, least in (
         ("force error [N]", c["normal_force"] - c["desired"], (), (-within, within), "F", None),
-        ("speed [mm/s]", 1e3 * c["speed"], (), (asked,), "ink", 0.0),
+        ("speed [mm/s]", 1e3 * c["speed"], (), (1e3 * speed,), "ink", 0.0),
         ("normal's error [deg]", np.degrees(c["normal_error"]), (cone,), (), "ink", 0.0),
         ("tool's angle [deg]", np.degrees(c["tool"]), (), (), "ink", 0.0),
         ("friction [1]", c["mu"], _interval(c, "mu"), (truth["friction"],), "ink", None),

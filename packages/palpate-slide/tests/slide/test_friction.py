@@ -12,8 +12,10 @@ from scipy.spatial import cKDTree
 from oracles.wiped_surface import Wipe, WipeLog, any_press, any_wipe, press, wipe
 from palpate.cli import main
 from palpate.contact_frame import ContactFrame, identify_contact
+from palpate.contact_frame.signals_in_base import signals_of
 from palpate.identification import Identification, Verdict
 from palpate.records import Record
+from palpate_slide.from_log import SHAPE, freed_of
 
 UNITS = {"time": "s", "force": "N", "position": "m", "quaternion": "1"}
 WORLD = Wipe(seed=1, shape="bowl", path="back", mu=0.4, dither=0.1, seconds=8.0, rate=250.0, force_rate=250.0)
@@ -133,6 +135,34 @@ def test_the_command_says_first_that_the_tip_slides(tmp_path, capsys, monkeypatc
     assert answer["parameters"]["mu"]["verdict"] == "identified"
     assert {"friction", "by_speed", "normal", "places", "stiffness"} <= set(answer["slide"])
     assert "The tip slides" in (tmp_path / "page.html").read_text()
+
+
+def test_a_slides_own_record_is_read_with_its_frames_and_without_its_touches(tmp_path, capsys):
+    """Three touches before the slide are no free motion, and the slide at the end of the record is none either."""
+    quick = ["--shape", "plane", "--surface", "K=8000,mu=0.3", "--path", "line", "--seconds", "4"]
+    assert main(["slide", *quick, "--out", str(tmp_path / "out"), "--json"]) == 0
+    capsys.readouterr()
+    main(["identify", str(tmp_path / "out" / "record.parquet"), "--json"])
+    own = json.loads(capsys.readouterr().out)["parameters"]
+    for name, truth in (("mu", 0.3), ("K", 8e3)):
+        assert own[name]["verdict"] == "identified"
+        assert own[name]["ci95"][0] < truth < own[name]["ci95"][1]
+
+
+@pytest.mark.parametrize("seed", [21100, 21101, 21116, 21120])
+def test_a_slide_that_begins_in_contact_shows_no_free_motion(seed):
+    log = wipe(any_wipe(seed, free=0.0))
+    record = Record(log.columns, {name: UNITS[name.partition("_")[0]] for name in log.columns}, {})
+    frame = ContactFrame(wrench_frame="tool")
+    freed = freed_of(signals_of(record, frame), frame)
+    assert freed is None or not freed.free.any()
+
+
+def test_the_length_of_a_spheres_friction_is_within_its_factor():
+    way = 1.5 * (1.0 - (1.0 - np.linspace(0.3, 0.9, 50)) ** (2.0 / 3.0))
+    lengths = -way / np.log(1.0 - np.linspace(0.3, 0.9, 50)) / 0.6
+    assert lengths.max() < SHAPE < 1.03 * lengths.max()
+    assert lengths.min() > 1.0 / SHAPE
 
 
 @pytest.mark.parametrize(

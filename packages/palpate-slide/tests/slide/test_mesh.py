@@ -50,7 +50,7 @@ def obj(path: Path, corners: np.ndarray) -> Path:
 
 def stl_text(path: Path, corners: np.ndarray) -> Path:
     facets = (
-        f"facet normal 0 0 0\nouter loop\n{{}}endloop\nendfacet\n".format(
+        "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n".format(
             "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in corner)
         )
         for corner in corners.tolist()

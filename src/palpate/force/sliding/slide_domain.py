@@ -108,7 +108,8 @@ def slide_sentence(gains: Gains) -> str:
     )
     floor = (
         f"no normal, right or wrong, presses harder than {(1.0 + slide.mu_max**2) ** 0.5:.3g} times the force at rest; "
-        f"a step costs half the force at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on {gains.cap / 1e3:.4g} kN/m"
+        f"a step costs half the force at most up to {1e3 * edge_speed(gains, gains.cap):.2g} mm/s on "
+        f"{gains.cap / 1e3:.4g} kN/m"
     )
     if domain is None:
         better = "slow down, or give a better normal"
