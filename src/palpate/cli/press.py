@@ -11,6 +11,7 @@ from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
+from palpate.cli.options.kept import only
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options, si
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
@@ -171,19 +172,6 @@ class LimitOptions:
     stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
     time_limit: values.Time | None = None
     "Total duration, as 20:s."
-
-
-def only(part: Any, of: str) -> None:
-    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
-
-    Raises:
-        InputError: one was given; it is named.
-    """
-    if part != type(part)():
-        from palpate.cli.options.kept import options_given
-
-        given = next(iter(options_given((part,))))
-        raise InputError(f"--{given} is for {of}, or leave out --{given}")
 
 
 def press(

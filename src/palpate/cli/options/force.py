@@ -133,7 +133,7 @@ class SlideTuningOptions(SlideLimits):
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        from palpate.cli.press import only
+        from palpate.cli.options.kept import only
 
         if self.slide:
             return self.gains_with(gains, self.radius.si)

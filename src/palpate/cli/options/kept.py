@@ -47,6 +47,16 @@ def options_given(parts: Iterable[Any]) -> dict[str, Any]:
     }
 
 
+def only(part: Any, of: str) -> None:
+    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
+
+    Raises:
+        InputError: one was given; it is named.
+    """
+    for given in options_given((part,)):
+        raise InputError(f"--{given} is for {of}, or leave out --{given}")
+
+
 def _name(part: Any, field: str) -> str:
     """The first name of an option on the command line."""
     hint = get_type_hints(type(part), include_extras=True)[field]
