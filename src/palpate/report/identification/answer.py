@@ -75,6 +75,7 @@ _CAUSES = {
     "other forces": "drift or friction",
     "blocks": "parts of the log differ",
     "repetition": "presses differ",
+    "loadings": "loadings differ",
     "octaves": "frequencies differ",
     "touch": "the touch",
     "unseen way": "the first reading",
