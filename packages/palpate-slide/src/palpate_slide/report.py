@@ -42,10 +42,11 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
     on = c["sliding"] > 0.0
     never = "no slide" if c["normal_force"].any() else "no contact"
     said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
+    seen = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
     summary: dict[str, Any] = {
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,
         "end": "held" if found.obeys else "not held" if found.touched else never,
-        "truth": {"friction": ground.friction, "stiffness": _seen(gains, ground)},
+        "truth": {"friction": ground.friction, "stiffness": seen},
         "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
         "tool": None,
     }  # fmt: skip
@@ -72,10 +73,6 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
             "angle95_deg": float(np.degrees(np.percentile(c["tool"][judged], 95))),
         } if turned else None,
     }  # fmt: skip
-
-
-def _seen(gains: Gains, ground: Ground) -> float:
-    return gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
 
 
 def sentence(summary: dict[str, Any]) -> str:
