@@ -259,7 +259,7 @@ class SlideWindows:
         return F, lean(F, way) - friction_that_acts(found.mu[0], share), slips
 
     def load_on(self, turned: Array, load: Array) -> Array:
-        """Force [N] of the bias and weight that a `SlideFit` found, on a tool turned by matrices (n, 3, 3), shape (n, 3)."""
+        """Force [N] of bias and weight as in `SlideFit`, on a tool turned by matrices (n, 3, 3), shape (n, 3)."""
         off: Array = turned @ load[:3]
         return off if len(load) == 3 else off + load[3:] - turned @ self.rest.T @ load[3:]
 
