@@ -263,7 +263,7 @@ class SlideWindows:
         return F, lean(F, way) - friction_that_acts(found.mu[0], share), slips
 
     def load_on(self, turned: Array, load: Array) -> Array:
-        """What is left of bias and weight [N] as of `SlideFit`, on a tool that is turned so, shape (n, 3)."""
+        """Rest of bias and weight [N] as of `SlideFit`, on a tool that is turned so, shape (n, 3)."""
         off: Array = turned @ load[:3]
         return off if len(load) == 3 else off + load[3:] - turned @ self.rest.T @ load[3:]
 
