@@ -45,6 +45,8 @@ SHORTEST = 2e-3
 """Slide that is one [m]."""
 MOST = 1500
 """Windows that are looked at."""
+MOST_MU = 5.0
+"""Friction of a fit, at most: a force along the motion is a press' and its angle no friction's."""
 STUCK = 0.98
 """Share of friction below which a row is of a contact that sticks."""
 
@@ -193,12 +195,14 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
 
 
 def _noise(values: Array) -> float:
-    """Standard deviation of a reading of an axis, by third differences of the rows that differ."""
-    fresh = values[np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)]]
+    """Standard deviation of a reading, by third differences of the rows and axes that change; rounding at least."""
+    changes = np.diff(values, axis=0) != 0.0
+    fresh = values[np.ix_(np.r_[True, changes.any(axis=1)], changes.any(axis=0))]
     if len(fresh) < 8:
         return 0.0
     third = np.diff(fresh, 3, axis=0)
-    return float(np.median(np.abs(third - np.median(third))) * 1.4826 / np.sqrt(20.0))
+    noise = np.median(np.abs(third - np.median(third))) * 1.4826 / np.sqrt(20.0)
+    return float(max(noise, np.finfo(float).eps * np.abs(fresh).max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -397,7 +401,8 @@ class Fit:
         enough = bool(np.bincount(self.classes[slips], minlength=classes).min() >= 2 * BLOCKS)
         rows = slips | (not enough)
         psi = self.psi(0.0, np.zeros(len(self.prior) - 1))[0]
-        x = np.r_[np.full(classes, np.tan(np.median(psi[rows]))), np.zeros(1 + len(self.prior))]
+        friction = np.clip(np.tan(np.median(psi[rows])), -MOST_MU, MOST_MU)
+        x = np.r_[np.full(classes, friction), np.zeros(1 + len(self.prior))]
         inverse = np.r_[np.zeros(classes + 1), 1.0 / self.prior]
         step = np.r_[np.full(classes, 1e-4), 1e-7, 1e-4, np.full(len(self.prior) - 1, 1e-3)]
         alike = 1.0
@@ -415,7 +420,7 @@ class Fit:
             A = J.T @ (w[:, None] * J) + np.diag(inverse**2)
             move = -np.linalg.solve(A, J.T @ (w * r) + inverse**2 * x)
             x = x + move
-            x[:classes] = np.clip(x[:classes], -5.0, 5.0)
+            x[:classes] = np.clip(x[:classes], -MOST_MU, MOST_MU)
             if np.all(np.abs(move) < 0.01 * step):
                 break
         # Parts of the time, and of the place: what a path repeats on each lap is in every part of the time.
