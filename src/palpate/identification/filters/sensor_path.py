@@ -111,6 +111,7 @@ def _count(stretches: list[Array]) -> float:
 
 
 _DERIVATIVES = 5
+"""The position and four derivatives: one of order 0 to 2 is read, with the two after it for a lag nearby."""
 _NEAR = 0.25
 """Steps of time within which a lag is reached by Taylor's series from one that was read before."""
 _FORGOTTEN = 10.0
