@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from palpate.errors import InputError, unknown
 from palpate.files import read_text, read_toml, write_text
 from palpate.files.writing import MADE
-from palpate.logs.presets import preset
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -116,6 +115,8 @@ def _value_of(words: Sequence[str], flag: str) -> str | None:
 
 
 def _preset(name: str, known: set[str]) -> dict[str, Any]:
+    from palpate.logs.presets import preset
+
     return _check(preset(name), f"preset {name}", known)
 
 
