@@ -110,7 +110,7 @@ def alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
     end = summary["end"]
     if end != "done":
         tone = "fail" if end in _FAILED or end == "no contact" else "warn"
-        text, advice = f"{summary['why']}.", _ADVICE.get(end, "")
+        text, advice = f"{summary['why'].removeprefix(f'{end} ')}.", _ADVICE.get(end, "")
         found.append({"tone": tone, "title": f"{end.capitalize()}:", "text": text, "advice": advice})
     if summary["contacts_lost"] and end != "lost contact":
         times = summary["contacts_lost"]
