@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
 

@@ -16,9 +16,9 @@ from palpate.force.describe import bounds
 from palpate.force.sliding.slide_proof import slide_proof
 from palpate.force.tuning import RIGID, surface_ends
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, panels
-from palpate.report.numbers import quantity
 from palpate.report.page import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.text import printable
+from palpate.units import quantity
 from palpate_certify.controller_file import UNCOVERED, ControllerVerdict
 from palpate_certify.delayed_contact import DelayedContact
 
