@@ -97,6 +97,15 @@ def test_commas_that_part_thousands(tmp_path, dialect, copies):
     assert np.allclose(record["force"], force, atol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("x", "scale"), [("{:,.2f}", 1), ("{:.2f}", 1000)], ids=["beside both marks", "alone"]
+)
+def test_a_comma_before_three_digits_parts_thousands_beside_a_cell_with_both_marks(tmp_path, x, scale):
+    at = 2000 + np.arange(200)
+    rows = [f"{t:.2f};{x.format(1e3 + k)};{k:,}" for t, k in zip(np.arange(200) / 100, at, strict=True)]
+    assert np.allclose(read(tmp_path / "log.csv", ["t;x;f", *rows])["force"], at / scale)
+
+
 def test_a_decimal_comma_with_three_places_stays_one(tmp_path):
     rows = [f"{t:.3f};{1e-3 * t:.6f};{f:.3f}".replace(".", ",") for t, f in zip(T, 1.5 + T, strict=True)]
     assert np.allclose(read(tmp_path / "log.csv", ["t;x;f", *rows])["force"], 1.5 + T)
