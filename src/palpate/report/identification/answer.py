@@ -38,10 +38,11 @@ from palpate.report.identification.words import (
     sentence,
     unit_warnings,
 )
-from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
-from palpate.report.page import CommandAnswer, print_hanging
+from palpate.report.output import as_html, console_text
+from palpate.report.page import CommandAnswer
 from palpate.signals.types import NORMAL
-from palpate.text import printable
+from palpate.text import print_hanging, printable
+from palpate.units import NONE, plain, quantity, with_half
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

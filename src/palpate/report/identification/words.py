@@ -11,8 +11,8 @@ from palpate.files import RECORD
 from palpate.identification.causes import BRIEF, Cause, Code, cause_of
 from palpate.identification.result import Identification, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.numbers import plain, quantity, quantity_between, with_half
 from palpate.text import printable
+from palpate.units import plain, quantity, quantity_between, with_half
 
 CALLED = {
     "K": "stiffness",

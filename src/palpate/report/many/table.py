@@ -25,8 +25,8 @@ from palpate.report.identification.words import (
     unit_warnings,
     units_of,
 )
-from palpate.report.numbers import NONE, plain, quantity, si_prefix, with_half
 from palpate.report.page import CommandAnswer, Table
+from palpate.units import NONE, plain, quantity, si_prefix, with_half
 
 POINT = "working point"
 

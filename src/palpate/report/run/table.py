@@ -5,10 +5,10 @@ from typing import Any
 
 from palpate.identification.result import Identification
 from palpate.report.identification.words import CALLED
-from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import Card, CommandAnswer, Table
 from palpate.signals.types import NORMAL
 from palpate.text import printable
+from palpate.units import NONE, plain, quantity, with_half
 
 
 def force_cards(summary: dict[str, Any]) -> list[Card]:
