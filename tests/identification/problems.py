@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from palpate.identification.contacts import contacts_of
-from palpate.identification.front_end import problem_of
 from palpate.identification.options import Options
-from palpate.identification.problem import Problem
+from palpate.identification.problem import Problem, problem_of
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
 

@@ -10,8 +10,7 @@ import pytest
 
 from identification.synthetic_contacts import pressed, shaken
 from palpate.identification import identify
-from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.budget import Spread
+from palpate.identification.estimators.budget import Answer, Spread
 from palpate.identification.uncertainty import (
     Contribution,
     Measurement,

@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identification.estimators.answer import Answer
+from palpate.identification.estimators.budget import Answer
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.options import Options
 from palpate.identification.result import DynamicStiffness, Press, Tangent

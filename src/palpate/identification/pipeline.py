@@ -13,10 +13,9 @@ from palpate.identification.estimators.fit import Fit, fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
 from palpate.identification.filters.state_variable import Chain, block_means
-from palpate.identification.front_end import problem_of
 from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import LAG, Options
-from palpate.identification.problem import Problem, with_fewer_rows
+from palpate.identification.problem import Problem, problem_of, with_fewer_rows
 from palpate.identification.result import (
     DynamicStiffness,
     Identification,

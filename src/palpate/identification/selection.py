@@ -14,8 +14,7 @@ import numpy as np
 
 from palpate.arrays import Mask
 from palpate.errors import InputError
-from palpate.identification.estimators.answer import Answer
-from palpate.identification.estimators.budget import TOUCH, of_another
+from palpate.identification.estimators.budget import TOUCH, Answer, of_another
 from palpate.identification.estimators.linearisation import Linearisation, lag_open
 from palpate.identification.estimators.octaves import Solution, estimate, held, segments_of, solve
 from palpate.identification.filters.state_variable import Chain

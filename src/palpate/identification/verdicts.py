@@ -8,8 +8,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
-from palpate.identification.estimators.answer import Answer, Prediction
-from palpate.identification.estimators.budget import Budget, Spread
+from palpate.identification.estimators.budget import Answer, Budget, Prediction, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
 from palpate.identification.options import LAG, Lag

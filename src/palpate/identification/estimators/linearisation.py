@@ -8,7 +8,6 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.answer import Answer, Prediction
 from palpate.identification.estimators.averaging import (
     Member,
     averaged,
@@ -21,7 +20,14 @@ from palpate.identification.estimators.averaging import (
     seen,
     sensor_lines,
 )
-from palpate.identification.estimators.budget import FRICTION, Budget, Spread, effect_columns
+from palpate.identification.estimators.budget import (
+    FRICTION,
+    Answer,
+    Budget,
+    Prediction,
+    Spread,
+    effect_columns,
+)
 from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
     LARGEST,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.estimators.answer import Answer
+from palpate.identification.estimators.budget import Answer
 from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
