@@ -67,7 +67,13 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
         )
     asset = f'<mesh name="surface" inertia="shell" {_content(path)}/>'
     geom = '<geom type="mesh" mesh="surface" contype="0" conaffinity="0"/>'
-    model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
+    try:
+        model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
+    except InputError:  # in MuJoCo's words, which name elements that no user wrote
+        raise InputError(
+            f"{path}: no mesh is read from it; 4 corners or more, at most 200000 triangles and finite numbers are "
+            "needed; export it again as STL or OBJ"
+        ) from None
     turn = np.zeros(9)
     mujoco().mju_quat2Mat(turn, model.mesh_quat[0])
     points = scale * (model.mesh_vert @ turn.reshape(3, 3).T + model.mesh_pos[0])
