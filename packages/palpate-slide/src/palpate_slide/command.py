@@ -41,7 +41,6 @@ _SURFACE = {
     "grade": "grade",
 }
 
-
 _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
 
 

@@ -365,7 +365,7 @@ def _stiffness(
     rows = []
     for i in np.unique(main.part):
         at = main.part == i
-        own = Dips(*(values[at] for values in main[:4]), main.noise)
+        own = Dips(main.dip[at], main.columns[at], main.part[at], main.place[at], main.noise)
         one = _ratio(own, 8) if len(own.dip) > 32 else None
         if one is not None:
             K, half = surface(*one)

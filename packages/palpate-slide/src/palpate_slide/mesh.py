@@ -71,8 +71,7 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
         model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
     except InputError:  # in MuJoCo's words, which name elements that no user wrote
         raise InputError(
-            f"{path}: no mesh is read from it; 4 corners or more, at most 200000 triangles and finite numbers are "
-            "needed; export it again as STL or OBJ"
+            f"{path}: no mesh is read from it (4 corners, 200000 triangles at most, finite numbers); export it again"
         ) from None
     turn = np.zeros(9)
     mujoco().mju_quat2Mat(turn, model.mesh_quat[0])

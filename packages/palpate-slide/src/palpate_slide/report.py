@@ -30,8 +30,7 @@ _UNITS |= {"tool": "rad", "normal_error": "rad", "cone": "rad", "stiffness": "N/
 
 
 _DITHERED = (
-    "the dither takes the force off by more than a tenth, since it is followed late, and the tip slides at half the "
-    "speed then; beside the dither the force was held (a smaller --dither is faster)"
+    "the dither, followed late, takes the force off by a tenth, and halves the speed; a smaller one is faster"
 )
 
 
