@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import settings
 
-from palpate._jit import registry
+from palpate._jit import cache
 from palpate._jit.cache import home_of
 from palpate.cli import main
 from palpate.plugins import consent
@@ -70,7 +70,7 @@ def _forgotten_afterwards(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
 
     A kernel of the tests may call whatever is registered: each such module would have all that follow compiled anew.
     """
-    registered = (registry.parts, registry.foreign_laws, registry.foreign_files)
+    registered = (cache.parts, cache.foreign_laws, cache.foreign_files)
     before = [set(known) for known in registered]
     yield
     own = tmp_path_factory.getbasetemp()

@@ -10,8 +10,8 @@ from itertools import product
 from palpate.press.engines import MODES
 from palpate.press.prepare import Question, prepare_press, surface_of
 from palpate.press.pressing import summarise
-from palpate.report.numbers import with_half
 from palpate.robots.serial.from_toml import names
+from palpate.units import with_half
 
 STIFFNESSES, DAMPING, FORCE = (5e3, 6e4), 50.0, 20.0
 HEAD = (

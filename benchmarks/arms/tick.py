@@ -19,9 +19,10 @@ import numpy as np
 from palpate._vector import ZERO3
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface import UNTOUCHED, touch
-from palpate.press.cell import Reading, TouchState, body_at, compiled_tick
+from palpate.press.cell import Reading, TouchState, compiled_tick
 from palpate.press.engines import loop_of
 from palpate.press.setting import cell_of, place_of
+from palpate.press.simulated_arm import body_at
 from palpate.robots import SerialArm
 from palpate.robots.serial.serial_arm import mjcf, scene_of
 

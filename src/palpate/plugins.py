@@ -19,7 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from palpate._jit.registry import PACKAGE, foreign_files
+from palpate._jit.cache import PACKAGE, foreign_files
 from palpate.errors import InputError, PluginError
 
 _FOLDERS: dict[Path, None] = {}

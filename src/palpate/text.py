@@ -1,8 +1,17 @@
-"""Text from outside, made safe to show: names in a log are a stranger's."""
+"""Text to be shown: names in a log are a stranger's, and are made safe; long lines are wrapped."""
+
+from __future__ import annotations
 
 import re
 import shlex
+import sys
 import unicodedata
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
 
 _UNSAFE = {
     "Cc",
@@ -61,6 +70,20 @@ def shorten(text: str, most: int) -> str:
         return text
     kept = most - len(_GAP)
     return text[: kept - kept // 3] + _GAP + text[-(kept // 3) :]
+
+
+def print_hanging(lines: Iterable[Text], console: Console) -> None:
+    """Print lines; on a terminal, and in a text of Python's, a long one goes on under its own beginning."""
+    from rich.text import Text
+
+    narrow = console.is_terminal or console.file is not sys.stdout
+    for line in lines:
+        indent = line.cell_len - len(line.plain.lstrip())
+        if narrow and line.cell_len > console.width > indent + 20:
+            for part in line[indent:].wrap(console, console.width - indent):
+                console.print(Text(" " * indent).append(part))
+        else:
+            console.print(line, soft_wrap=True)
 
 
 def duration(seconds: float) -> str:

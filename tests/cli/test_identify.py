@@ -160,7 +160,7 @@ def test_the_sentence_the_table_and_the_figure(log, capsys):
     picture = log.parent / "press.identify.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert re.match(r"\d+ ± \d+ N/m stiffness by the model kelvin-voigt ✓ identified press.csv at ", printed)
-    assert printed.index("To narrow it: ") < printed.index("95 % verdict") < printed.index("One contact, ")
+    assert printed.index("Limited by ") < printed.index("95 % verdict") < printed.index("One contact, ")
 
 
 def test_the_uncertainty_budget_follows_the_answer(log, capsys):

@@ -12,6 +12,8 @@ from cli.test_run import text_of
 from palpate.cli import main
 from palpate.cli._streams import notice_signals
 from palpate.logs import read_record
+from palpate.press import prepare
+from palpate.press.prepare import prepare_press
 from palpate.report.run import figures
 from palpate.report.run import page as pages
 
@@ -139,3 +141,16 @@ def test_a_hang_up_that_is_ignored_and_a_handler_of_somebody_else_are_left():
     finally:
         signal.signal(signal.SIGUSR2, before[0])
         signal.signal(signal.SIGHUP, before[1])
+
+
+def test_a_press_before_its_first_tick_leaves_nothing(tmp_path, monkeypatch, capsys):
+    def interrupted(*words):
+        os.kill(os.getpid(), signal.SIGINT)
+        return prepare_press(*words)
+
+    monkeypatch.setattr(prepare, "prepare_press", interrupted)
+    folder = tmp_path / "press"
+    words = ["press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50", "--out", str(folder)]
+    assert main(words) == 130
+    assert capsys.readouterr().err == "palpate: interrupted\n"
+    assert not folder.exists()

@@ -18,7 +18,7 @@ from palpate.cli import main
 from palpate.force import Certificate, ForceLoop, known_from, load_arm, tune
 from palpate.force.arm import ServoLoop
 from palpate.force.gains import LAW
-from palpate.report.numbers import quantity
+from palpate.units import quantity
 
 CONTRACT = {
     "arm", "kind", "rate_hz", "theta_s", "gains", "approach_speed_m_s", "peak_N", "settling_s", "overshoot",

@@ -12,7 +12,7 @@ from foreign.motions import tracked
 from foreign.scoring import WORKING_POINT, judged, score
 from foreign.surfaces import SURFACES, Surface, random_surface, touch
 from foreign.tables import markdown, tables
-from foreign.truth import dynamic_stiffness, octave_stiffness, press_stiffness
+from foreign.truth import Dense, dynamic_stiffness, octave_stiffness, press_stiffness
 
 physics = pytest.mark.long
 """Of the judge's own physics, which takes seconds to compile: nothing of the package."""
@@ -105,6 +105,17 @@ def test_the_octave_and_the_press_of_a_spring_are_its_stiffness():
     assert octave_stiffness(log.dense, 1.0) == pytest.approx((stiffness, stiffness), rel=0.01)
     soft = replace(log.dense, force=np.where(log.dense.contact, stiffness * log.dense.depth, 0.0))
     assert press_stiffness(log.plan.surface, soft) == pytest.approx((stiffness, stiffness), rel=1e-9)
+
+
+@physics
+def test_what_relaxes_at_rest_is_no_part_of_the_slope_of_a_press():
+    """Two ramps with a rest between them, in which the force falls by 6 % and stays in the window."""
+    advance = np.linspace(0.0, 1.0, 200)
+    depth = 1e-3 * np.concatenate([advance, np.ones(400), 1 + advance])
+    force = 1e3 * depth - np.interp(np.arange(800), [200, 600], [0.0, 0.06])
+    press = Dense(1e-3, depth, force, np.ones(800, bool))
+    told = press_stiffness(Surface("relaxing", {"K": 1e3}), press, 1.0)
+    assert told == pytest.approx((1e3, 1e3), rel=1e-6)
 
 
 @physics

@@ -20,7 +20,7 @@ from scipy.io import savemat
 
 from logs.ros_bags import storage, wrench, write_bag
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs import read_log, read_record
 from palpate.logs.formats import kind_of
 from palpate.logs.listing import list_log

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
 
@@ -95,6 +95,15 @@ def test_commas_that_part_thousands(tmp_path, dialect, copies):
     assert len(record) == 200 * copies
     assert not record.meta["notes"] or all(note["code"] != "lines-skipped" for note in record.meta["notes"])
     assert np.allclose(record["force"], force, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("x", "scale"), [("{:,.2f}", 1), ("{:.2f}", 1000)], ids=["beside both marks", "alone"]
+)
+def test_a_comma_before_three_digits_parts_thousands_beside_a_cell_with_both_marks(tmp_path, x, scale):
+    at = 2000 + np.arange(200)
+    rows = [f"{t:.2f};{x.format(1e3 + k)};{k:,}" for t, k in zip(np.arange(200) / 100, at, strict=True)]
+    assert np.allclose(read(tmp_path / "log.csv", ["t;x;f", *rows])["force"], at / scale)
 
 
 def test_a_decimal_comma_with_three_places_stays_one(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from palpate.files import check_place
 from palpate.report.identification.figure import draw, write_figure
 from palpate.report.identification.words import full_number, sentence
-from palpate.report.look.assets import with_peaks
+from palpate.report.style import with_peaks
 from report.outcomes import OUTCOMES
 
 

@@ -49,7 +49,7 @@ def test_each_quantity_has_one_answer():
 def test_a_parameter_without_a_number_has_its_bound_its_cause_and_a_remedy():
     found = OUTCOMES["not_identifiable"]()
     (row,) = (line for line in printed(found) if line.startswith("M "))
-    assert "? not identified" in row
+    assert "? not identifiable" in row
     assert next(iter(found.parameters["M"].budget)) == "other forces"
     assert "drift or friction" in row
 
@@ -77,7 +77,7 @@ def test_a_stiffness_behind_the_joints_is_a_lower_bound_everywhere():
     assert "give --robot-stiffness" in lines[1]
     (row,) = (line for line in lines if line.startswith("K "))
     assert "! lower bound" in row
-    assert "not identified" not in row
+    assert "not identifiable" not in row
 
 
 def test_a_modulus_goes_first():

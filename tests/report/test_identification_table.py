@@ -7,7 +7,7 @@ from rich.console import Console
 from palpate.identification.causes import Code, Warn
 from palpate.report.identification.details import show
 from palpate.report.identification.words import full_number, number, sentence
-from palpate.report.numbers import between
+from palpate.units import between
 from report.outcomes import OUTCOMES
 
 

@@ -24,7 +24,6 @@ from palpate.report.look.assets import (
     data,
     packed_column,
     policy,
-    rows_shown,
     scripts,
     style_sheet,
     styles,
@@ -128,7 +127,7 @@ def test_gaps_stay_gaps_and_places_that_a_column_lacks_stay_such():
 @given(st.integers(1, 400), st.integers(4, 60), st.integers(0, 2**31))
 def test_thinning_keeps_order_ends_and_peaks(n, most, seed):
     values = np.random.default_rng(seed).standard_normal(n)
-    rows = rows_shown(values, most)
+    rows = style.rows_shown(values, most)
     assert (np.diff(rows) > 0).all()
     assert len(rows) <= max(most + 2, n if n <= most else 0)
     assert {0, n - 1} <= set(rows.tolist())
@@ -139,7 +138,7 @@ def test_thinning_keeps_order_ends_and_peaks(n, most, seed):
 def test_half_of_what_is_kept_lies_where_it_is_to_be_dense():
     dense = np.zeros(10000, dtype=bool)
     dense[5000:5500] = True
-    rows = rows_shown(np.sin(np.arange(10000)), 800, dense)
+    rows = style.rows_shown(np.sin(np.arange(10000)), 800, dense)
     assert abs(dense[rows].sum() - 400) <= 10
 
 

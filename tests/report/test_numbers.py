@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palpate.report.numbers import between, plain, with_half
+from palpate.units import between, plain, with_half
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,7 @@ def test_a_value_is_one_short_line(make, told):
 def test_a_strangers_name_stays_text(found):
     from dataclasses import replace
 
-    bad = replace(found.K, reason="<script>alert(1)</script>\x1b[31m")
+    bad = replace(found.K, unit="N\x1b[31m", reason="<script>alert(1)</script>\x1b[31m")
+    assert "N" in repr(bad)
     assert "<script>" not in bad._repr_html_()
     assert "\x1b" not in bad._repr_html_() + repr(bad)

@@ -9,7 +9,7 @@ from palpate.identification.causes import Code, Warn, cause_of
 from palpate.identification.result import DynamicStiffness, Identification, Traces, WorkingPoint
 from palpate.identification.uncertainty import Measurement, Parameter, Verdict
 from palpate.report.identification.words import limited_by, model_line, sentence
-from palpate.report.numbers import quantity, quantity_between
+from palpate.units import quantity, quantity_between
 
 NONE = np.empty(0)
 

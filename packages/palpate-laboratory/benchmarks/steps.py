@@ -1,6 +1,6 @@
 """Whether a laboratory may be looked for with fewer steps of the physics than the figures have: how many verdicts turn.
 
-python packages/palpate-thesis/benchmarks/steps.py --laboratories 16
+python packages/palpate-laboratory/benchmarks/steps.py --laboratories 16
 """
 
 from __future__ import annotations

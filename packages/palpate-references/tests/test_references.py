@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from palpate.cli import main
 from palpate_references.certify import certify
 from palpate_references.check import ENOUGH, MOST, digits_of, scores
 from palpate_references.models import FLOATS, MODELS
@@ -91,3 +92,9 @@ def test_the_command_lists_exports_and_refuses(tmp_path, capsys):
     assert len(list((tmp_path / "logs").glob("*.csv"))) == len(KNOWN)
     assert main(["references", "export", str(tmp_path / "logs")]) == 2
     assert main(["references", "export"]) == 2
+
+
+@pytest.mark.parametrize("words", [["export"], ["check", "nope"], ["list", "nope"]])
+def test_a_folder_is_for_export_alone(words, capsys):
+    assert main(["references", *words]) == 2
+    assert "palpate references export FOLDER" in capsys.readouterr().err

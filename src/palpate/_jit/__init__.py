@@ -5,10 +5,9 @@ cache; only where the cache has none does it hand Numba every law as it stands a
 overloads, and compile.
 """
 
-from palpate._jit.cache import sources_stamp
+from palpate._jit.cache import law, part, sources_stamp
 from palpate._jit.kernels import BoundKernel, Kernel, NotCompiled, kernel
 from palpate._jit.overloads import reader, writer
-from palpate._jit.registry import law, part
 
 __all__ = [
     "BoundKernel",

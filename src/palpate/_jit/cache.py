@@ -1,4 +1,7 @@
-"""The kernel cache: hashed files, a stamp of the sources that a kernel depends on, one process at a time that compiles.
+"""The registry of laws and parts, and the cache of the kernels that are made of them.
+
+Numba is not imported before a kernel is needed. The cache has hashed files, a stamp of the sources that a kernel
+depends on, and one process at a time that compiles.
 
 A spoiled file is compiled again, never executed; a kernel of other sources is never run.
 """
@@ -18,9 +21,41 @@ from contextlib import suppress
 from functools import cache
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from palpate._jit.registry import PACKAGE, foreign_files, foreign_laws, parts
+from palpate._vector import Mat3, Vec3, Vec6
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+laws: list[Callable[..., Any]] = []
+foreign_laws: list[Callable[..., Any]] = []
+parts: dict[type, None] = {}
+stored: dict[Callable[..., Any], tuple[type, bool]] = {}
+"""Functions that read (true), or write, a part's numbers in an array: `palpate._jit.overloads`."""
+foreign_files: set[Path] = set()
+"""Sources of the user's plug-ins, and what they import from beside them."""
+PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def law(function: F) -> F:
+    """Marks a plain function as usable inside kernels. It stays a plain function."""
+    laws.append(function)
+    if PACKAGE not in Path(function.__code__.co_filename).parents:
+        foreign_laws.append(function)
+    return function
+
+
+def part(cls: C) -> C:
+    """Marks a NamedTuple whose methods are usable inside kernels. It stays a plain class."""
+    parts[cls] = None
+    return cls
+
+
+part(Vec3)
+part(Mat3)
+part(Vec6)
+
 
 _HASH = hashlib.sha256().digest_size
 

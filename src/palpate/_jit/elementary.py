@@ -2,7 +2,7 @@
 
 from math import floor, inf, nan
 
-from palpate._jit.registry import law
+from palpate._jit.cache import law
 
 _HALVINGS = (512.0, 256.0, 128.0, 64.0, 32.0, 16.0, 8.0, 4.0, 2.0, 1.0)
 """Powers of two of which every exponent of a number is the sum, with one over."""

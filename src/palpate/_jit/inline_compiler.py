@@ -13,7 +13,13 @@ from contextlib import contextmanager
 from types import CodeType
 from typing import Any
 
-from palpate._jit.registry import ENTRY, INSIDE, PACKAGE
+from palpate._jit.cache import PACKAGE
+
+# Division as NumPy's: no branch and no exception inside a loop.
+ENTRY = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+# What only kernels call needs no way in from outside: making those would be half of all compiling. And it stands where
+# it is called: handing a loop's hundred numbers on, and a state's back, costs as much as what is done with them.
+INSIDE = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True}
 
 
 @functools.cache

@@ -14,10 +14,18 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from palpate._jit.cache import CompileLock, hashed_files, home_of, sources_stamp, stamp_of, text_of
-from palpate._jit.inline_compiler import entry, inside
+from palpate._jit.cache import (
+    PACKAGE,
+    CompileLock,
+    hashed_files,
+    home_of,
+    laws,
+    sources_stamp,
+    stamp_of,
+    text_of,
+)
+from palpate._jit.inline_compiler import ENTRY, entry, inside
 from palpate._jit.overloads import hand_over, operators_and_members
-from palpate._jit.registry import ENTRY, PACKAGE, laws
 
 _Call = tuple[int, FrameType | None]
 

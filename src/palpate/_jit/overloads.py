@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from itertools import repeat
 from typing import Any, get_type_hints
 
+from palpate._jit.cache import parts, stored
 from palpate._jit.inline_compiler import inside
-from palpate._jit.registry import parts, stored
 from palpate._vector import (
     METHODS,
     Vec3,

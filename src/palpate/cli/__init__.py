@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from palpate.cli._program import COMMANDS, COMPANIONS, EXPANDED, TYPED, program
     from palpate.cli._streams import run_guarded
     from palpate.cli._terminal import print_lines
-    from palpate.files.limits import check_address_space
+    from palpate.files.reading import check_address_space
 
     TYPED.set(tuple(sys.argv[1:] if argv is None else argv))
 

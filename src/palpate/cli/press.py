@@ -11,8 +11,7 @@ from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.kept import only
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options, si
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, only, options, si
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable

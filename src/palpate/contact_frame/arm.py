@@ -95,8 +95,9 @@ def identify_contact(
     about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
     record = replace(record, meta={**record.meta, "arm": about})
     found = with_arm(found, arm, tolerance, from_pose=in_space)
-    asked = frame or ContactFrame(), arm, tolerance, calibration
-    slid = _slide(whole, asked, found, record) if in_space else None
+    slid = None
+    if in_space:
+        slid = _slide(whole, (frame or ContactFrame(), arm, tolerance, calibration), found, record)
     if slid is None or slid.slide is None:
         return slid or found, record
     meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press

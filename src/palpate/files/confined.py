@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.files.limits import COPIES, OWN, ReadingBudget
+from palpate.files.reading import COPIES, OWN, ReadingBudget
 
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "POLARS_MAX_THREADS": "2"}
 """Threads that libraries would start, one for each core, take address space of their own."""

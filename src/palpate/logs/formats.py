@@ -14,8 +14,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.files import RECORD
-from palpate.files.limits import ReadingBudget, ReadingLimits
-from palpate.files.reading import read_text
+from palpate.files.reading import ReadingBudget, ReadingLimits, read_text
 from palpate.logs.tables.sheet import Sheet
 
 

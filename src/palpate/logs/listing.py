@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.columns import ColumnStatistics
 from palpate.logs.formats import Bag, Kind, bag_reader, kind_of, open_table

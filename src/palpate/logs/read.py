@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs.formats import Kind, bag_reader, kind_of, open_table
 from palpate.logs.roles import (
     Loaded,

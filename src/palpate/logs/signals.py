@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingLimits
+from palpate.files.reading import ReadingLimits
 from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, read_run
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
-"""Largest unpacked size of a log [GB]; the default of `palpate.files.limits`."""
+"""Largest unpacked size of a log [GB]; the default of `palpate.files.reading`."""
 _SHOWN = 40
 
 

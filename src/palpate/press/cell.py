@@ -5,14 +5,12 @@ The arm's own laws fill M, h and J, or MuJoCo does; contact, sensor and motors a
 
 from typing import NamedTuple
 
-import numpy as np
-
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface import SurfaceState, contact_force, follow, opposing
-from palpate.robots.serial.chain import KinematicChain, Room, axis_of, chain_motion, room_for
+from palpate.robots.serial.chain import KinematicChain, Room, axis_of, chain_motion
 from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward_both, product
 
 
@@ -132,13 +130,6 @@ class TouchState(NamedTuple):
     force: float  # on the surface during the last step [N]
     mean: float  # over the last tick [N]
     depth: float  # of the tip, negative in free motion [m]
-
-
-def body_at(q: Array, motor: Array) -> Body:
-    """State of the body at rest."""
-    n = len(q)
-    one = [np.zeros(n) for _ in range(7)]
-    return Body(q.copy(), one[0], motor.copy(), one[1], room_for(n), np.zeros((n, n)), *one[2:])
 
 
 @law

@@ -15,8 +15,8 @@ from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, gains_for
 from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
-from palpate.robots.serial.serial_arm import SerialArm
-from palpate.robots.serial.task import into, joint_torque, task_model, tip_of
+from palpate.robots.serial.serial_arm import SerialArm, tip_of
+from palpate.robots.serial.task import into, joint_torque, task_model
 from palpate.signals.types import Sense, triple
 
 ENGINES = ("own", "mujoco")

@@ -181,6 +181,9 @@ def press(
 
     Returns:
         One row a tick; ``meta["end"]`` says why it ended, ``meta["why"]`` in a sentence.
+
+    Raises:
+        KeyboardInterrupt: of `progress`, before there is a row.
     """
     rows, sequence = _Rows(arm.arm.joints), PressSequence(arm, driver, plan.force_at, arm.loop.tick)
     ending, k = None, 0
@@ -190,6 +193,8 @@ def press(
             if progress is not None and k % _SHOWN == 0:
                 progress(k * arm.loop.tick, tick.action.trouble or PHASES[tick.action.phase])
         except KeyboardInterrupt:
+            if not rows.rows:
+                raise
             ending = Ending(INTERRUPTED, f"interrupted at {k * arm.loop.tick:.3f} s")
             break
         row = _row(arm, place, tick, sequence.touch, k * arm.loop.tick)

@@ -12,19 +12,27 @@ from palpate.arrays import Array
 from palpate.environments.surface import UNTOUCHED, rest_for
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
-from palpate.press.cell import Reading, TouchState, Workcell, body_at
+from palpate.press.cell import Body, Reading, TouchState, Workcell
 from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
 from palpate.press.sequence import TARE, TipSample
 from palpate.press.setting import Place
+from palpate.robots.serial.chain import room_for
 from palpate.robots.serial.inverse import pose_error, rotation_by
-from palpate.robots.serial.serial_arm import SerialArm
-from palpate.robots.serial.task import arm_state_for, compiled_description, task_room_for
+from palpate.robots.serial.serial_arm import SerialArm, arm_state_for, compiled_description
+from palpate.robots.serial.task import TaskRoom
 from palpate.signals.types import Task, alike, triple
 
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
 _SPARE = 5.0
 """Damping of the joints to spare [1/s]."""
+
+
+def body_at(q: Array, motor: Array) -> Body:
+    """State of the body at rest."""
+    n = len(q)
+    one = [np.zeros(n) for _ in range(7)]
+    return Body(q.copy(), one[0], motor.copy(), one[1], room_for(n), np.zeros((n, n)), *one[2:])
 
 
 @dataclass(frozen=True)
@@ -200,6 +208,11 @@ class SimulatedArm:
         if self._resolution == 0.0:
             return turned.copy()
         return np.asarray(self._resolution * np.round(turned / self._resolution))
+
+
+def task_room_for(n: int) -> TaskRoom:
+    """Room for an arm of n joints."""
+    return TaskRoom(np.zeros((n, n)), np.zeros((7, n)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
 
 
 class _TipLoop:

@@ -21,7 +21,6 @@ from palpate.report.look.assets import (
     TABLES,
     data,
     packed_column,
-    rows_shown,
     scripts,
 )
 
@@ -297,7 +296,7 @@ def _join(lines: Sequence[tuple[Array, Array]], most: int) -> tuple[Array, list[
     thin = {}
     for first in dict.fromkeys(alike):
         same = [y for i, (_, y) in zip(alike, lines, strict=True) if i == first]
-        thin[first] = np.unique(np.concatenate([rows_shown(y, most // len(same)) for y in same]))
+        thin[first] = np.unique(np.concatenate([style.rows_shown(y, most // len(same)) for y in same]))
     shown = [(x[thin[i]], y[thin[i]]) for i, (x, y) in zip(alike, lines, strict=True)]
     places = np.unique(np.concatenate([x for x, _ in shown]))
     columns = [np.full(len(places), np.inf) for _ in shown]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -12,12 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.text import Text
 
 from palpate.files import SIGNATURE
 from palpate.report.chart import page_figures
-from palpate.report.numbers import quantity
 from palpate.text import OPTION, printable
+from palpate.units import quantity
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -115,18 +113,6 @@ def png(path: Path) -> str:
 def data_address(data: bytes, kind: str) -> str:
     """Anything as the source of an image that lies in the page itself; `kind` is its media type."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
-
-
-def print_hanging(lines: Iterable[Text], console: Console) -> None:
-    """Print lines; on a terminal, and in a text of Python's, a long one goes on under its own beginning."""
-    narrow = console.is_terminal or console.file is not sys.stdout
-    for line in lines:
-        indent = line.cell_len - len(line.plain.lstrip())
-        if narrow and line.cell_len > console.width > indent + 20:
-            for part in line[indent:].wrap(console, console.width - indent):
-                console.print(Text(" " * indent).append(part))
-        else:
-            console.print(line, soft_wrap=True)
 
 
 @dataclass(frozen=True)

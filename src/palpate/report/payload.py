@@ -9,7 +9,7 @@ import numpy as np
 from palpate.contact_frame.tool_payload import Weighed
 from palpate.contact_frame.weighing import Estimated
 from palpate.report import style
-from palpate.report.numbers import as_html, as_text
+from palpate.report.output import as_html, as_text
 from palpate.report.page import CommandAnswer, PageAnswer, Table, answer_page, data_address, warning_alerts
 from palpate.report.style import svg
 from palpate.text import printable

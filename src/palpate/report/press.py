@@ -18,7 +18,6 @@ from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
-from palpate.report.numbers import NONE, plain, quantity
 from palpate.report.page import (
     Card,
     CommandAnswer,
@@ -31,6 +30,7 @@ from palpate.report.page import (
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.units import NONE, plain, quantity
 
 _BEFORE = 0.4
 """Seconds of the approach that are shown."""

@@ -13,7 +13,7 @@ from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
-from palpate.report.numbers import as_html, console_text, plain, quantity, quantity_between
+from palpate.report.output import as_html, console_text
 from palpate.report.page import (
     Card,
     CommandAnswer,
@@ -21,10 +21,10 @@ from palpate.report.page import (
     PageAnswer,
     answer_page,
     log_scale,
-    print_hanging,
     warning_alerts,
 )
-from palpate.text import printable
+from palpate.text import print_hanging, printable
+from palpate.units import plain, quantity, quantity_between
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

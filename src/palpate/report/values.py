@@ -8,9 +8,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.report.numbers import as_html, plain, quantity, quantity_between, write_figure, write_page
+from palpate.report.output import as_html, write_figure, write_page
 from palpate.signals.types import NORMAL
 from palpate.text import in_python, printable
+from palpate.units import plain, quantity, quantity_between
 
 __all__ = ["facts_of", "html", "line", "view_of", "write_figure", "write_page"]
 

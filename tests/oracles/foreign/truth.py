@@ -106,6 +106,8 @@ def _level(line: Array, values: Array) -> Array:
     return values - np.polyval(np.polyfit(line, values, 1), line)
 
 
+_RESTS = 0.01
+"""Share of the fastest of a loading below which the probe rests."""
 ABOUT = 0.05
 """Half of the share of the largest force about a force at which the slope is taken."""
 
@@ -113,7 +115,8 @@ ABOUT = 0.05
 def press_stiffness(surface: Surface, dense: Dense, force: float | None = None) -> Range | None:
     """Lowest and highest slope of force over depth of the loadings [N/m]: about a force, or from 40 to 95 % of theirs.
 
-    A loading is a contact's first advance to its peak force; a log without one has the slope of its unloading. Two
+    A loading is a contact's first advance to its peak force, without rests and ways back: at rest the force goes on by
+    itself, and has no slope over the depth. A log without a loading has the slope of its unloading. Two
     slopes are as true as each other: of the force as it was, and of the force without what is no spring (damper, mass,
     friction), on the same way. Of a surface that yields so are those of each contact alone: its second is stiffer.
     """
@@ -166,9 +169,12 @@ def _slope_in(
             continue
         below = np.flatnonzero(f < low * most)
         first = int(below[-1]) + 1 if len(below) else 0
-        x, f = x[first:], f[first:]
-        xx += float(((x - x.mean()) ** 2).sum())
-        xf += float(((x - x.mean()) * (f - f.mean())).sum())
+        step = np.diff(x[first:], prepend=x[first])
+        advances = np.concatenate([[0], step > _RESTS * step.max(), [0]])
+        for a, b in np.flatnonzero(np.diff(advances)).reshape(-1, 2):
+            from_mean = x[first + a : first + b] - x[first + a : first + b].mean()
+            xx += float(from_mean @ from_mean)
+            xf += float(from_mean @ f[first + a : first + b])
     return xf / xx if xx > 0 else None
 
 

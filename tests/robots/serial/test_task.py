@@ -13,9 +13,10 @@ from palpate.controllers import (
     RaibertCraig,
     ResolvedAcceleration,
 )
+from palpate.press.simulated_arm import task_room_for
 from palpate.robots import SerialArm
 from palpate.robots.serial.chain import chain_model, room_for
-from palpate.robots.serial.task import joint_torque, task_model, task_room_for
+from palpate.robots.serial.task import joint_torque, task_model
 from palpate.signals.types import Sense, Task
 
 

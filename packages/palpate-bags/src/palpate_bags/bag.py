@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.errors import InputError, unknown
-from palpate.files.limits import ReadingBudget, ReadingLimits
+from palpate.files.reading import ReadingBudget, ReadingLimits
 from palpate.logs.formats import Kind
 from palpate_bags.reading import Stream, finder, first_line, leaves, no_field, open_files
 from palpate_bags.scanning import TopicInFile

@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.files.limits import ReadingBudget
+from palpate.files.reading import ReadingBudget
 from palpate.logs.formats import PACKED, STORAGES, Kind, kind_of
 from palpate_bags.scanning import (
     ZSTD,

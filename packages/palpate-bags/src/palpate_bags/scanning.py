@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, BinaryIO, NamedTuple
 from urllib.parse import quote
 
 from palpate.errors import InputError
-from palpate.files.limits import LimitError, ReadingBudget
+from palpate.files.reading import LimitError, ReadingBudget
 
 if TYPE_CHECKING:
     from rosbags.rosbag1.reader import Header

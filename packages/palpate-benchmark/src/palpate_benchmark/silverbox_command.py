@@ -71,8 +71,8 @@ def _values(
 def _show(
     data: Silverbox, fitted: dict[str, FittedEquation], errors: dict[str, dict[str, float]], best: str
 ) -> None:
-    from palpate.report.numbers import with_half
     from palpate.report.page import Table
+    from palpate.units import with_half
     from palpate_benchmark.duffing import UNITS
 
     own, screen = fitted[best], console()

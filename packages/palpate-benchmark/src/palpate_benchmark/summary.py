@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.report.numbers import plain
 from palpate.report.page import Table
+from palpate.units import plain
 from palpate_benchmark.metrics import BAND, OVER, RunMetrics
 from palpate_benchmark.plan import LINES, PERIOD, STEP_HEIGHT, SWAY, SWAY_FORCE, ForcePlan
 from palpate_benchmark.simulated import ForceResult

@@ -245,7 +245,8 @@ def _print(
     written: Path | None = None,
 ) -> None:
     from palpate.force.describe import as_json, lines
-    from palpate.report.page import CommandAnswer, print_hanging
+    from palpate.report.page import CommandAnswer
+    from palpate.text import print_hanging
     from palpate_certify.report import proof_lines
 
     def display(console: Console) -> None:

@@ -16,9 +16,9 @@ from palpate.force.describe import bounds
 from palpate.force.sliding.slide_proof import slide_proof
 from palpate.force.tuning import RIGID, surface_ends
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, panels
-from palpate.report.numbers import quantity
 from palpate.report.page import Card, Extent, PageAnswer, answer_page, log_scale
 from palpate.text import printable
+from palpate.units import quantity
 from palpate_certify.controller_file import UNCOVERED, ControllerVerdict
 from palpate_certify.delayed_contact import DelayedContact
 
@@ -143,15 +143,17 @@ def _scale(answer: dict[str, Any]) -> Any:
 def edge_chart(verdict: ControllerVerdict) -> Chart:
     """The edge of the first axis by the delay, as the file stands and corrected."""
     answer = verdict.answer
-    delays, asked, given = answer["delay_s"] * DELAYS, answer["asked"], 1e3 * answer["delay_s"]
+    delays, asked, given = answer["delay_s"] * DELAYS, 1e-3 * answer["asked"], 1e3 * answer["delay_s"]
     loops = ((verdict.before, "as it stands", "F"), (verdict.after, "corrected", "measured"))
     series = [
-        Series(1e3 * delays, np.array([_edge_at(loop, float(delay)) for delay in delays]), colour, name)
+        Series(
+            1e3 * delays, np.array([1e-3 * _edge_at(loop, float(delay)) for delay in delays]), colour, name
+        )
         for loop, name, colour in loops
         if loop is not None
     ]
     bands, marks = [Band(asked, asked, **KNOWN)], [Mark([(given, given)], "ink")]
-    chart = Chart("unstable from [N/m]", series, bands, marks, x="delay [ms]", log="y", height=2.9)
+    chart = Chart("unstable from [kN/m]", series, bands, marks, x="delay [ms]", log="y", height=2.9)
     low, high = np.log10(chart.range)
     return replace(chart, ylim=(10.0 ** np.floor(low), 10.0 ** np.ceil(high)))
 

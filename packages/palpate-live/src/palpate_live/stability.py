@@ -21,7 +21,7 @@ from palpate.controllers import CautiousController
 from palpate.errors import InputError, PalpateError
 from palpate.force.claims import Claim
 from palpate.force.gains import Gains
-from palpate.report.numbers import plain, quantity
+from palpate.units import plain, quantity
 
 Answer = dict[str, Any]
 NICE = 10

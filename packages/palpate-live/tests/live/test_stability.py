@@ -8,7 +8,7 @@ from live.conftest import PATIENCE, near
 from palpate.force.certificate import Claim
 from palpate.force.expected import margins as margins_on
 from palpate.press.engines import loop_of, press_gains
-from palpate.report.numbers import plain
+from palpate.units import plain
 from palpate_live import stability
 from palpate_live.stability import OfArm, OfBench, Stability, answers
 from palpate_studies.analysis import linearise, margins

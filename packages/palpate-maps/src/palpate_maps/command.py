@@ -292,7 +292,7 @@ def press_map(asked: AskOptions, simulated: SimulatedOptions, phantom: PhantomOp
         InputError: the phantom, the arm or an option is wrong, or an interruption before a map could be drawn.
     """
     from palpate.environments.kelvin_voigt import KelvinVoigt
-    from palpate.report.numbers import plain
+    from palpate.units import plain
     from palpate_maps import report as page
     from palpate_maps.phantom import load_phantom, palpate_phantom
 

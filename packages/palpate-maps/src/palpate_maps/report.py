@@ -10,7 +10,6 @@ from palpate.arrays import Array
 from palpate.report import style
 from palpate.report.chart import KNOWN, Band, Chart, Series, panels
 from palpate.report.look.assets import data, text_of
-from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import (
     Card,
     CommandAnswer,
@@ -21,6 +20,7 @@ from palpate.report.page import (
     warning_alerts,
 )
 from palpate.report.style import svg
+from palpate.units import plain, quantity, quantity_between
 from palpate_maps.presses import AXES
 from palpate_maps.result import Lump, MapResult
 

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from palpate._jit.cache import parts, stored
 from palpate._jit.overloads import kind_of
-from palpate._jit.registry import parts, stored
 from palpate_native.normal_form import normal_form
 from palpate_native.source import refuse, syntax_of
 from palpate_native.structs import by_pointer, c_name, is_struct, leaves, members, number, plain

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate._jit.registry import parts
+from palpate._jit.cache import parts
 from palpate_native.expressions import SUM, UNARY, Expressions, Value
 from palpate_native.normal_form import normal_form
 from palpate_native.source import comments_of, syntax_of

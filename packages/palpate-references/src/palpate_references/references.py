@@ -33,12 +33,17 @@ def references(
 
     Returns:
         0 if palpate's search has 8 digits on every log from both starts, 1 if not.
+
+    Raises:
+        InputError: a folder without `export`, or `export` without one.
     """
     from palpate.errors import InputError
     from palpate.files import fresh_folder
     from palpate.report.page import Table
     from palpate_references.problem import problems
 
+    if (out is None) == (action == "export"):
+        raise InputError("a folder is for export, which makes it: palpate references export FOLDER")
     known = problems()
     if action == "list":
         names = ("log", "level", "model", "deviation")
@@ -48,9 +53,7 @@ def references(
         else:
             show_table(console(), Table(f"{len(rows)} certified logs", names, rows))
         return 0
-    if action == "export":
-        if out is None:
-            raise InputError("export needs a folder to make: palpate references export FOLDER")
+    if out is not None:
         with fresh_folder(out, replace=False) as folder:
             for name in (*(f"logs/{p.name}.csv" for p in known), "certified.json"):
                 (folder / Path(name).name).write_bytes(files(__package__).joinpath(name).read_bytes())

@@ -13,8 +13,7 @@ from cyclopts import Group, Parameter
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, LoopArm, Physics
 from palpate.cli.options.force import SlideLimits
-from palpate.cli.options.kept import only, options_given
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, si
+from palpate.cli.options.values import FLAG, SIGNED, WHOLE, only, options_given, si
 from palpate.cli.press import AskOptions, LimitOptions, WireOptions
 from palpate.cli.toolkit import command, console, option_of, place, print_answer
 from palpate.errors import InputError, unknown

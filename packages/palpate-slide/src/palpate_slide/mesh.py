@@ -11,7 +11,7 @@ import numpy as np
 from palpate._jit import kernel, law
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files.limits import GB
+from palpate.files.reading import GB
 from palpate.robots.serial.loading import load_mjcf, mujoco
 from palpate_slide.ground import SPACING
 

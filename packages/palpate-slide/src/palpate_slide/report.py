@@ -17,8 +17,8 @@ from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
-from palpate.report.numbers import plain, quantity, quantity_between
 from palpate.report.page import Card, PageAnswer, answer_page, data_address
+from palpate.units import plain, quantity, quantity_between
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of

@@ -22,7 +22,7 @@ from palpate_studies.metrics import Window, metric_of
 from palpate_studies.metrics.verdicts import try_metric
 from palpate_studies.parameters import Label
 from palpate_studies.plan import MAIN, TRIED, RunPlan, RunSetting, samples
-from palpate_studies.run_one import FAILED, REFUSED, RunJob, Stopped, run_one
+from palpate_studies.run_one import FAILED, REFUSED, RunJob, Stopped, run_one, uninterrupted
 
 if TYPE_CHECKING:
     from polars import DataFrame
@@ -102,7 +102,8 @@ def seconds_a_run(plan: RunPlan, waiting: Callable[[], None] | None = None) -> f
         if setting.experiment is None:
             continue
         try:
-            build_any(setting.experiment).run(0.1, press=0.1, waiting=waiting)  # compiled now, if it was not
+            # Compiled now, if it was not.
+            uninterrupted(build_any(setting.experiment).run(0.1, press=0.1, waiting=waiting))
             return _time_run(setting.experiment, setting.seed)
         except InputError:
             continue
@@ -120,7 +121,7 @@ def _time_run(experiment: AnyExperiment, seed: int) -> float:
             raise Stopped
 
     try:
-        bench.run(run.duration, seed, press=run.press, progress=progress)
+        uninterrupted(bench.run(run.duration, seed, press=run.press, progress=progress))
     except Stopped:
         share = reached[0] / min(run.duration, reached[0] + run.press)
         return (time.perf_counter() - begun) / share

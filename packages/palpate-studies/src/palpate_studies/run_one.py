@@ -23,6 +23,7 @@ import msgspec
 import palpate
 from palpate.bench.from_experiment import AnyExperiment, build_any
 from palpate.bench.speed import cores
+from palpate.bench.summary import INTERRUPTED
 from palpate.errors import InputError
 from palpate.logs.tables.parquet import write_parquet
 from palpate.plugins import Plugin
@@ -96,6 +97,7 @@ def run_one(
 
     Raises:
         Stopped: `stopped` said so while it ran.
+        KeyboardInterrupt: the run was interrupted.
     """
     begun = time.perf_counter()
 
@@ -126,7 +128,20 @@ def _record(
             raise Stopped
 
     run = experiment.run
-    return build_any(experiment).run(run.duration, seed, press=run.press, progress=progress, waiting=waiting)
+    return uninterrupted(
+        build_any(experiment).run(run.duration, seed, press=run.press, progress=progress, waiting=waiting)
+    )
+
+
+def uninterrupted(record: Record) -> Record:
+    """The record of a run that no Ctrl-C ended; the bench makes an ending of it, and a study stops there.
+
+    Raises:
+        KeyboardInterrupt: one did.
+    """
+    if record.meta["end"] == INTERRUPTED:
+        raise KeyboardInterrupt
+    return record
 
 
 A = TypeVar("A")

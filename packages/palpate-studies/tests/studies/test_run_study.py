@@ -13,6 +13,7 @@ from palpate.bench import Bench
 from palpate.errors import InputError
 from palpate.logs import read_record
 from palpate_studies import run_one as one_run
+from palpate_studies.preview import check_cases, seconds_a_run
 from palpate_studies.run_one import Local, RunJob, map_unordered
 from palpate_studies.run_study import Work
 from studies.small import NEAR, SMALL, Formula, planned, text
@@ -214,6 +215,27 @@ def test_items_are_taken_as_they_are_needed():
     assert len(taken) <= 4
     results.close()
     assert len(taken) <= 4
+
+
+def interrupted(bench, *args, **options):
+    """A run that Ctrl-C ends at its first look at the progress."""
+
+    def progress(at, phase):
+        raise KeyboardInterrupt
+
+    return RUN(bench, *args, **(options | {"progress": progress}))
+
+
+RUN = Bench.run
+
+
+@pytest.mark.parametrize("before", [check_cases, seconds_a_run])
+def test_a_try_before_the_study_that_is_interrupted_ends_the_study(monkeypatch, before):
+    """The bench makes an ending of a Ctrl-C; taken for the result of a try, it is lost, and the study goes on."""
+    plan = planned(text('"controller.ki" = { range = [1.0, 20.0], points = 40 }', head="seeds = 3"))
+    monkeypatch.setattr(Bench, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        before(plan)
 
 
 def test_stopping_stops_the_runs_under_way():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm
-from palpate.cli.options.values import FLAG, SIGNED, options
+from palpate.cli.options.values import FLAG, SIGNED, only, options
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
@@ -133,8 +133,6 @@ class SlideTuningOptions(SlideLimits):
 
     def tuned_for(self, gains: Gains) -> Gains:
         """The gains with a table `slide`, if one is wanted."""
-        from palpate.cli.options.kept import only
-
         if self.slide:
             return self.gains_with(gains, self.radius.si)
         only(self, "a slide; add --slide")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Any
 
+from palpate.cli.options.values import options_given
 from palpate.errors import InputError, unknown
 from palpate.files import read_text, read_toml, write_text
 from palpate.files.writing import MADE
@@ -34,33 +34,6 @@ def save_options(path: Path, parts: Iterable[Any], command: str) -> None:
     """Write options that are of a cell, rather than of a single call of the command."""
     once = _NEVER | _TYPED.get(command, set())
     write_text(path, _toml({name: value for name, value in options_given(parts).items() if name not in once}))
-
-
-def options_given(parts: Iterable[Any]) -> dict[str, Any]:
-    """Options that differ from their defaults, by name."""
-    return {
-        _name(part, field.name): str(value) if isinstance(value, str) else value
-        for part in parts
-        for field in fields(part)
-        if (value := getattr(part, field.name)) != field.default
-    }
-
-
-def only(part: Any, of: str) -> None:
-    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
-
-    Raises:
-        InputError: one was given; it is named.
-    """
-    for given in options_given((part,)):
-        raise InputError(f"--{given} is for {of}, or leave out --{given}")
-
-
-def _name(part: Any, field: str) -> str:
-    """The first name of an option on the command line."""
-    hint = get_type_hints(type(part), include_extras=True)[field]
-    said = [name for one in getattr(hint, "__metadata__", ()) for name in getattr(one, "name", None) or ()]
-    return said[0].removeprefix("--") if said else field.replace("_", "-")
 
 
 def expand(argv: Sequence[str], app: App) -> list[str]:

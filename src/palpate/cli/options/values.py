@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 from math import isfinite, isnan
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeAlias, TypeVar, dataclass_transform
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Generic,
+    TypeAlias,
+    TypeVar,
+    dataclass_transform,
+    get_type_hints,
+)
 
 from cyclopts import Group, Parameter, Token
 
@@ -329,3 +338,30 @@ Interval = Annotated[Ends, typed_option(span)]
 Angles = Annotated[Triple, typed_option(partial(vector, quantity="angle"))]
 Direction = Annotated[Triple, typed_option(partial(vector, quantity="number"))]
 Point = Annotated[Triple, typed_option(partial(vector, quantity="length"))]
+
+
+def options_given(parts: Iterable[Any]) -> dict[str, Any]:
+    """Options that differ from their defaults, by name."""
+    return {
+        _name(part, field.name): str(value) if isinstance(value, str) else value
+        for part in parts
+        for field in fields(part)
+        if (value := getattr(part, field.name)) != field.default
+    }
+
+
+def only(part: Any, of: str) -> None:
+    """Refuse options of another kind of arm or task: a part of a command that is not as by default.
+
+    Raises:
+        InputError: one was given; it is named.
+    """
+    for given in options_given((part,)):
+        raise InputError(f"--{given} is for {of}, or leave out --{given}")
+
+
+def _name(part: Any, field: str) -> str:
+    """The first name of an option on the command line."""
+    hint = get_type_hints(type(part), include_extras=True)[field]
+    said = [name for one in getattr(hint, "__metadata__", ()) for name in getattr(one, "name", None) or ()]
+    return said[0].removeprefix("--") if said else field.replace("_", "-")

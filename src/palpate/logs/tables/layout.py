@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingBudget
+from palpate.files.reading import ReadingBudget
 from palpate.logs.tables.lines import Parting, TextLine
 from palpate.logs.tables.sheet import Stated
 from palpate.units import known_unit

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError
 from palpate.files.confined import read_confined
-from palpate.files.limits import ReadingBudget
+from palpate.files.reading import ReadingBudget
 from palpate.logs.tables.sheet import Cells, Sheet, as_counts
 
 _HEADER, _COMPRESSED, _PIECE = 128, 15, 1 << 20

@@ -17,7 +17,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.files.confined import read_confined
-from palpate.files.limits import ReadingBudget, ReadingLimits
+from palpate.files.reading import ReadingBudget, ReadingLimits
 from palpate.logs.tables.lines import NO_READING, seconds_of_cells
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, as_counts
 from palpate.records import Record

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from palpate.errors import InputError, unknown
 from palpate.files.confined import read_confined
-from palpate.files.limits import LimitError, ReadingBudget, ReadingLimits
+from palpate.files.reading import LimitError, ReadingBudget, ReadingLimits
 from palpate.logs.tables.sheet import Cells, Sheet
 from palpate.logs.tables.text import read_text_sheet
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.errors import InputError
-from palpate.files.limits import ReadingBudget
+from palpate.files.reading import ReadingBudget
 from palpate.logs.tables.layout import Layout, find_layout, read_preamble
 from palpate.logs.tables.lines import (
     COMMENTS,

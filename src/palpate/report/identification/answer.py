@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from palpate.errors import InputError
-from palpate.identification.causes import Code, cause_of
+from palpate.identification.causes import Cause, Code, cause_of
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import details, figure
@@ -31,25 +31,22 @@ from palpate.report.identification.words import (
     full_number,
     interval,
     limited_by,
+    loss_of,
     no_contact_in,
     place_of,
     press_facts,
     sentence,
     unit_warnings,
 )
-from palpate.report.numbers import NONE, as_html, console_text, plain, quantity, with_half
-from palpate.report.page import CommandAnswer, print_hanging
+from palpate.report.output import as_html, console_text
+from palpate.report.page import CommandAnswer
 from palpate.signals.types import NORMAL
-from palpate.text import printable
+from palpate.text import print_hanging, printable
+from palpate.units import NONE, plain, quantity, with_half
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-VERDICTS = {
-    Verdict.IDENTIFIED: "identified",
-    Verdict.NOT_IDENTIFIABLE: "not identified",
-    Verdict.REJECTED: "rejected",
-}
 MOST = 14
 """Lines of an answer, which a reader sees at once."""
 _BOUND = Text("! lower bound", style="yellow")
@@ -74,7 +71,7 @@ _REMEDIES = {
 _CAUSES = {
     "other forces": "drift or friction",
     "blocks": "parts of the log differ",
-    "repetition": "presses differ",
+    "repetition": "parts of the log differ",
     "loadings": "loadings differ",
     "octaves": "frequencies differ",
     "touch": "the touch",
@@ -186,8 +183,11 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     point = found.working_point
     assert point is not None
     own, what, at = point.stiffness, "stiffness", place_of(found, point)
+    lost = own.verdict is Verdict.NOT_IDENTIFIABLE and loss_of(found, point)
+    if lost:
+        at += f", beside {lost}"
     mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
-    detail = f"{at}. To narrow it: {limited_by(found).remedy}."
+    detail = _limited(at, limited_by(found))
     if behind_the_arm(found):
         what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
         detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
@@ -200,7 +200,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     elif by_the_model(found):
         own, what = found.parameters["K"], f"stiffness by the model {found.model}"
         mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
-        detail = f"{at}. To narrow it: {cause_of(next(iter(own.budget), None)).remedy}."
+        detail = _limited(at, cause_of(next(iter(own.budget), None)))
     elif own.value is not None and own.ci95 is not None and own.ci95[1] < 0:
         detail = (
             f"{at}: the force falls as the probe goes in. The surface yields, or the probe's support moves."
@@ -208,6 +208,10 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     elif own.value is None:
         detail = f"{at}: {_sentence(own.reason)}."
     yield from _head(own, what, name, detail, mark)
+
+
+def _limited(at: str, cause: Cause) -> str:
+    return f"{at}. Limited by {cause.described}: {cause.remedy}."
 
 
 def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
@@ -228,7 +232,7 @@ def _sentence(reason: str) -> str:
 
 
 def _mark(p: Parameter) -> Text:
-    return Text(f"{MARKS[p.verdict]} {VERDICTS[p.verdict]}", style=STYLES[p.verdict])
+    return Text(f"{MARKS[p.verdict]} {p.verdict}", style=STYLES[p.verdict])
 
 
 def _rows(found: Identification) -> Iterator[Text]:
@@ -260,7 +264,7 @@ def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
     bound = name == "K" and behind_the_arm(found)
     cause = next(iter(p.budget), "")
     why = (
-        f"lag, ± {1e3 * _lag_half(found):.2g} ms"
+        f"lag, ± {plain(1e3 * _lag_half(found), 2)} ms"
         if cause == "lag" and found.lag
         else _CAUSES.get(cause, cause)
     )
@@ -317,11 +321,11 @@ def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
         yield Text(printable(f"R{read[1:]}"))
 
 
-_ONE_CLOCK = "Two channels of one converter, unfiltered: --lag 0:STD (one row)."
+_ONE_CLOCK = "Where one converter samples both channels, unfiltered: --lag 0:STD, STD the time of a row."
 
 
 def _assumed_lag(found: Identification) -> str:
-    """That the lag is assumed, what a calibration of it is worth, and how one clock of both channels is told."""
+    """That the lag is assumed, what a calibration of it is worth, and the option for one clock of both channels."""
     lag = found.lag
     assert lag is not None
     text = f"The lag of the force sensor is assumed, {with_half(1e3 * lag.value, 1e3 * _lag_half(found))} ms"
@@ -332,8 +336,10 @@ def _assumed_lag(found: Identification) -> str:
         whole = hypot(*p.budget.values())
         rest = sqrt(max(whole**2 - p.budget["lag"] ** 2, 0.0))
         if rest:
-            called = CALLED[name]
-            return f"{text}: calibrate it, and the {called} is known {whole / rest:.2g} times as well. {_ONE_CLOCK}"
+            text += (
+                f": a calibration makes the {CALLED[name]}'s interval {plain(whole / rest, 2)} times narrower"
+            )
+            break
     return f"{text}. {_ONE_CLOCK}"
 
 

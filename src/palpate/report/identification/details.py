@@ -21,8 +21,8 @@ from palpate.report.identification.words import (
     sentence,
     unit,
 )
-from palpate.report.numbers import NONE, between, plain, quantity
 from palpate.text import printable
+from palpate.units import NONE, between, plain, quantity
 
 _MANY = 6
 """Contacts that a line names."""

@@ -14,7 +14,6 @@ from palpate.identification.result import DynamicStiffness, Identification, Pres
 from palpate.report import style
 from palpate.report.identification.spectra import band_of, leaving, resting, stretches, white
 from palpate.report.identification.words import MARKS, full_number, model_line, sentence, subtitle
-from palpate.report.look.assets import rows_shown, with_peaks
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -33,11 +32,14 @@ def force(axes: Axes, found: Identification, traces: Traces) -> None:
     style.panel(axes, axis_label("force", traces.force_unit), "time [s]")
     contacts(axes, found)
     axes.plot(
-        *with_peaks(traces.time, traces.force, _FIT_POINTS), color=style.MEASURED, lw=1.0, label="measured"
+        *style.with_peaks(traces.time, traces.force, _FIT_POINTS),
+        color=style.MEASURED,
+        lw=1.0,
+        label="measured",
     )
     if len(traces.fitted_time):
         for i, piece in enumerate(stretches(traces.fitted_time)):
-            line = with_peaks(traces.fitted_time[piece], traces.predicted[piece], _FIT_POINTS)
+            line = style.with_peaks(traces.fitted_time[piece], traces.predicted[piece], _FIT_POINTS)
             axes.plot(*line, color=style.INK, lw=1.4, label="model" if i == 0 else None)
     axes.set_xlim(*window(found, traces))
     style.legend_above(axes)
@@ -49,7 +51,7 @@ def residual(axes: Axes, found: Identification, traces: Traces) -> None:
     contacts(axes, found)
     left = traces.fitted_force - traces.predicted
     for i, piece in enumerate(stretches(traces.fitted_time)):
-        line = with_peaks(traces.fitted_time[piece], left[piece], _FIT_POINTS)
+        line = style.with_peaks(traces.fitted_time[piece], left[piece], _FIT_POINTS)
         axes.plot(*line, color=style.MEASURED, lw=0.9, label="measured less model" if i == 0 else None)
     axes.set_xlim(*window(found, traces))
     style.legend_above(axes)
@@ -209,7 +211,7 @@ def press(axes: Axes, found: Identification, traces: Traces) -> None:
 
 def _whole(axes: Axes, traces: Traces, scale: float) -> None:
     """Every loading and unloading of the log, broken where there is no contact."""
-    rows = rows_shown(traces.fitted_force, _POINTS)
+    rows = style.rows_shown(traces.fitted_force, _POINTS)
     t = traces.fitted_time[rows]
     steps = np.diff(t, prepend=t[0])
     gap = steps > _BREAK * max(float(np.median(steps)), float(np.ptp(traces.fitted_time)) / _POINTS)

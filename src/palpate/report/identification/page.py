@@ -30,10 +30,10 @@ from palpate.report.identification.words import (
     units_of,
     work_loss,
 )
-from palpate.report.numbers import plain, quantity, with_half
 from palpate.report.page import data_address, render
 from palpate.report.style import svg
 from palpate.text import printable
+from palpate.units import plain, quantity, with_half
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,8 +11,8 @@ from palpate.files import RECORD
 from palpate.identification.causes import BRIEF, Cause, Code, cause_of
 from palpate.identification.result import Identification, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.numbers import plain, quantity, quantity_between, with_half
 from palpate.text import printable
+from palpate.units import plain, quantity, quantity_between, with_half
 
 CALLED = {
     "K": "stiffness",
@@ -89,8 +89,8 @@ def sentence(found: Identification) -> str:
     if point.differs:
         return f"{len(point.each)} presses differ, {each_press(point)} {where}; {APART}."
     if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
-        lost = _loss(found, point)
-        start = f"{lost}, but no stiffness" if lost else "The log shows no stiffness"
+        lost = loss_of(found, point)
+        start = f"The log shows {lost}, but no stiffness" if lost else "The log shows no stiffness"
         return f"{start} {where} ({own.reason}); {limit.remedy}."
     if own.ci95[1] < 0 and own.verdict is not Verdict.IDENTIFIED:
         number = quantity(-own.value, own.unit, (own.ci95[1] - own.ci95[0]) / 2)
@@ -125,12 +125,12 @@ def _mostly(limit: Cause) -> str:
     return f"its uncertainty is mostly due to {limit.described}: {limit.remedy}"
 
 
-def _loss(found: Identification, point: WorkingPoint) -> str:
-    """That the loss is known where the stiffness is not, as of a damper."""
+def loss_of(found: Identification, point: WorkingPoint) -> str:
+    """The loss, where the octave of the working point shows it: of a damper it is the answer."""
     own = next((o for o in found.dynamic_stiffness if o.frequency == point.frequency_Hz), None)
     if point.source != "octave" or own is None or not own.loss_half < own.loss:
         return ""
-    return f"The log shows a loss of {quantity(own.loss, point.stiffness.unit, own.loss_half)}"
+    return f"a loss of {quantity(own.loss, point.stiffness.unit, own.loss_half)}"
 
 
 def place_of(found: Identification, point: WorkingPoint) -> str:
@@ -230,7 +230,7 @@ def lag_of(found: Identification) -> str:
     if lag is None:
         return "no lag known"
     value = with_half(1e3 * lag.value, 1e3 * lag.bound) if lag.bound else plain(1e3 * lag.value, 3)
-    who = {"told": "as told", "measured": "measured in this log", "prior": "assumed, typical of sensors"}
+    who = {"told": "as given", "measured": "measured in this log", "prior": "assumed, typical of sensors"}
     return f"force late by {value} ms ({who.get(lag.kind, lag.kind)})"
 
 

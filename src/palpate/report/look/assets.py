@@ -9,13 +9,11 @@ import hashlib
 import json
 from functools import cache
 from importlib import resources
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
 
 GAP = -32768
 """Where there is no value."""
@@ -40,42 +38,6 @@ def packed_column(values: Array) -> dict[str, Any]:
     codes[np.isinf(values)] = NO_PLACE
     codes[known] = np.round((values[known] - low) / step).astype(np.int64) - _HALF
     return {"b": base64.b64encode(codes.tobytes()).decode(), "s": step, "o": low}
-
-
-def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
-    """A line through values over x, of about so many points that keep its peaks."""
-    rows = rows_shown(values, most)
-    return x[rows], values[rows]
-
-
-def rows_shown(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
-    """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
-
-    Args:
-        values: that must keep their peaks, shape (n,); NaN are passed over.
-        most: rows, about.
-        dense: rows of which half of all that are shown are to be, shape (n,).
-    """
-    n = len(values)
-    if n <= most:
-        return np.arange(n)
-    if dense is not None and dense.any() and not dense.all():
-        inside, outside = np.flatnonzero(dense), np.flatnonzero(~dense)
-        share = max(most // 2, most - len(outside))
-        parts = [
-            inside[rows_shown(values[inside], share)],
-            outside[rows_shown(values[outside], most - min(share, len(inside)))],
-        ]
-        return np.unique(np.concatenate(parts))
-    edges = np.linspace(0, n, max(most // 2, 1) + 1).astype(int)
-    kept = [0, n - 1]
-    for a, b in pairwise(edges):
-        piece = values[a:b]
-        if len(piece) and np.isfinite(piece).any():
-            kept += [a + int(np.nanargmin(piece)), a + int(np.nanargmax(piece))]
-        elif len(piece):
-            kept.append(a)
-    return np.unique(kept)
 
 
 DATA = {

@@ -29,10 +29,11 @@ from palpate.report.many.table import (
     tables,
     together,
 )
-from palpate.report.numbers import NONE, as_html, as_text, quantity
+from palpate.report.output import as_html, as_text
 from palpate.report.page import Card, PageAnswer, answer_page, data_address, warning_alerts
 from palpate.report.style import svg
 from palpate.text import printable
+from palpate.units import NONE, quantity
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,6 +16,7 @@ from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification.words import (
     Source,
     as_json,
+    by_the_model,
     facts_of,
     full_number,
     interval,
@@ -24,8 +25,8 @@ from palpate.report.identification.words import (
     unit_warnings,
     units_of,
 )
-from palpate.report.numbers import NONE, plain, quantity, si_prefix, with_half
 from palpate.report.page import CommandAnswer, Table
+from palpate.units import NONE, plain, quantity, si_prefix, with_half
 
 POINT = "working point"
 
@@ -162,7 +163,7 @@ def tables(rows: Sequence[LogRow], pooled: Pooled, *, places: bool = False) -> l
 
 
 def _logs(rows: Sequence[LogRow], pooled: Pooled, places: bool) -> Table:
-    """A row a log: its quantities, and the verdict of its working point."""
+    """A row a log: its quantities, and the verdict of its stiffness, as of one log alone."""
     names = quantities_with_number(rows, pooled)
     units = [f"{_title(name)}{_unit(quantities(pooled)[name].parameter)}" for name in names]
     lines = []
@@ -174,13 +175,14 @@ def _logs(rows: Sequence[LogRow], pooled: Pooled, places: bool) -> Table:
 
 
 def _place_and_verdict(row: LogRow) -> tuple[str, str, str]:
-    """Where a log's working point is, its model, and the point's verdict."""
+    """Where a log's working point is, its model, and the verdict of its stiffness."""
     if row.found is None:
         return NONE, NONE, "not identified"
     point = row.found.working_point
     if point is None:
         return NONE, row.found.model, "no working point" if row.found.contacts else "no contact"
-    return ", ".join(facts_of(row.found, point)), row.found.model, str(point.stiffness.verdict)
+    own = row.found.parameters["K"] if by_the_model(row.found) else point.stiffness
+    return ", ".join(facts_of(row.found, point)), row.found.model, str(own.verdict)
 
 
 def together(pooled: Pooled) -> Table:

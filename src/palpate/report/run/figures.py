@@ -13,10 +13,10 @@ from palpate.files import write_text
 from palpate.records import Record
 from palpate.report import style
 from palpate.report.chart import KNOWN, Band, Chart, Interval, Mark, Series, figure_of, panels
-from palpate.report.numbers import NONE, quantity
 from palpate.report.page import PageAnswer, Table, answer_page
 from palpate.report.run.table import alerts, sentence, settling
 from palpate.signals.types import NORMAL
+from palpate.units import NONE, quantity
 
 BEFORE = 1.0
 """Seconds before contact that are still shown."""

@@ -13,14 +13,14 @@ from palpate.report.chart import figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES, split
 from palpate.report.identification.words import CALLED, full_number
-from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, rows_shown, scripts, text_of
-from palpate.report.numbers import quantity
+from palpate.report.look.assets import ARM, CHARTS, TABLES, data, packed_column, scripts, text_of
 from palpate.report.page import Card, data_address, render
 from palpate.report.run.figures import BEFORE, PARAMETERS, charts_of, figures_of, window_of
 from palpate.report.run.table import alerts, force_cards, force_rows, motors, sentence, thesis_table
-from palpate.report.style import svg
+from palpate.report.style import rows_shown, svg
 from palpate.robots.arm3 import Arm3
 from palpate.text import printable
+from palpate.units import quantity
 
 ROWS = 4000
 """Of the record that lie in the page, the peaks of the measured force among them."""

@@ -5,10 +5,10 @@ from typing import Any
 
 from palpate.identification.result import Identification
 from palpate.report.identification.words import CALLED
-from palpate.report.numbers import NONE, plain, quantity, with_half
 from palpate.report.page import Card, CommandAnswer, Table
 from palpate.signals.types import NORMAL
 from palpate.text import printable
+from palpate.units import NONE, plain, quantity, with_half
 
 
 def force_cards(summary: dict[str, Any]) -> list[Card]:
@@ -18,7 +18,7 @@ def force_cards(summary: dict[str, Any]) -> list[Card]:
     if f["overshoot_N"] is not None:
         fraction = 100 * f["overshoot_N"] / abs(f["desired_N"]) if f["desired_N"] else 0.0
         cards.append(Card("Overshoot", plain(f["overshoot_N"], 2), "N", why=f"{fraction:.0f} % of the step"))
-    error = f"{f['error_N']:+.2f}".replace("-", "\N{MINUS SIGN}")
+    error = f"{f['error_N']:+z.2f}".replace("-", "\N{MINUS SIGN}")
     why = f"RMS since contact {plain(f['rms_error_N'], 2)} N"
     return [*cards, Card("Error, last second", error, "N", why=why)]
 
@@ -110,7 +110,7 @@ def alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
     end = summary["end"]
     if end != "done":
         tone = "fail" if end in _FAILED or end == "no contact" else "warn"
-        text, advice = f"{summary['why']}.", _ADVICE.get(end, "")
+        text, advice = f"{summary['why'].removeprefix(f'{end} ')}.", _ADVICE.get(end, "")
         found.append({"tone": tone, "title": f"{end.capitalize()}:", "text": text, "advice": advice})
     if summary["contacts_lost"] and end != "lost contact":
         times = summary["contacts_lost"]

@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import open_file
 from palpate.files.confined import read_confined
-from palpate.files.limits import GB, ReadingBudget, ReadingLimits
+from palpate.files.reading import GB, ReadingBudget, ReadingLimits
 from palpate.robots.serial.linear import check_inertia
 
 

@@ -10,12 +10,9 @@ of which the second part moves joints to spare and not the tip.
 
 from typing import NamedTuple
 
-import numpy as np
-
-from palpate._jit import kernel, law, part
-from palpate._vector import ZERO3, Mat3, Vec3, Vec6
+from palpate._jit import law, part
+from palpate._vector import Vec3, Vec6
 from palpate.arrays import Array
-from palpate.robots.serial.chain import Room, Tip, chain_model, jacobian_rate, room_for
 from palpate.robots.serial.linear import backward, factorise, forward, product
 
 
@@ -101,18 +98,13 @@ def put_six(a, i, v):
 
 @part
 class TaskRoom(NamedTuple):
-    """Where the laws of this file put what they find; `task_room_for` makes it."""
+    """Where the laws of this file put what they find; whoever steps an arm makes it."""
 
     L: Array  # of M = L D L^T, as `linear` has it, shape (n, n)
     W: Array  # J in the task's axes, then L^-1 J^T in rows; the last row is L^-1 h, shape (7, n)
     mobility: Array  # J M^-1 J^T, shape (6, 6)
     factor: Array  # of that, shape (6, 6)
     six: Array  # shape (6,)
-
-
-def task_room_for(n: int) -> TaskRoom:
-    """Room for an arm of n joints."""
-    return TaskRoom(np.zeros((n, n)), np.zeros((7, n)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
 
 
 @law
@@ -173,52 +165,3 @@ def joint_torque(axes, room, model, own, F, damping, qd, torque):
     wrench = F - model.M @ acceleration_of_last(own)
     for i in range(n):
         torque[i] += wrench @ column_in(axes, room.J, i)
-
-
-@part
-class ArmState(NamedTuple):
-    """The laws at one state, in arrays."""
-
-    room: Room
-    Jdot: Array  # shape (6, n)
-    Jdqd: Array  # shape (6,)
-    pose: Array  # shape (4, 4)
-
-
-@law
-def describe_arm(chain, q, qd, found):
-    """Fills everything that is known of one state."""
-    tip = chain_model(chain, q, qd, found.room)
-    jacobian_rate(qd, found.room, tip, found.Jdot)
-    bias, pose = found.Jdqd, found.pose
-    bias[0], bias[1], bias[2] = tip.a.x, tip.a.y, tip.a.z
-    bias[3], bias[4], bias[5] = tip.dw.x, tip.dw.y, tip.dw.z
-    R = tip.R
-    pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3] = R.r1.x, R.r1.y, R.r1.z, tip.p.x
-    pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3] = R.r2.x, R.r2.y, R.r2.z, tip.p.y
-    pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3] = R.r3.x, R.r3.y, R.r3.z, tip.p.z
-
-
-@law
-def tip_of(found, qd):
-    """The tip, from the arrays."""
-    pose, bias, J = found.pose, found.Jdqd, found.room.J
-    v, w = ZERO3, ZERO3
-    for i in range(len(qd)):
-        v += qd[i] * Vec3(J[0, i], J[1, i], J[2, i])
-        w += qd[i] * Vec3(J[3, i], J[4, i], J[5, i])
-    R = Mat3(
-        Vec3(pose[0, 0], pose[0, 1], pose[0, 2]),
-        Vec3(pose[1, 0], pose[1, 1], pose[1, 2]),
-        Vec3(pose[2, 0], pose[2, 1], pose[2, 2]),
-    )
-    p = Vec3(pose[0, 3], pose[1, 3], pose[2, 3])
-    return Tip(p, R, v, w, Vec3(bias[0], bias[1], bias[2]), Vec3(bias[3], bias[4], bias[5]))
-
-
-def arm_state_for(n: int) -> ArmState:
-    """Room for what is found of an arm of n joints."""
-    return ArmState(room_for(n), np.zeros((6, n)), np.zeros(6), np.eye(4))
-
-
-compiled_description = kernel(describe_arm)

@@ -12,8 +12,8 @@ from palpate.references import Multisine
 from palpate.report import style
 from palpate.report.chart import KNOWN, Band, Chart, Interval, Mark, Series, figure_of, panels
 from palpate.report.identification.words import CALLED
-from palpate.report.numbers import plain, quantity
 from palpate.report.page import Card, PageAnswer, answer_page
+from palpate.units import plain, quantity
 from palpate_excitation import Design, Remedy
 from palpate_excitation.report.table import describe_wave, percent, remedies_table, sentence, surfaces_table
 

@@ -10,8 +10,8 @@ from palpate.files import FORCE, MADE, write_text
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.references import Multisine
-from palpate.report.numbers import plain, quantity
 from palpate.report.page import CommandAnswer, Table
+from palpate.units import plain, quantity
 from palpate_excitation import Design, HybridLoop, Remedy
 from palpate_excitation.problem import LONGEST
 
