@@ -151,10 +151,15 @@ def body_of(figure: Figure) -> str:
     return text.partition(begin)[2].partition(end)[0]
 
 
+def text_of(figure: Figure) -> str:
+    """What its command printed, without the line that says so; empty if it has never been made."""
+    return body_of(figure).rpartition("`python ")[0].strip()
+
+
 def stamp_of(figure: Figure) -> str:
-    """The digest that stands with a figure; empty where there is none."""
+    """The digest that stands with a figure; empty where there is none, or no figure."""
     found = re.search(r"sources ([0-9a-f]{12})", body_of(figure))
-    return found[1] if found else ""
+    return found[1] if found and text_of(figure) else ""
 
 
 def is_fresh(figure: Figure) -> bool:
@@ -166,7 +171,7 @@ def output(command: str) -> str:
     """What a script prints.
 
     Raises:
-        RuntimeError: with its last line, if it fails.
+        RuntimeError: with its last line, if it fails; or if it prints nothing, which is no figure.
     """
     # One thread, and the same kernels of algebra on every processor: others round otherwise.
     algebra = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "OPENBLAS_CORETYPE": "Haswell"}
@@ -182,6 +187,8 @@ def output(command: str) -> str:
     if done.returncode:
         last = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
         raise RuntimeError(f"`python {command}` ended with exit code {done.returncode}: {last}")
+    if not done.stdout.strip():
+        raise RuntimeError(f"`python {command}` printed nothing")
     return "\n".join(line.rstrip() for line in done.stdout.splitlines() if line.strip())
 
 

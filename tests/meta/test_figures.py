@@ -32,7 +32,9 @@ def test_a_figure_is_of_today_s_sources(name):
     figure = FIGURES[name]
     assert (ROOT / figure.script).is_file()
     assert all((ROOT / source).exists() for source in figure.sources), figure.sources
-    assert figures.body_of(figure).strip(), f"{name} has never been made"
+    assert figures.text_of(figure), (
+        f"nothing but its command stands in {name}: python benchmarks/figures.py --only {name}"
+    )
     assert figures.kept(figure), f"the small run of {name} has never been kept"
     assert figures.is_fresh(figure), f"its sources have changed: python benchmarks/figures.py --only {name}"
 
@@ -132,6 +134,11 @@ def test_a_stale_figure_is_known(monkeypatch, tmp_path):
     assert text.endswith("after\n")
     assert "| a | 1.0 |\n\n`python script.py`, palpate " in text
     assert figures.is_fresh(figure)
+    figures.put(figure, "")
+    assert not figures.text_of(figure)
+    assert not figures.is_fresh(figure)
+    figures.put(figure, "| a | 1.0 |")
+    assert figures.is_fresh(figure)
     (tmp_path / "law.py").write_text("x = 2\n")
     assert not figures.is_fresh(figure)
 
@@ -140,4 +147,7 @@ def test_a_script_that_fails_is_named_with_its_last_line(monkeypatch, tmp_path):
     monkeypatch.setattr(figures, "ROOT", tmp_path)
     (tmp_path / "script.py").write_text("raise SystemExit('no arm')\n")
     with pytest.raises(RuntimeError, match=r"script\.py.*exit code 1: no arm"):
+        figures.output("script.py")
+    (tmp_path / "script.py").write_text("")
+    with pytest.raises(RuntimeError, match=r"script\.py.*printed nothing"):
         figures.output("script.py")

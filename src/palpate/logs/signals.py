@@ -94,14 +94,18 @@ class Signals:
             InputError: the log cannot be read, or something would have to be guessed.
         """
         bag = kind_of(path).is_bag
+        about = stored_about(path) if kind_of(path) is Kind.PARQUET else None
+        own_frame = {"wrench_frame"} & (about.meta.keys() if about else set())
         if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
-            return self, {}
+            return self, {name: about.meta[name] for name in own_frame} if about else {}
         from palpate.logs.listing import list_log
 
-        if kind_of(path) is Kind.PARQUET and (about := stored_about(path)) is not None:
-            known_frame |= "wrench_frame" in about.meta
         proposal = list_log(path, self.delimiter, self.limits).proposal
-        guesses = [guess for guess in proposal.guesses if not (known_frame and "--wrench-frame" in guess)]
+        guesses = [
+            guess
+            for guess in proposal.guesses
+            if not ((known_frame or own_frame) and "--wrench-frame" in guess)
+        ]
         if bag and (proposal.options is None or guesses):
             return self, {}  # a bag's only wrench and pose need no names
         if proposal.options is None or guesses:

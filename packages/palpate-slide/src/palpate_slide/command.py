@@ -40,7 +40,6 @@ _SURFACE = {
     "grade": "grade",
 }
 
-
 _SIMULATED = Parameter(group=Group("The simulated surface", sort_key=2))
 
 
@@ -98,8 +97,11 @@ class SlideOptions(SlideLimits):
                 raise InputError(
                     f"--surface needs K=..,B=..,mu=.. as numbers, each once, as K=20000,mu=0.3; got {self.surface!r}"
                 ) from None
-        name, _, size = self.shape.partition(":")
-        stiffness, heights = numbers.pop("stiffness", 0.0), None
+        if not {"stiffness", "friction"} <= numbers.keys():
+            raise InputError(
+                f"--surface needs K and mu, as K=20000,mu=0.3 (mu=0: no friction); got {self.surface!r}"
+            )
+        (name, _, size), heights = self.shape.partition(":"), None
         if name == "mesh":
             from palpate_slide.mesh import heights_of
 
@@ -114,7 +116,7 @@ class SlideOptions(SlideLimits):
             )
         height = {"height": self.radius, "period": 0.02} if name == "step" else {}
         radius = 0.2 if name == "step" else self.radius
-        return ground_of(name, radius, stiffness, heights=heights, **numbers, **height)
+        return ground_of(name, radius, heights=heights, **numbers, **height)
 
     @property
     def extent(self) -> float:
@@ -130,6 +132,8 @@ class SlideOptions(SlideLimits):
     def radius(self) -> float:
         """Radius of the shape, or its height [m]; of a plane or a mesh the smallest radius that is expected."""
         name, _, size = self.shape.partition(":")
+        if name == "plane" and size:
+            raise InputError(f"--shape plane has no radius; leave out :{size}, or give a sphere or a bowl")
         if name in {"plane", "mesh"} or not size:
             return 0.1 if name == "mesh" else 0.2
         radius = values.quantity("--shape", size, "length")

@@ -175,6 +175,9 @@ def advantage(
     by_press = np.sum(
         residual_of_press(press, about, s.time[rows], s.place[rows], s.velocity[rows], read) ** 2, axis=1
     )
+    # A direction of the motion is noisier than a depth: that is no fault of a slide, and counts for both.
+    speed = np.linalg.norm(s.velocity[rows], axis=1)
+    by_press += np.where(slides, (size * s.blur / np.maximum(speed, 1e-12)) ** 2, 0.0)
     # Both are normal with a variance of their own: the parts' log-likelihoods against each other.
     one, other = (values / values.mean() for values in (by_press, by_slide))
     parts = np.array([part.mean() for part in np.array_split(one - other, BLOCKS)])
@@ -355,16 +358,20 @@ def _stiffness(
     ends = min(lengths.min(), tied.min()), max(lengths.max(), tied.max())
     others = [_ratio(_dips(course, found, float(x)), BLOCKS) for x in ends]
     spread = max(float("inf") if one is None else abs(one[0] / whole[0] - 1.0) for one in others)
+
+    def surface(K: float, half: float) -> tuple[float, float]:
+        return _surface(K, float(np.hypot(half, spread * K)), arm, calibration)
+
     rows = []
     for i in np.unique(main.part):
         at = main.part == i
         own = Dips(main.dip[at], main.columns[at], main.part[at], main.place[at], main.noise)
         one = _ratio(own, 8) if len(own.dip) > 32 else None
         if one is not None:
-            K, half = _surface(one[0], float(np.hypot(one[1], spread * one[0])), arm, calibration)
+            K, half = surface(*one)
             rows += [(*own.place.mean(axis=0), K, half)] if 0.0 < half < 0.5 * K else []
     places = np.array(rows).reshape(-1, 5)
-    K, half = _surface(whole[0], float(np.hypot(whole[1], spread * whole[0])), arm, calibration)
+    K, half = surface(*whole)
     if not (0.0 < half <= tolerance * K):
         return none, places
     why = f"95 %: {K - half:.4g} to {K + half:.4g} N/m, by the changes of the force along the path"

@@ -78,6 +78,11 @@ class Smooth:
     noise: float
     inside: Mask
 
+    @property
+    def blur(self) -> float:
+        """Standard deviation of the velocity of an axis [m/s]."""
+        return float(self.grain * np.sqrt(12.0 / self.rows**3) / self.step)
+
 
 def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
     """Signals over windows in which the tip goes on by `CHORD`; None of a log that is too short, or without contact."""
@@ -153,7 +158,7 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
         own, at, R = mean[::turned], place[::turned], rotations[::turned]
         level = np.median(own[:brief], axis=0)
         far = np.linalg.norm(own - level, axis=1)
-        usual = float(np.quantile(far, 0.9))
+        usual = float(np.sort(far)[-min(brief, len(far))])  # for so long, however brief a slide is in its log
         met = end = int(np.argmax(far > 0.5 * usual))
         while end and far[end] > chance:
             end -= 1
@@ -282,14 +287,13 @@ def friction_that_acts(mu: Array, share: Array) -> Array:
 def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> SlideWindows | None:
     """The windows in which the tip slides; None if it does not."""
     s = smooth(signals, freed)
-    if s is None:
+    if s is None or not s.inside.any():
         return None
     speed = np.linalg.norm(s.velocity, axis=1)
-    blur = s.grain * np.sqrt(12.0 / s.rows**3) / s.step
-    usual = float(np.median(speed[s.inside & (speed > 4.0 * blur)])) if s.inside.any() else 0.0
+    usual = float(np.median(speed[s.inside & (speed > 4.0 * s.blur)]))
     size = np.linalg.norm(s.force, axis=1)
-    heavy = float(np.median(size[s.inside])) if s.inside.any() else 0.0
-    moves = s.inside & (speed > max(MOVES * usual, 4.0 * blur)) & (size > 0.2 * heavy)
+    heavy = float(np.median(size[s.inside]))
+    moves = s.inside & (speed > max(MOVES * usual, 4.0 * s.blur)) & (size > 0.2 * heavy)
     if not usual > 0.0 or moves.sum() < 10 * s.rows or not heavy > 6.0 * s.noise:
         return None
     way = s.velocity / np.maximum(speed, 1e-12)[:, None]
@@ -307,7 +311,7 @@ def course_of(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Sli
     rotations = signals.rotations[nearest(signals.time, s.time[rows])]
     rest = signals.rotations[freed.free].mean(axis=0) if freed.free.any() else rotations.mean(axis=0)
     force = s.noise * np.sqrt(2.25 / s.rows)
-    noise = np.hypot(force, size[rows] * blur / speed[rows])
+    noise = np.hypot(force, size[rows] * s.blur / speed[rows])
     return SlideWindows(
         speed[rows], s.place[rows], way[rows], sign * s.force[rows], sign * s.rate[rows],
         rotations, rows, s, moves, slides, known,

@@ -67,7 +67,12 @@ def _triangles(path: Path, scale: float) -> tuple[Array, Array]:
         )
     asset = f'<mesh name="surface" inertia="shell" {_content(path)}/>'
     geom = '<geom type="mesh" mesh="surface" contype="0" conaffinity="0"/>'
-    model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
+    try:
+        model, _ = load_mjcf(path, f"<mujoco><asset>{asset}</asset><worldbody>{geom}</worldbody></mujoco>")
+    except InputError:  # in MuJoCo's words, which name elements that no user wrote
+        raise InputError(
+            f"{path}: no mesh is read from it (4 corners, 200000 triangles at most, finite numbers); export it again"
+        ) from None
     turn = np.zeros(9)
     mujoco().mju_quat2Mat(turn, model.mesh_quat[0])
     points = scale * (model.mesh_vert @ turn.reshape(3, 3).T + model.mesh_pos[0])

@@ -12,7 +12,7 @@ from palpate.arrays import Array
 from palpate.files import RECORD, write_text
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import slide_json, slide_sentence
-from palpate.force.sliding.slide_state import SLIDING_TROUBLES
+from palpate.force.sliding.slide_state import AWAY, SLIDING_TROUBLES
 from palpate.force.sliding.sliding_loop import CHI2_95, Z_95, Uncertain
 from palpate.records import Record
 from palpate.report import style
@@ -29,6 +29,11 @@ _UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dic
 _UNITS |= {"tool": "rad", "normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 
 
+_DITHERED = (
+    "the dither, followed late, takes the force off by a tenth, and halves the speed; a smaller one is faster"
+)
+
+
 def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -> dict[str, Any]:
     """Plain JSON values: how the force was held, normal, friction and stiffness with intervals, and the truth.
 
@@ -41,7 +46,8 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
     c, found = dict(zip(COLUMNS, rows.T, strict=True)), figures_of(rows, gains, ground)
     on = c["sliding"] > 0.0
     never = "no slide" if c["normal_force"].any() else "no contact"
-    said = [SLIDING_TROUBLES[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
+    shown = SLIDING_TROUBLES | ({AWAY: _DITHERED} if found.obeys and np.ptp(c["desired"][on]) else {})
+    said = [shown[code] for code in dict.fromkeys(c["trouble"].tolist()) if code]
     seen = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
     summary: dict[str, Any] = {
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -37,10 +39,12 @@ def test_a_dithered_slide_measures_the_stiffness_along_its_path(
     assert figures_of(rows, gains, ground).obeys
 
 
-def test_the_places_of_a_dithered_slide_are_read_by_a_map(tmp_path) -> None:
+def test_the_places_of_a_dithered_slide_are_read_by_a_map(tmp_path, capsys) -> None:
     out = tmp_path / "out"
-    words = ["slide", "--dither", "0.05", "--speed", "15:mm/s", "--seconds", "6", "--out", str(out), "--json"]
+    words = ["slide", "--dither", "0.1", "--speed", "15:mm/s", "--seconds", "8", "--out", str(out), "--json"]
     assert main(words) == 0
+    (said,) = json.loads(capsys.readouterr().out)["troubles"]
+    assert said.startswith("the dither")  # and no step, no friction above mu_max
     presses = read_table(out / "places.csv")
     assert len(presses.stiffness) >= 2
     assert (np.abs(presses.stiffness - 2e4) < 1.5 * presses.half).all()

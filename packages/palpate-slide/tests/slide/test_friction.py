@@ -77,11 +77,18 @@ def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
 
 
 @pytest.mark.parametrize(
-    "seed", [12118, 12132]
-)  # of a bowl and a plane: a press would have K at 259 and 3054 N/m
+    "seed", [12118, 12132, 20102]
+)  # of a bowl, a plane and a cylinder: a press would have K at 259, 3054 and 62 N/m
 def test_a_slide_without_free_motion_is_no_press_with_a_stiffness(seed):
     found = found_in(wipe(any_wipe(seed, free=0.0)))
     assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
+
+
+def test_a_slide_that_is_a_tenth_of_its_log_is_one():
+    found = found_in(wipe(replace(WORLD, seconds=2.5, free=15.0, path="line")))
+    mu = found.parameters["mu"]
+    assert mu.verdict is Verdict.IDENTIFIED
+    assert mu.ci95[0] < WORLD.mu < mu.ci95[1]
 
 
 @pytest.mark.parametrize(

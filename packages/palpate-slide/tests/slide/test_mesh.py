@@ -110,7 +110,7 @@ def hole(corners: np.ndarray) -> np.ndarray:
             0.03,
             "non-manifold",
         ),
-        (triangles() * [1.0, 1.0, np.nan], 1e-3, 0.03, "MuJoCo refuses it"),
+        (triangles() * [1.0, 1.0, np.nan], 1e-3, 0.03, "no mesh is read from it"),
         (triangles(), 1e-3, 0.5, "may reach"),
     ],
 )
@@ -126,7 +126,7 @@ def test_a_mesh_that_is_none_is_one_line(corners, scale, reach, said, tmp_path: 
         ("mesh", "needs a file and its unit"),
         ("mesh:part.stl", "needs a file and its unit"),
         ("mesh:none.stl:mm", "No such file"),
-        ("mesh:odd.stl:mm", "MuJoCo refuses it"),
+        ("mesh:odd.stl:mm", "no mesh is read from it"),
         ("mesh:odd.stl:kg", "unit"),
         ("mesh:odd.txt:mm", r"a file .stl or .obj"),
         ("sphere:0:mm", "--shape sphere needs a radius"),

@@ -117,6 +117,7 @@ def _about(arm: Wire, order: Order, tool: Payload | None) -> dict[str, Any]:
         "normal": list(task.direction),
         "desired_N": task.force,
         "hold_s": task.hold,
+        "path": task.path and task.path.name,
         "probe": task.probe,
         "theta_s": order.loop.gains.theta,
         # The encoders of a servo show how it gives way, so that nothing is in series with the surface.

@@ -64,8 +64,8 @@ class Outcome:
             "touched": self.touched,
             "force_N": self.force,
             "settled_s": self.settled,
-            "stiffness_N_per_m": None if self.stiffness is None else list(self.stiffness),
-            **({} if self.surface is None else {"surface": self.surface}),
+            "stiffness_N_per_m": self.stiffness and list(self.stiffness),
+            **({"surface": self.surface} if self.surface else {}),
             "lateness": self.lateness.to_json(),
             "bias_N": self.rest.bias.tolist(),
             "noise_N": self.rest.noise,
@@ -226,7 +226,11 @@ def _finish(folder: Path, record: Record, outcome: dict[str, Any]) -> Path:
 
 def _record(rows: Any, about: dict[str, Any]) -> Record:
     columns = {name: np.ascontiguousarray(rows[:, i]) for i, name in enumerate(UNITS)}
-    if len(rows):
-        columns["t"] = columns["t"] - columns["t"][0]
+    columns["t"] -= columns["t"][:1]
+    if about.get("path"):  # a slide has no depth along one direction: it is read as wrench and pose
+        columns["time"] = columns.pop("t")
+        del columns["x_measured"]
+    units = {name: UNITS.get(name, "s") for name in columns}
     meta = {name: value for name, value in about.items() if name != "written_by"}
-    return Record(columns, UNITS, {"wire": meta, "position_from": about.get("position_from", "joints")})
+    source = about.get("position_from", "joints")
+    return Record(columns, units, {"wire": meta, "position_from": source, "wrench_frame": "base"})

@@ -175,13 +175,16 @@ def test_it_slides_over_the_protocol_of_a_simulated_arm(folder, here, capsys):
     with arm(folder) as (_, address):
         assert main(words_of(folder, address, "--dry-run")) == 0
         assert "while it slides along a back of 10 mm" in capsys.readouterr().out
-    with arm(folder) as (_, address):
+    with arm(folder, "--gap", "0.006") as (_, address):
         code = main(words_of(folder, address, "--yes", "--record", "rec", "--json"))
     told = json.loads(capsys.readouterr().out)
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)
     assert told["surface"]["friction"]["ci95"][0] < FRICTION < told["surface"]["friction"]["ci95"][1]
     assert np.ptp(read_record(here / "rec" / "record.parquet")["position_x"]) > 0.005
+    assert main(["identify", str(here / "rec" / "record.parquet"), "--json"]) == 0
+    mu = json.loads(capsys.readouterr().out)["parameters"]["mu"]  # no press: it is read with its axes
+    assert mu["ci95"][0] < FRICTION < mu["ci95"][1]
 
 
 def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
