@@ -40,7 +40,7 @@ LARGEST = {
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 35, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 34, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 UNTESTED = 240
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""

@@ -148,7 +148,7 @@ def slope_of_lag(
     return change / (2 * step)
 
 
-def linearised(
+def linearise(
     model: Model, motion: Motion, force: Array, nonlinear: dict[str, float], lag: float
 ) -> tuple[dict[str, float], Array, Array]:
     """A model about its nonlinear parameters and a lag [s], and the linear ones that fit best there.

@@ -28,7 +28,7 @@ from palpate.identification.estimators.budget import (
     Spread,
     effect_columns,
 )
-from palpate.identification.estimators.fit import linearised, nonlinear_fit, slope_of_lag
+from palpate.identification.estimators.fit import linearise, nonlinear_fit, slope_of_lag
 from palpate.identification.estimators.octaves import (
     LARGEST,
     Octaves,
@@ -302,7 +302,7 @@ def _linearise(
     if len(nonlinear) < len(model.nonlinear):
         exact = replace(problem.lag, value=lag, std=0.0)
         nonlinear = nonlinear_fit(model, motion, problem.force, exact)
-    at, jacobian, residuals = linearised(model, motion, problem.force, nonlinear, lag)
+    at, jacobian, residuals = linearise(model, motion, problem.force, nonlinear, lag)
     free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
     own = {name: jacobian[:, i] for name, i in free.items()}
     return at, own, residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
