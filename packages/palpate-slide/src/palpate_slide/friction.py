@@ -176,8 +176,7 @@ def advantage(
         residual_of_press(press, about, s.time[rows], s.place[rows], s.velocity[rows], read) ** 2, axis=1
     )
     # A direction of the motion is noisier than a depth: that is no fault of a slide, and counts for both.
-    speed = np.linalg.norm(s.velocity[rows], axis=1)
-    by_press += np.where(slides, (size * s.blur / np.maximum(speed, 1e-12)) ** 2, 0.0)
+    by_press[slides] += (size[slides] * s.blur / np.linalg.norm(s.velocity[rows][slides], axis=1)) ** 2
     # Both are normal with a variance of their own: the parts' log-likelihoods against each other.
     one, other = (values / values.mean() for values in (by_press, by_slide))
     parts = np.array([part.mean() for part in np.array_split(one - other, BLOCKS)])
@@ -365,7 +364,7 @@ def _stiffness(
     rows = []
     for i in np.unique(main.part):
         at = main.part == i
-        own = Dips(main.dip[at], main.columns[at], main.part[at], main.place[at], main.noise)
+        own = Dips(main.noise, *(values[at] for values in main[1:]))
         one = _ratio(own, 8) if len(own.dip) > 32 else None
         if one is not None:
             K, half = surface(*one)
@@ -387,11 +386,11 @@ class Dips(NamedTuple):
     (n,), places [m], shape (n, 3), and the variance of the rate by the sensor's noise [N^2/s^2].
     """
 
+    noise: float
     dip: Array
     columns: Array
     part: Array
     place: Array
-    noise: float
 
 
 def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
@@ -411,7 +410,7 @@ def _dips(course: SlideWindows, found: SlideFit, length: float) -> Dips:
     part = np.floor((s.time[rows] - s.time[rows[0]]) / PART) if len(rows) else s.time[rows]
     columns = np.column_stack([carried, rate, np.gradient(rate, s.step)])[rows]
     noise = s.noise**2 * 12.0 / (s.longer**3 * s.step**2) / (1.0 + mu**2)
-    return Dips(dip[rows], columns, part, s.place[rows], noise)
+    return Dips(noise, dip[rows], columns, part, s.place[rows])
 
 
 _NO_DITHER = (

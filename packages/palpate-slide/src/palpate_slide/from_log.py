@@ -158,7 +158,7 @@ def freed_of(signals: BaseSignals, frame: ContactFrame, touches: bool = True) ->
         own, at, R = mean[::turned], place[::turned], rotations[::turned]
         level = np.median(own[:brief], axis=0)
         far = np.linalg.norm(own - level, axis=1)
-        usual = float(np.sort(far)[-min(brief, len(far))])  # for so long, however brief a slide is in its log
+        usual = np.sort(far)[-brief:][0]  # for so long, however brief a slide is in its log
         met = end = int(np.argmax(far > 0.5 * usual))
         while end and far[end] > chance:
             end -= 1
