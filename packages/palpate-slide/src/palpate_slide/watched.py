@@ -58,7 +58,8 @@ class WatchedSlide(WatchedArm):
             Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
             Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
         )  # fmt: skip
-        about = "the law of palpate tune --slide around a circle, MuJoCo"
+        first = "three touches for the normal, then " if numbers_of(gains).touches else ""
+        about = f"{first}the law of palpate tune --slide around a circle, MuJoCo"
         quantities = {"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")}
         super().__init__(at.arm, at.place, gains, sliders, about, seed, quantities=quantities)
         self.reset()
@@ -98,8 +99,7 @@ class WatchedSlide(WatchedArm):
         """
         self.view.check(key, value)
         self.state.values[key] = value
-        if key == "force":
-            self._run.loop.desired = value
+        self._run.loop.desired = self.state.values["force"]
         self._run.engine.ground = self._surface
 
     @property

@@ -199,6 +199,19 @@ def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
     assert told["surface"]["friction"]["value"] == pytest.approx(FRICTION, abs=0.1)
 
 
+def test_a_direction_off_the_surface_meets_none_and_tells_no_normal(folder, here, capsys):
+    words = words_of(folder, "", "--yes")
+    words[words.index("0,0,-1")] = "0,0,1"
+    words[words.index("30:mm")] = "11:mm"
+    with arm(folder) as (_, words[words.index("--wire") + 1]):
+        code = main(words)
+    printed = capsys.readouterr().out
+    assert code == 1
+    assert "beyond the limit of 11 mm" in printed
+    assert "no surface was held before that; --normal is the direction into it" in printed
+    assert "friction" not in printed
+
+
 @pytest.mark.parametrize("at", [1, 7])  # y of the force, and of the position
 def test_a_slide_ends_where_one_axis_is_no_number(folder, here, capsys, at):
     def spoil(since, _):
