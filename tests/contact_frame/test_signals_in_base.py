@@ -32,6 +32,13 @@ def test_a_tool_that_rests_is_not_at_its_limit():
     assert not saturated_rows(held, 0 * PLACE, ALL).any()
 
 
+def test_what_rounds_in_an_axis_without_noise_is_no_limit():
+    still = force()
+    still[:, 0] = -0.5
+    still[::50, 0] = np.nextafter(-0.5, 0.0)
+    assert not saturated_rows(still, PLACE, ALL).any()
+
+
 def test_the_air_is_no_limit():
     """A simulated force is exactly constant in free motion."""
     quiet = np.maximum(force(), 2.0)

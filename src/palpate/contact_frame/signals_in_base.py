@@ -200,7 +200,7 @@ def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:
     stuck = np.zeros(len(force), bool)
     for axis in force.T:
         there = np.isfinite(axis) & inside
-        if there.any() and np.ptp(axis[there]):
+        if there.any() and np.ptp(np.float32(axis[there])):  # what is below its grain is rounding, no range
             stuck |= at_limit(axis, place, (axis[there].max(), axis[there].min()), there)
     return stuck
 

@@ -58,9 +58,12 @@ class WatchedSlide(WatchedArm):
             Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
             Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
         )  # fmt: skip
-        about = "the law of palpate tune --slide around a circle, MuJoCo"
-        quantities = {"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")}
-        super().__init__(at.arm, at.place, gains, sliders, about, seed, quantities=quantities)
+        first = "three touches for the normal, then " if numbers_of(gains).touches else ""
+        super().__init__(
+            at.arm, at.place, gains, sliders,
+            f"{first}the law of palpate tune --slide around a circle, MuJoCo", seed,
+            quantities={"K": ("Stiffness K", "N/m"), "B": ("Friction mu", "1")},
+        )  # fmt: skip
         self.reset()
 
     @property
@@ -98,8 +101,7 @@ class WatchedSlide(WatchedArm):
         """
         self.view.check(key, value)
         self.state.values[key] = value
-        if key == "force":
-            self._run.loop.desired = value
+        self._run.loop.desired = self.state.values["force"]
         self._run.engine.ground = self._surface
 
     @property
@@ -116,11 +118,10 @@ class WatchedSlide(WatchedArm):
         except InputError as error:
             self.state.ended = str(error)
         self._k += 1
-        now = self._k * self._tick
-        if self._run.sequence.touch is not None and before is None:
+        now, trouble = self._k * self._tick, self._run.loop.trouble
+        if self._run.sequence.touch and not before:
             self.state.note(Happened(now, "slides"))
         self._angle += self._own[PLACE["speed"]] * self._tick / self._radius
-        trouble = self._run.loop.trouble
         if trouble and trouble != self.state.warning:
             self.state.note(Happened(now, trouble.partition(":")[0], "fail"))
         self.state.warning = trouble
@@ -129,11 +130,10 @@ class WatchedSlide(WatchedArm):
 
     def _row(self) -> Array:
         own, values, row = self._own, self.state.values, np.full(len(SHOWN), np.nan)
-        n = own[PLACE["nx"] : PLACE["nz"] + 1]
         slides = own[PLACE["sliding"]] == 1.0
-        known: dict[str, float] = {
+        known: dict[str, Any] = {
             "t": (self._k - 1) * self._tick,
-            "measured": float(own[PLACE["fx"] : PLACE["fz"] + 1] @ n),
+            "measured": own[PLACE["fx"] : PLACE["fz"] + 1] @ own[PLACE["nx"] : PLACE["nz"] + 1],
             "force": own[PLACE["normal_force"]],
             "desired": values["force"] if slides else 0.0,
             "depth": 1e3 * self._run.engine.slid.tip.depth,

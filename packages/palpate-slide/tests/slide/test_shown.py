@@ -126,6 +126,10 @@ def test_a_watched_slide_shows_what_it_does_and_takes_sliders() -> None:
     watched = WatchedSlide(arm, gains, ground_of("bowl", 0.15, 2e4, friction=0.3), 0.03, (0.0, 0.0, -1.0))
     rows = watched.advance(0.2)
     assert len(rows) == 40
+    assert "touches" not in watched.view.about
+    touching = replace(gains, slide=Slide(speed=0.03, mu_max=0.9, touches=0.01))
+    watching = WatchedSlide(arm, touching, ground_of("plane", 0.2, 2e4), 0.03, (0.0, 0.0, -1.0))
+    assert "three touches for the normal, then the law" in watching.view.about
     assert np.diff(rows[:, AT["t"]]) == pytest.approx(0.005)
     assert np.isfinite(rows[:, AT["q1"] : AT["q7"] + 1]).all()
     watched.set("friction", 0.5)

@@ -185,10 +185,10 @@ def _plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
         f" {limits.seconds:g} s, on Ctrl-C and every other signal that can be caught, and {last:.3g} ms after the last"
         " reading at the latest"
     )
-    kept = f"record: {record}" if record is not None else "no record is kept (--record DIR keeps one)"
+    kept = f"record: {record}" if record else "no record is kept (--record DIR keeps one)"
     arms = f"arm: {arm.title}; gains for {gains.arm.title}"
     massless = mass_note(gains)
-    notes = [] if massless is None else [f"note: {massless}"]
+    notes = [f"note: {massless}"] if massless else []
     if gains.arm.sensor.accuracy is not None:
         notes.append(
             f"note: a force is as true as its sensor, ± {gains.arm.sensor.accuracy:g} N by its maker"
@@ -241,27 +241,29 @@ def _look(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
 
 def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
     if json:
-        print_answer(outcome.to_json() | {"priority": words, "record": None if where is None else str(where)})
+        print_answer(outcome.to_json() | {"priority": words, "record": where and str(where)})
         return 0 if outcome.ok else 1
     lines = [f"ended: {outcome.ended}; the arm rests"]
+    if not outcome.touched:
+        lines.append("no surface was held before that; --normal is the direction into it, in the base's axes")
     lines += [f"trouble in {ticks} ticks: {trouble}" for trouble, ticks in outcome.troubles.items()]
     if outcome.force is not None:
         settled = (
             f"within 5 % after {outcome.settled:.2g} s" if outcome.settled is not None else "never within 5 %"
         )
         lines.append(f"force {outcome.force:.4g} N, {settled}")
-    if outcome.stiffness is not None:
+    if outcome.stiffness:
         value, std = outcome.stiffness
         lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
-    if outcome.surface is not None:
+    if outcome.surface:
         n, mu = outcome.surface["normal"], outcome.surface["friction"]
-        low, high = (float("nan"),) * 2 if mu is None else mu["ci95"]
+        friction = "unknown" if mu is None else " to ".join(f"{end:.2f}" for end in mu["ci95"])
         lines.append(
             f"normal {n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f} within {outcome.surface['cone95_deg']:.2g} deg, friction"
-            f" {low:.2f} to {high:.2f}"
+            f" {friction}"
         )
     lines += [*outcome.lateness.sentences(), words]
-    if where is not None:
+    if where:
         lines.append(f"written: {where}; palpate identify {where} reads it")
     print_lines(*lines)
     return 0 if outcome.ok else 1

@@ -39,7 +39,7 @@ class Outcome:
         force: mean over the last third of the hold [N]; None if it was not reached.
         settled: seconds from the touch until the force was within 5 % for good; None if it was not.
         stiffness: what the loop found of the surface, as the position feels it, and its std [N/m]; None if nothing.
-        surface: normal and friction at the end of a slide with their intervals; None of a press.
+        surface: normal and friction at the end of a slide with their intervals; None of a press, or if it never slid.
         lateness: of the loop.
         rest: what was seen before.
         troubles: ticks of each trouble of the law, by its sentence.

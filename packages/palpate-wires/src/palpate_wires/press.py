@@ -232,7 +232,7 @@ class _Press:
             force=force_reached(times, forces) if ok else None,
             settled=settling_time(times, forces, self._order) if ok else None,
             stiffness=self._stiffness,
-            surface=surface_of(loop) if isinstance(loop, SlidingLoop) else None,
+            surface=surface_of(loop) if isinstance(loop, SlidingLoop) and self._pressed else None,
             lateness=self._arm.watch.summary(),
             rest=self._arm.rest,
             troubles=self._driver.troubles.ticks,

@@ -21,6 +21,7 @@ import numpy as np
 
 from palpate.force import load_arm
 from palpate.press.engines import press_gains
+from palpate_wires import sim
 from palpate_wires.outcome import UNITS
 
 ARM = """
@@ -151,7 +152,7 @@ class Relay(threading.Thread):
     Args:
         address: of the arm, `sim:HOST:PORT`.
         fault: given the seconds since the first command, what to do with a datagram: `None` as it is, a number to hold
-            it back for so many seconds, `lose`, or `garble`.
+            it back for so many seconds, `lose`, `garble`, or a function of its reading's thirteen values.
     """
 
     def __init__(self, address: str, fault):
@@ -180,16 +181,25 @@ class Relay(threading.Thread):
             if self._far in ready:
                 data = self._far.recv(512)
                 fault = None if begun is None or data[8] != 3 else self._fault(now - begun, self._rng)
-                if fault == "garble":
-                    data = bytes(self._rng.randrange(256) for _ in range(len(data)))
                 if fault != "lose":
-                    held.append((now + (fault if isinstance(fault, float) else 0.0), data))
+                    held.append(
+                        (now + (fault if isinstance(fault, float) else 0.0), self._spoiled(data, fault))
+                    )
             for due in [one for one in held if one[0] <= now]:
                 held.remove(due)
                 if master is not None:
                     self._near.sendto(due[1], master)
         self._near.close()
         self._far.close()
+
+    def _spoiled(self, data, fault):
+        if fault == "garble":
+            return bytes(self._rng.randrange(256) for _ in range(len(data)))
+        if callable(fault):
+            kind, session, body = sim.unpack(data)
+            number, stamp, values = sim.read_state(body)
+            return sim.pack(kind, session, sim.state(number, stamp, fault(values)))
+        return data
 
 
 @contextmanager

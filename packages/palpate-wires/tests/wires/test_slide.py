@@ -199,6 +199,35 @@ def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
     assert told["surface"]["friction"]["value"] == pytest.approx(FRICTION, abs=0.1)
 
 
+def test_a_direction_off_the_surface_meets_none_and_tells_no_normal(folder, here, capsys):
+    words = words_of(folder, "", "--yes")
+    words[words.index("0,0,-1")] = "0,0,1"
+    words[words.index("30:mm")] = "11:mm"
+    with arm(folder) as (_, words[words.index("--wire") + 1]):
+        code = main(words)
+    printed = capsys.readouterr().out
+    assert code == 1
+    assert "beyond the limit of 11 mm" in printed
+    assert "no surface was held before that; --normal is the direction into it" in printed
+    assert "friction" not in printed
+
+
+@pytest.mark.parametrize("at", [1, 7])  # y of the force, and of the position
+def test_a_slide_ends_where_one_axis_is_no_number(folder, here, capsys, at):
+    def spoil(since, _):
+        return (lambda values: (*values[:at], math.nan, *values[at + 1 :])) if since > 3.0 else None
+
+    with arm(folder, "--gap", "0.001") as (_, address), relayed(address, spoil) as relay:
+        code = main(words_of(folder, relay.address, "--yes", "--record", "rec"))
+    printed = capsys.readouterr().out
+    assert code == 1
+    assert "ended: the arm gives a reading that is no number; the arm rests\n" in printed
+    assert relay.rests
+    record = read_record(here / "rec" / "record.parquet")
+    assert len(record) > 200
+    assert record["phase"].max() == 3.0  # it was sliding
+
+
 def test_a_signal_tells_the_arm_to_rest_and_loses_nothing(folder, tmp_path):
     with arm(folder, "--gap", "0.001") as (_, address), relayed(address, lambda *_: None) as relay:
         words = words_of(folder, relay.address, "--yes", "--record", "rec")
