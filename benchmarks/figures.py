@@ -56,7 +56,7 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             figure is of a day, and no digest tells when it is of the past.
         fenced: whether it is text with columns, rather than Markdown.
         times: whether it holds times, which no second run prints again.
-        needs: programs without which the small run is left out.
+        needs: programs without which the small run is left out, and the figure not made.
     """
 
     name: str
@@ -227,7 +227,13 @@ def write(figure: Figure, body: str) -> None:
 
 
 def renew(figure: Figure, forced: bool) -> str:
-    """Make a figure again, or only its digest where the small run prints what it printed; says which."""
+    """Make a figure again, or only its digest where the small run prints what it printed; says which.
+
+    Raises:
+        RuntimeError: where a program is lacking, without which the figure would lose a row.
+    """
+    if lacking := [program for program in figure.needs if not shutil.which(program)]:
+        raise RuntimeError(f"needs {', '.join(lacking)}: install what is lacking, then make it again")
     today = smoke(figure)
     if not forced and not figure.times and stamp_of(figure) and today == kept(figure):
         write(figure, body_of(figure).replace(f"sources {stamp_of(figure)}", f"sources {digest(figure)}"))

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -151,3 +152,10 @@ def test_a_script_that_fails_is_named_with_its_last_line(monkeypatch, tmp_path):
     (tmp_path / "script.py").write_text("")
     with pytest.raises(RuntimeError, match=r"script\.py.*printed nothing"):
         figures.output("script.py")
+
+
+def test_a_figure_is_not_made_where_a_program_is_lacking(monkeypatch):
+    needy = structs.replace(next(iter(FIGURES.values())), needs=("sh", "no-such-compiler"))
+    monkeypatch.setattr(figures, "smoke", lambda figure: pytest.fail("it was run"))
+    with pytest.raises(RuntimeError, match="needs no-such-compiler"):
+        figures.renew(needy, forced=True)
