@@ -35,7 +35,7 @@ def test_a_tool_that_rests_is_not_at_its_limit():
 def test_what_rounds_in_an_axis_without_noise_is_no_limit():
     still = force()
     still[:, 0] = -0.5
-    still[::50, 0] = np.nextafter(-0.5, 0.0)
+    still[:100, 0] += np.linspace(1e-14, 0.0, 100)
     assert not saturated_rows(still, PLACE, ALL).any()
 
 
