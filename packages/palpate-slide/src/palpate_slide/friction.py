@@ -17,6 +17,7 @@ from palpate.identification.result import LagFound, SlideFound
 from palpate.identification.uncertainty import student
 from palpate.records import Record
 from palpate_slide.from_log import (
+    ALONG,
     BLOCKS,
     SHAPE,
     Fit,
@@ -121,7 +122,7 @@ def _identification(
     else:
         K, parts = _nothing("N/m", _NO_ZERO), np.zeros((0, 5))
     normal, cone = _normals(course, fit, found, mu, share)
-    own = _verdict(mu, _contradiction(course, fit, found, normal, rows), course.known, wide[0])
+    own = _verdict(mu, _contradiction(course, fit, found, normal, rows, freed), course.known, wide[0])
     std = float(np.sqrt(found.covariance[len(found.mu) + 1, len(found.mu) + 1]))
     inside = signals.time[freed.inside]
     return Identification(
@@ -222,8 +223,7 @@ def _classes(speed: Array, rows: Mask) -> Array:
         total += int(many[octave])
         if total >= 3 * BLOCKS and many[octave + 1 :].sum() >= 3 * BLOCKS:
             kept, total = kept + 1, 0
-    found: Array = names[own]
-    return found
+    return names[own]
 
 
 def _coefficient(
@@ -292,7 +292,9 @@ def _verdict(mu: Coefficient, wrong: str, known: bool, tolerance: float) -> Para
     )  # fmt: skip
 
 
-def _contradiction(course: SlideWindows, fit: Fit, found: SlideFit, normal: Array, rows: Mask) -> str:
+def _contradiction(
+    course: SlideWindows, fit: Fit, found: SlideFit, normal: Array, rows: Mask, freed: Unloaded
+) -> str:
     """Why force and motion do not belong together; empty if they do."""
     _, _, F = fit.psi(found.lag, found.load)
     psi = np.arctan(found.mu[0]) + found.angle * course.noise / np.linalg.norm(F, axis=1)
@@ -302,6 +304,11 @@ def _contradiction(course: SlideWindows, fit: Fit, found: SlideFit, normal: Arra
     contrary = float(np.mean(psi[rows] < -np.radians(3.0)))
     if contrary > CONTRARY:
         return f"friction would push the tip on in {100 * contrary:.0f} % of the path: {axes}"
+    s, touch = course.smooth, int(np.argmax(course.smooth.inside))
+    before = course.turns[0][freed.free & (course.turns[0] < s.time[touch])]
+    came = s.place[touch] - s.place[nearest(s.time, before[-1:])].sum(axis=0)
+    if len(before) and came @ normal[0] < -ALONG * np.linalg.norm(came):
+        return f"the tip came from within the surface, as the force says its normal: {axes}"
     spread, directions = np.linalg.eigh(np.cov(course.place.T))
     if spread[1] > 0.05 * spread[2] and spread[0] < 0.05 * spread[1]:
         mean = normal.mean(axis=0)

@@ -104,14 +104,12 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
     usual = float(np.median(far[far > 0.1 * far.max()])) if far.size and far.max() > 0.0 else 0.0
     if not usual > 0.0:
         return None
-    rows = round(min(max(CHORD, GRAINS * grain) / usual, 0.4) / step) // 2 * 2 + 1
-    rows = max(rows, 5)
+    rows = max(round(min(max(CHORD, GRAINS * grain) / usual, 0.4) / step) // 2 * 2 + 1, 5)
     if len(grid) < 10 * rows:
         return None
 
     def of(values: Array, order: int) -> Array:
-        found: Array = savgol_filter(values, rows, 2, deriv=order, delta=step, axis=0)
-        return found
+        return savgol_filter(values, rows, 2, deriv=order, delta=step, axis=0)
 
     longer = max(rows, round(RATE / step) // 2 * 2 + 1)
     rate = savgol_filter(force, longer, 2, deriv=1, delta=step, axis=0)
@@ -125,8 +123,7 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
 def nearest(time: Array, at: Array) -> NDArray[np.intp]:
     """Rows that are nearest to some times, shape (n,)."""
     later = np.searchsorted(time, at).clip(1, len(time) - 1)
-    found: NDArray[np.intp] = later - (at - time[later - 1] < time[later] - at)
-    return found
+    return later - (at - time[later - 1] < time[later] - at)
 
 
 ALONG = np.sqrt(0.5)
@@ -396,8 +393,7 @@ class Fit:
         psi, spring, F = self.psi(x[j + 1], x[j + 2 :])
         mu = x[:j][self.classes]
         model = friction_that_acts(mu, share) + x[j] * spring / np.sqrt(1.0 + mu**2)
-        left: Array = (psi - model) * np.linalg.norm(F, axis=1) / self.course.noise
-        return left
+        return (psi - model) * np.linalg.norm(F, axis=1) / self.course.noise
 
     def solve(self, share: Array, slips: Mask) -> SlideFit:
         """By Gauss-Newton with Huber's weights, from friction as it looks without any load."""
@@ -458,8 +454,7 @@ def _jackknife(J: Array, w: Array, r: Array, A: Array, inverse: Array, order: ND
         score = Jb.T @ (wb * r[b])
         gone = A @ np.linalg.solve(rest + 1e-12 * np.diag(np.diag(A)), score)
         meat = meat + np.outer(gone, gone) * (len(blocks) - 1) / len(blocks)
-    found: Array = inner @ meat @ inner
-    return found
+    return inner @ meat @ inner
 
 
 def with_length(fit: Fit) -> tuple[SlideFit, float, Array]:

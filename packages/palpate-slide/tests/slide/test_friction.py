@@ -70,6 +70,17 @@ def test_force_and_position_in_other_axes_are_refused():
     assert "--wrench-frame" in mu.reason
 
 
+@pytest.mark.parametrize("path", ["line", "raster"])
+def test_a_tip_that_comes_from_within_the_surface_tells_no_normal(path):
+    """A wrench turned by 180 degrees about the path has the friction of the right one, and the opposite normal."""
+    log = wipe(replace(WORLD, shape="plane", path=path, tilted=False, dither=0.0))
+    assert found_in(log).parameters["mu"].verdict is Verdict.IDENTIFIED
+    turned = {name: -1.0 * log.columns[name] for name in ("force_y", "force_z")}
+    found = found_in(replace(log, columns=log.columns | turned))
+    assert not any(own.verdict is Verdict.IDENTIFIED for own in found.parameters.values())
+    assert found.slide is None or "from within the surface" in found.parameters["mu"].reason
+
+
 def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
     found = found_in(wipe(any_wipe(215, free=1.5)))  # one length gives 42 % too much, known to 10 %
     assert found.parameters["mu"].verdict is Verdict.IDENTIFIED
