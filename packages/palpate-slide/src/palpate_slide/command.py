@@ -89,17 +89,16 @@ class SlideOptions(SlideLimits):
 
         numbers: dict[str, float] = {}
         names = dict(_SURFACE)
-        for part in self.surface.split(","):
-            key, _, text = (word.strip() for word in part.partition("="))
-            try:
+        try:
+            for part in self.surface.split(","):
+                key, _, text = (word.strip() for word in part.partition("="))
                 numbers[names.pop(key)] = float(text)
-            except (KeyError, ValueError):
-                raise InputError(
-                    f"--surface needs K=..,B=..,mu=.. as numbers, each once, as K=20000,mu=0.3; got {self.surface!r}"
-                ) from None
+        except (KeyError, ValueError):
+            numbers.clear()
         if not {"stiffness", "friction"} <= numbers.keys():
             raise InputError(
-                f"--surface needs K and mu, as K=20000,mu=0.3 (mu=0: no friction); got {self.surface!r}"
+                "--surface needs the numbers K and mu, and may have B, each once, as K=20000,B=50,mu=0.3 (mu=0: no"
+                f" friction); got {self.surface!r}"
             )
         (name, _, size), heights = self.shape.partition(":"), None
         if name == "mesh":

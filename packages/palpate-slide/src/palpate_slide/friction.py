@@ -236,16 +236,16 @@ def _coefficient(
     fit, found, length, beside = fitted
     share, slips = course.share(length)
     t = student(BLOCKS - 1)
-    spread = float(np.abs(beside[:, 1] - found.mu[0]).max())
+    spread = np.abs(beside[:, 1] - found.mu[0]).max()
     if len(found.load) > 3 and not freed.load.separable:  # with a weight that turns, or without: both count
         still = Fit(course, fit.classes, fit.prior[:4]).solve(share, slips)
-        spread = float(np.hypot(spread, still.mu[0] - found.mu[0]))
+        spread = np.hypot(spread, still.mu[0] - found.mu[0])
     # What the model leaves beyond the noise is as slow as the path, and may be of friction as a whole.
     size = np.linalg.norm(course.force[rows], axis=1)
-    left = float(np.median(np.abs(found.angle[rows] * course.noise[rows] / size))) * 1.4826
-    own = float(np.median(course.noise[rows] / size))
-    spread = float(np.hypot(spread, np.sqrt(max(left**2 - own**2, 0.0))))
-    lacks = float(np.mean(1.0 - share[rows, 0]))  # of gross slip, by one length: in doubt as a whole
+    left = np.median(np.abs(found.angle[rows] * course.noise[rows] / size)) * 1.4826
+    own = np.median(course.noise[rows] / size)
+    spread = np.hypot(spread, np.sqrt(max(left**2 - own**2, 0.0)))
+    lacks = np.mean(1.0 - share[rows, 0])  # of gross slip, by one length: in doubt as a whole
 
     def half(values: Array, stds: Array, spread: float) -> Array:
         return np.sqrt((t * stds) ** 2 + (lacks * values) ** 2 + spread**2)
@@ -298,11 +298,9 @@ def _contradiction(
     """Why force and motion do not belong together; empty if they do."""
     _, _, F = fit.psi(found.lag, found.load)
     psi = np.arctan(found.mu[0]) + found.angle * course.noise / np.linalg.norm(F, axis=1)
-    axes = "are force and position in the same axes (--wrench-frame)?"
-    if found.mu[0] < -0.02:
-        return f"friction would push the tip on: say the other --force-sign; {axes}"
+    axes = "are force and position in the same axes (--wrench-frame), and is --force-sign right?"
     contrary = float(np.mean(psi[rows] < -np.radians(3.0)))
-    if contrary > CONTRARY:
+    if found.mu[0] < -0.02 or contrary > CONTRARY:
         return f"friction would push the tip on in {100 * contrary:.0f} % of the path: {axes}"
     s, touch = course.smooth, int(np.argmax(course.smooth.inside))
     before = course.turns[0][freed.free & (course.turns[0] < s.time[touch])]
@@ -440,17 +438,14 @@ def _ratio(dips: Dips, blocks: int) -> tuple[float, float] | None:
     if faint >= 1.0:
         return None
     theta = np.linalg.lstsq(own, dip, rcond=None)[0]
-    split = np.array_split(np.arange(len(dip)), blocks)
-    left = []
-    for gone in split:
-        kept = np.ones(len(dip), bool)
-        kept[gone] = False
-        left.append(np.linalg.lstsq(own[kept], dip[kept], rcond=None)[0][-2])
-    slope = float(theta[-2])
-    std = float(np.sqrt((blocks - 1) / blocks * np.sum((np.array(left) - np.mean(left)) ** 2)))
-    slope /= 1.0 - faint
+    left = [
+        np.linalg.lstsq(np.delete(own, gone, 0), np.delete(dip, gone), rcond=None)[0][-2]
+        for gone in np.array_split(np.arange(len(dip)), blocks)
+    ]
+    slope = float(theta[-2]) / (1.0 - faint)
     if not slope > 0.0:
         return None
+    std = np.sqrt(blocks - 1) * np.std(left)
     wide = float(np.hypot(student(blocks - 1) * std / slope, 0.5 * faint))
     return 1.0 / slope, wide / slope
 
@@ -497,16 +492,15 @@ def _answer(
         f"Path {1e3 * course.path:.3g} mm.",
     ]
     if len(parts):
-        low, high = parts[:, 3].min(), parts[:, 3].max()
-        facts.append(f"Stiffness along the path at {len(parts)} places: {low:.4g} to {high:.4g} N/m.")
+        ends = f"{parts[:, 3].min():.4g} to {parts[:, 3].max():.4g}"
+        facts.append(f"Stiffness along the path at {len(parts)} places: {ends} N/m.")
     every = max(len(normal) // PLACES, 1)
     known = own.value is not None
-    ends = [mu.value - mu.half, mu.value + mu.half]
     table = [dict(zip(("speed_m_s", "mu", "half"), row, strict=True)) for row in mu.table.tolist()]
     keys = ("x", "y", "z", "stiffness", "half")
     shown = (values[::every].tolist() for values in (course.place, normal, np.degrees(cone)))
     values: dict[str, Any] = {
-        "friction": {"value": mu.value, "ci95": ends} if known else None,
+        "friction": {"value": mu.value, "ci95": [mu.value - mu.half, mu.value + mu.half]} if known else None,
         "by_speed": table if known else [],
         "normal": {"mean": mean.tolist(), "cone95_deg": wide, "turns_deg": turns},
         "path_m": course.path,
