@@ -187,7 +187,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     if lost:
         at += f", beside {lost}"
     mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
-    detail = _limited(at, limited_by(found))
+    detail = _limit(at, limited_by(found))
     if behind_the_arm(found):
         what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
         detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
@@ -200,7 +200,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     elif by_the_model(found):
         own, what = found.parameters["K"], f"stiffness by the model {found.model}"
         mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
-        detail = _limited(at, cause_of(next(iter(own.budget), None)))
+        detail = _limit(at, cause_of(next(iter(own.budget), None)))
     elif own.value is not None and own.ci95 is not None and own.ci95[1] < 0:
         detail = (
             f"{at}: the force falls as the probe goes in. The surface yields, or the probe's support moves."
@@ -210,7 +210,7 @@ def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     yield from _head(own, what, name, detail, mark)
 
 
-def _limited(at: str, cause: Cause) -> str:
+def _limit(at: str, cause: Cause) -> str:
     return f"{at}. Limited by {cause.described}: {cause.remedy}."
 
 
