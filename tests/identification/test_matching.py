@@ -8,13 +8,14 @@ import pytest
 from identification.problems import problem
 from identification.sensor_logs import SAMPLING, TRUTH, log, press_and_chirp, rig, sensor_log
 from palpate.errors import InputError
-from palpate.identification.estimators.fit import fit
+from palpate.identification.estimators.fit import Descent, fit
 from palpate.identification.filters.sensor_path import SensorPath
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD, Lag
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import channels_of
 from palpate.signals.low_pass import LowPass
+from palpate.signals.types import NORMAL
 
 DT = 1e-3
 SENSOR = LowPass.parse("butterworth3:120")
@@ -122,12 +123,12 @@ def test_least_squares_are_as_sure_as_the_bound():
     """A chirp, the lag calibrated: deviations are the Cramer-Rao bound's."""
     made = sensor_log("chirp", 5)
     question, _ = asked(made.record, made.lag)
-    fitted = fit(KELVIN_VOIGT_MASS, question.motion, question.force, Lag(made.lag))
+    fitted = fit(Descent(KELVIN_VOIGT_MASS, question.motion, question.force, made.lag), {}, Lag(made.lag))
     jacobian = slopes(question, made.lag)[:, 1:]
     bound = 0.6 * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
     # The level of the noise is known to 2 % from 1200 samples, its colour adds some.
     for name, own in zip(("K", "B", "M"), bound, strict=False):
-        assert fitted.std(name) == pytest.approx(own, rel=0.15)
+        assert fitted.half_of(name) == pytest.approx(NORMAL * own, rel=0.15)
         assert abs(fitted[name] - TRUTH[name]) < 4 * own
 
 
@@ -198,8 +199,8 @@ def test_a_low_pass_that_the_rows_cannot_follow_filters_the_position_all_the_sam
     thin = log(run["t"][::every], run["x"][::every], run["force_sampled"][::every])
     question = problem(thin, LAG, force_filter=low_pass)
     assert not isinstance(question.motion.chain, SensorPath)
-    fitted = fit(KELVIN_VOIGT_MASS, question.motion, question.force, question.lag)
-    assert fitted["K"] == pytest.approx(TRUTH["K"], rel=0.02)
+    fitted = Descent(KELVIN_VOIGT_MASS, question.motion, question.force, question.lag.value).at({})
+    assert fitted.theta[0] == pytest.approx(TRUTH["K"], rel=0.02)
 
 
 def test_a_tap_too_short_for_the_low_pass_is_refused():

@@ -152,14 +152,10 @@ def _autocorrelation(line: Array, count: int) -> Array:
 
 def _smooth(columns: Array, place: NDArray[np.intp], autocovariance: Array) -> Array:
     """Gamma times each column."""
+    from scipy.signal import oaconvolve
+
+    line = np.zeros((int(place[-1] - place[0]) + 1, columns.shape[1]))
+    line[place - place[0]] = columns
     kernel = np.concatenate([autocovariance[:0:-1], autocovariance])
     reach = len(autocovariance) - 1
-    first = int(place[0])
-    n = int(place[-1]) - first + 1
-    size = 1 << (n + len(kernel)).bit_length()
-    spectrum = np.fft.rfft(kernel, size)
-    out = np.empty_like(columns)
-    for i in range(columns.shape[1]):
-        full = np.fft.irfft(np.fft.rfft(_spread(columns[:, i], place), size) * spectrum, size)
-        out[:, i] = full[reach : reach + n][place - first]
-    return out
+    return np.asarray(oaconvolve(line, kernel[:, None], axes=0)[reach + place - place[0]])

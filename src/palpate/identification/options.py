@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.identification.models import NAMES
 from palpate.signals.low_pass import LowPass
@@ -50,28 +49,6 @@ def lag_prior(
     return Lag(filtered + USUAL_LAG, float(np.hypot(USUAL_LAG_STD, period / 2)), False, mass)
 
 
-@dataclass(frozen=True)
-class Prior:
-    """Knowledge from before as observations beside the log's: value and weight (the noise over its deviation)."""
-
-    known: dict[str, tuple[float, float]]
-
-    def rows(self, names: tuple[str, ...]) -> tuple[Array, Array]:
-        """The regression's rows and targets for parameters of these names, shapes (r, p) and (r,)."""
-        own = [name for name in names if name in self.known]
-        matrix = np.zeros((len(own), len(names)))
-        for i, name in enumerate(own):
-            matrix[i, names.index(name)] = self.known[name][1]
-        return matrix, np.array([value * weight for value, weight in (self.known[name] for name in own)])
-
-    def std(self, names: tuple[str, ...], noise: float) -> Array | None:
-        """Standard deviation of each parameter, infinite where nothing is known; None if nothing is at all."""
-        if not any(name in self.known for name in names):
-            return None
-        return np.array([noise / self.known[name][1] if name in self.known else np.inf for name in names])
-
-
-NOTHING = Prior({})
 _EXACT = 1e-3
 """Relative deviation of what is known exactly: less would only cost digits of the rest."""
 
@@ -80,16 +57,6 @@ def mass_std(mass: tuple[float, float]) -> float:
     """Standard deviation of the prior of the mass [kg]."""
     value, std = mass
     return max(std, _EXACT * abs(value), _EXACT**3)
-
-
-def prior_of(lag: Lag, noise: float, free_lag: bool) -> Prior:
-    """The prior of the mass, and of the lag where the log estimates it, against noise of this deviation [N]."""
-    known = {}
-    if lag.mass is not None:
-        known["M"] = (lag.mass[0], noise / mass_std(lag.mass))
-    if free_lag and lag.std > 0:
-        known[LAG] = (lag.value, noise / lag.std)
-    return Prior(known)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.identification.causes import Code, Warn
 from palpate.identification.contacts import contacts_of
-from palpate.identification.estimators.fit import Fit, fit
+from palpate.identification.estimators.fit import Descent, Fit, fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
 from palpate.identification.filters.state_variable import Chain, block_means
@@ -64,17 +64,18 @@ def identify(record: Record, **given: Any) -> Identification:
     terms = replace(terms, band=problem.band)
     choice = choose(problem, options)
     problem, fitted = choice.problem, choice.answer.fit
-    holds = fit(fitted.model, problem.motion, problem.force, problem.lag, fitted.lag)
-    follows = max(choice.answer.fit.r2, holds.r2) > _FOLLOWS
+    follows = max(fitted.r2, fitted.in_time(problem.motion, problem.force).r2) > _FOLLOWS
     if not (contacts.clear or options.bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return _nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
     evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer)
+    searched = {own.name: fitted[own.name] for own in fitted.model.nonlinear}
+    holds = fit(Descent(fitted.model, problem.motion, problem.force, fitted.lag), searched, problem.lag)
     series = SeriesSpring.of(options)
     if series is not None:
-        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
         holds = series.parameters(holds, problem.band)
+        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
     if contacts.payload is not None:
         weighed = np.where(np.array(choice.answer.names) == "M", contacts.payload.std, 0.0)
         choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
@@ -122,7 +123,7 @@ def _outcome(
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
         traces=_traces(channels, chain, choice, terms),
-        estimate=Estimate(holds.names, holds.theta, holds.cov, holds.noise.effective),
+        estimate=Estimate(holds.names, holds.theta, holds.cov, holds.effective),
         working_point=point,
         dynamic_stiffness=spectrum,
         press=press,

@@ -98,7 +98,7 @@ def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
     whole = Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, "", parts)
     low, high = interval = (value - half, value + half)
     if name in holds.names:
-        reach = float(np.hypot(holds.t * holds.std(name), parts["calibration"].half))
+        reach = float(np.hypot(holds.half_of(name), parts["calibration"].half))
         whole = replace(whole, ci95_if_model_holds=(holds[name] - reach, holds[name] + reach))
     if name in found.fit.model.positive and high < 0:
         reason = f"the fit gives {_digits(value)} {_show(unit)}, {_BELOW}"

@@ -58,26 +58,24 @@ def digits_of(value: float, certified: float) -> float:
 
 
 def palpate_solver(problem: CertifiedProblem, start: dict[str, float]) -> SolverResult:
-    """The search of `palpate identify`, without its filters and its priors, until the sum of squares stands."""
+    """The search of `palpate identify`, without its filters, until the sum of squares stands."""
     path, force = motion_and_force(problem)
     law = problem.law
 
     def columns(_motion: Any, nonlinear: dict[str, float], _lag: float) -> list[Array]:
-        return law.columns(path, {name.strip(): value for name, value in nonlinear.items()}, FLOATS)
+        return law.columns(path, nonlinear, FLOATS)
 
-    # A blank before each name: the search has a meaning of its own for `lag`.
     outer = tuple(
-        NonlinearParameter(f" {name}", (value,), *_range(problem, name), _STEP * _size(problem, name))
+        NonlinearParameter(name, (value,), *_range(problem, name), _STEP * _size(problem, name))
         for name, value in start.items()
     )
-    search = Descent(Model(problem.model, law.linear, columns, outer), None, force)  # type: ignore[arg-type]
-    point = search.at({f" {name}": value for name, value in start.items()}, 0.0)
-    for _ in range(_ROUNDS):
-        before, point = point, search.from_point(point, None)
+    search = Descent(Model(problem.model, law.linear, columns, outer), None, force, 0.0)  # type: ignore[arg-type]
+    point = search.at(start)
+    for _ in range(_ROUNDS if outer else 0):
+        before, point = point, search.from_point(point)
         if before.nonlinear == point.nonlinear:
             break
-    found = {name.strip(): value for name, value in point.nonlinear.items()}
-    values = dict(zip(law.linear, point.theta.tolist(), strict=True)) | found
+    values = dict(zip(law.linear, point.theta.tolist(), strict=True)) | point.nonlinear
     return SolverResult(values, _deviations(problem, path, force, values))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from palpate.identification.estimators.budget import (
     Spread,
     effect_columns,
 )
-from palpate.identification.estimators.fit import linearise, nonlinear_fit, slope_of_lag
+from palpate.identification.estimators.fit import Descent, slope_of_lag
 from palpate.identification.estimators.octaves import (
     LARGEST,
     Octaves,
@@ -298,14 +298,14 @@ def _linearise(
             return {}, own, problem.force
         slope = slope_of_lag(model, motion, theta, lag)
         return {}, {**own, LAG: slope}, problem.force + slope * lag
-    nonlinear = {p.name: theta[p.name] for p in model.nonlinear if p.name in theta}
-    if len(nonlinear) < len(model.nonlinear):
-        exact = replace(problem.lag, value=lag, std=0.0)
-        nonlinear = nonlinear_fit(model, motion, problem.force, exact)
-    at, jacobian, residuals = linearise(model, motion, problem.force, nonlinear, lag)
+    given = {p.name: theta[p.name] for p in model.nonlinear if p.name in theta}
+    descent = Descent(model, motion, problem.force, lag)
+    known = len(given) == len(model.nonlinear)
+    point = descent.at(given) if known else descent.from_point(descent.best_start())
+    at, jacobian = descent.about(point)
     free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
     own = {name: jacobian[:, i] for name, i in free.items()}
-    return at, own, residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
+    return at, own, point.residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
 
 
 def _moved_by_lag(
