@@ -194,10 +194,9 @@ def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, redu
 
 def _beyond_hertz(strain: float) -> float:
     """Force on a rigid sphere over Hertz's, which takes it for a paraboloid, by depth over radius (Sneddon)."""
-    low, high = 1e-9, 1 - 1e-12
-    for _ in range(80):
-        u = (low + high) / 2
-        low, high = (u, high) if u * atanh(u) < strain else (low, u)
+    from scipy.optimize import brentq
+
+    u = brentq(lambda u: u * atanh(u) - strain, 1e-9, 1 - 1e-12)
     return ((1 + u**2) * atanh(u) - u) / (4 / 3 * strain**1.5)
 
 
