@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
+from palpate.identification.filters.state_variable import Chain
 from palpate.signals.low_pass import LowPass
 
 DT = 1e-3
@@ -126,40 +127,18 @@ def test_samples_further_than_the_reach_do_not_count():
         assert own[1] == pytest.approx(own[0], rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("white", [1e-6, 5e-5])
-def test_the_spread_is_that_of_white_noise_read(white):
-    """Independent readings: instants too far apart to share a sample of the position."""
-    rng = np.random.default_rng(5)
-    gap = sum(path().reach) + 10
-    count = 400
-    far = path(instants=gap * np.arange(2, count + 2) + 0.3)
-    noise = rng.normal(0, white, gap * (count + 4))
-    got = np.stack([far.read(noise, d, SENSOR.lag, np.arange(count)) for d in range(3)])
-    stated = far.noise_spread(PositionNoise(white, 0.0))
-    assert stated.shape == (4, 4)
-    size = np.sqrt(np.diag(stated))[:3]
-    # Of 400 numbers, a deviation is uncertain by 3.5 %, a correlation by 5 %.
-    np.testing.assert_allclose(got.std(axis=1), size, rtol=0.15)
-    np.testing.assert_allclose(np.corrcoef(got), stated[:3, :3] / np.outer(size, size), atol=0.2)
+@pytest.mark.parametrize(("white", "jump"), [(5e-5, 0.0), (0.0, 2e-6)])
+def test_the_noise_of_an_acceleration_is_that_of_noise_filtered(white, jump):
+    """Of jumps, half of the power counts."""
+    chain, rng = Chain(60.0, 1e-3), np.random.default_rng(5)
+    noise = rng.normal(0, white, 100_000) + np.cumsum(rng.normal(0, jump, 100_000))
+    stated = chain.acceleration_noise(PositionNoise(white, jump))
+    # The filter leaves some thousand independent numbers, which know a variance to 5 %.
+    assert chain(noise, 2)[100:-100].var() == pytest.approx(stated if white else 2 * stated, rel=0.2)
 
 
-def test_of_jumps_half_the_power_counts_and_none_in_the_position():
-    one = path()
-    stated = one.noise_spread(PositionNoise(0.0, 2e-6))
-    # A walk has no power of its own in the position, but E[e e''] = -E[e'^2] whatever its level.
-    np.testing.assert_allclose(stated[0], [0, 0, -stated[1, 1], 0])
-    rng = np.random.default_rng(6)
-    gap = sum(one.reach) + 10
-    count = 400
-    far = path(instants=gap * np.arange(2, count + 2) + 0.3)
-    walk = np.cumsum(rng.normal(0, 2e-6, gap * (count + 4)))
-    for d in (1, 2):
-        got = far.read(walk, d, SENSOR.lag, np.arange(count))
-        assert got.std() == pytest.approx(np.sqrt(2 * stated[d, d]), rel=0.15)
-
-
-def test_no_noise_no_spread():
-    np.testing.assert_array_equal(path().noise_spread(NOISELESS), 0.0)
+def test_no_noise_no_variance():
+    assert Chain(60.0, 1e-3).acceleration_noise(NOISELESS) == 0.0
 
 
 def test_the_rate_is_the_low_passs_or_what_the_position_shows():

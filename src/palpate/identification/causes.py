@@ -34,9 +34,7 @@ _CAUSES = {
     "friction": Cause("friction, or play before the position's sensor", "press and measure without play"),
     "touch": Cause("the difference between touch and contact", "approach more slowly, and more often"),
     "octaves": Cause("the difference between frequencies", "excite a wider band (palpate excite)", "A"),
-    "blocks": Cause(
-        "differences between parts of the log", "press longer, or more often, about one depth", "A"
-    ),
+    "blocks": Cause("differences between parts of the log", "press longer, or more often, at one depth", "A"),
     "repetition": Cause("differences between parts of the log", "press more often", "A"),
     "dynamic stiffness": Cause(
         "the difference between the model and the dynamic stiffness",
@@ -54,7 +52,7 @@ _CAUSES = {
         "move more slowly, log faster, or give --bonded",
     ),
     "tool's inertia": Cause(
-        "the tool's own inertia", "move faster in free motion, or compensate the inertia beforehand"
+        "the tool's own inertia", "move faster in free motion, or compensate it beforehand"
     ),
     "position noise": Cause("noise of the position", "measure the position finer, or move further"),
     "calibration": Cause("the scales of force and position", "calibrate force and position"),
@@ -108,24 +106,16 @@ class Code(Enum):
         " so K is mostly about the arm. Measure the position nearer to the surface."
     )
     LOW_EXCITATION = "The motion is too slow, too small or too short to show the parameter above the noise."
-    NONLINEAR_STIFFNESS = (
-        "The stiffness changes with the position; K is the slope at the middle of the motion."
-    )
-    HELD_SAMPLES = (
-        "A channel is refreshed more slowly than the rows are written; only its fresh readings are used."
-    )
+    NONLINEAR_STIFFNESS = "The stiffness changes with the position; K is that of the middle of the motion."
+    HELD_SAMPLES = "A channel is refreshed more slowly than the rows; only its fresh readings are used."
     MISSING_SAMPLES = (
-        "Rows without a reading, or with a spike of one row; short stretches are bridged, long ones left out."
+        "Rows without a reading, or with a spike; short stretches are bridged, long ones left out."
     )
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
-    SATURATED = (
-        "A channel rests at its extreme value while the other moves on: it is at the end of its range."
-    )
+    SATURATED = "A channel rests at its extreme while the other moves on: it is at the end of its range."
     UNIT_GUESS = "A unit was taken from a column's name or values."
     UNIT_STATED = "A unit was taken from the file's own statement."
-    UNIT_DOUBTFUL = (
-        "A unit is probably wrong: by it the press is unusual, or the name of the column has another."
-    )
+    UNIT_DOUBTFUL = "A unit is probably wrong: the press is unusual by it, or the column's name has another."
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."
     LINES_SKIPPED = "Lines of the file that are not rows of its table were left out."

@@ -293,9 +293,9 @@ def payload_of(
 
     force, motion = own(chain(channels.force)), own(chain(channels.position, 2, lag))
     size = float(motion @ motion)
-    spread = chain.noise_spread(position_noise([channels.position[i:j] for i, j in stays]))[2, 2]
+    spread = chain.acceleration_noise(position_noise([channels.position[i:j] for i, j in stays]))
     others = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
-    if size <= _ACCELERATED * len(motion) * float(spread):
+    if size <= _ACCELERATED * len(motion) * spread:
         return None
     by_motion = _accounts(motion, force)
     if by_motion <= _EXPLAINED or any(by_motion <= _OTHERS * _accounts(column, force) for column in others):

@@ -110,6 +110,9 @@ class Linearisation:
         drift = problem.contacts.drift
         bends = drift.bends(problem.time).T if drift is not None else ()
         bending = {f"drift {i}": column for i, column in enumerate(bends)}
+        if LAG in own:
+            moved = _moved_by_lag(effects, theta, segments, dt)
+            own, target = own | {LAG: own[LAG] + moved}, target + moved * lag
         columns = [*own.values(), *effects.values(), *bending.values(), target, motion.moved(0, lag)]
         prior = dict.fromkeys(bending, (0.0, 1.0))
         if LAG in free:
@@ -303,3 +306,14 @@ def _linearise(
     free = {name: i for i, name in enumerate(at) if name != "offset" and (name != LAG or asks)}
     own = {name: jacobian[:, i] for name, i in free.items()}
     return at, own, point.residuals + jacobian[:, list(free.values())] @ [at[name] for name in free]
+
+
+def _moved_by_lag(
+    effects: dict[str, Array], theta: dict[str, float], segments: list[Segment], dt: float
+) -> Array:
+    """Derivative of the other forces by the lag [N/s], shape (m,): they are as late as the force of the contact."""
+    force = np.column_stack(list(effects.values())) @ [theta.get(name, 0.0) for name in effects]
+    found = np.zeros(len(force))
+    for s in segments:
+        found[s.first : s.last] = -np.gradient(force[s.first : s.last], dt)
+    return found

@@ -54,18 +54,14 @@ class PositionNoise:
             jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
         return np.asarray(self.white**2 + jumps)
 
-    def spread(self, weights: Array) -> Array:
-        """Covariance of filtered derivatives 0 to k - 1 of this noise, shape (k, k), by the weights, (k, n), k > 2.
+    def variance(self, weights: Array) -> float:
+        """Of a filtered rate or acceleration of this noise, by the filter's weights, shape (n,).
 
-        Jumps have no power of their own in the position itself, but a position that wanders has its acceleration
-        against it: E[e e''] = -E[e'^2]. Of their power half is counted: an encoder's error never leaves its count, so
-        its jumps undo each other, and toward the low frequencies of a motion their power falls below what it is above.
+        Of the jumps' power half is counted: an encoder's error never leaves its count, so its jumps undo each other,
+        and toward the low frequencies of a motion their power falls below what it is above.
         """
-        steps = np.cumsum(weights, axis=1)
-        steps[0] = 0.0
-        of_jumps = steps @ steps.T
-        of_jumps[0, 2] = of_jumps[2, 0] = -of_jumps[1, 1]
-        return np.asarray(self.white**2 * weights @ weights.T + _IN_BAND * self.jump**2 * of_jumps)
+        steps = np.cumsum(weights)
+        return float(self.white**2 * weights @ weights + _IN_BAND * self.jump**2 * steps @ steps)
 
 
 NOISELESS = PositionNoise(0.0, 0.0)
@@ -195,7 +191,3 @@ class SensorPath:
         step = base - lag
         series: Array = value if step == 0 else value + step * slope + step * step / 2 * curve
         return series
-
-    def noise_spread(self, noise: PositionNoise) -> Array:
-        """Covariance of what noise of the position leaves in the derivatives 0 to 3 of one reading, shape (4, 4)."""
-        return noise.spread(self._taps.weights[0, :4] / self.dt ** np.arange(4)[:, None])

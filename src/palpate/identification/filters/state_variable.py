@@ -112,9 +112,9 @@ class Chain:
             found += np.repeat(levels, [len(own) for own in stretches])
         return found
 
-    def noise_spread(self, noise: PositionNoise) -> Array:
-        """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""
-        return noise.spread(np.stack([_taps(self, derivative, 0.0)[0] for derivative in range(4)]))
+    def acceleration_noise(self, noise: PositionNoise) -> float:
+        """Variance that noise of the position leaves in the second derivative."""
+        return noise.variance(_taps(self, 2, 0.0)[0])
 
 
 @lru_cache(maxsize=64)
