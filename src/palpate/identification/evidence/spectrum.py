@@ -114,6 +114,22 @@ def dynamic_stiffness(
     return tuple(found)
 
 
+def storage_near(problem: Problem, segments: list[Segment], frequency: float) -> float | None:
+    """Storage of the octave within half an octave of a frequency [Hz]; None if none of the segments shows it [N/m]."""
+    motion, lag = problem.motion, problem.lag.value
+    dt = float(np.median(np.diff(problem.time)))
+    channels = motion.moved(0, lag), motion.moved(1, lag), problem.force
+    length = longest_of(segments)
+    while length >= SHORTEST:
+        if _LOWEST < np.sqrt(2) * frequency * length * dt < 2 * _HIGHEST:
+            line = _fit(_blocks(problem, channels, segments, length, 0))
+            own = line.omega / (2 * np.pi)
+            if _LOWEST <= own * length * dt <= _HIGHEST and abs(np.log2(own / frequency)) < 0.5:
+                return float(line.parts[0])
+        length //= 2
+    return None
+
+
 def _round(problem: Problem, position: Array, lag: float) -> list[Array]:
     """Error of an encoder in this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
 
