@@ -183,8 +183,8 @@ def _sums(
         real = block @ seen  # (blocks, p, 2 lines)
         mine = group[first : first + some]
         begins = np.flatnonzero(np.diff(mine, prepend=-1))  # blocks of a group follow one another
-        for g, own in zip(mine[begins].tolist(), np.split(real, begins[1:]), strict=True):
-            flat = own.transpose(0, 2, 1).reshape(-1, width)
+        for g, those in zip(mine[begins].tolist(), np.split(real, begins[1:]), strict=True):
+            flat = those.transpose(0, 2, 1).reshape(-1, width)
             products, count = found.get(g, (np.zeros((width, width)), 0))
             found[g] = products + flat.T @ flat, count + len(flat)
     return list(found.items())

@@ -208,12 +208,13 @@ def _fit(blocks: _Blocks) -> _Line:
     spread = float((power @ u**2).sum()) / total
     slope = spread > _FLAT
     columns = np.stack([x, v / omega, u * x, u * v / omega] if slope else [x, v / omega], axis=-1)
-    bread = np.linalg.pinv(np.einsum("blp,blq->pq", columns.conj(), columns).real)
-    theta = bread @ np.einsum("blp,bl->p", columns.conj(), f).real
+    flat = columns.reshape(-1, columns.shape[-1])
+    bread = np.linalg.pinv((flat.conj().T @ flat).real)
+    theta = bread @ (flat.conj().T @ f.ravel()).real
     left = f - columns @ theta
     own = power.sum(axis=1)
     independent = max(OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
-    tied = bread @ np.einsum("blp,lm,bmq->pq", columns.conj(), _TIED, columns).real
+    tied = bread @ (flat.conj().T @ (_TIED @ columns).reshape(flat.shape)).real
     noise = float((np.abs(left) ** 2).sum()) / max(3 * len(x) - float(np.trace(tied)) / 2, 1e-3)
     within = noise / 2 * np.diag(tied @ bread)[:2] / OVERLAP
     moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]
