@@ -229,7 +229,8 @@ class _TipLoop:
             Vec6(alike(spring), alike(spring * turning)), Vec6(alike(damper), alike(damper * turning))
         )
         self._chain, self._axes = arm.chain, place.axes
-        self._frame = TaskFrame(*(Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3])), _SPARE)
+        axes, held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
+        self._frame = TaskFrame(axes, held, _SPARE)
         n = arm.joints
         self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
