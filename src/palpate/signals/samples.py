@@ -54,9 +54,9 @@ def _refill(fresh: Mask, every: int) -> Mask:
     """Count a long stretch without change as fresh once per period: the channel may simply rest."""
     fresh = fresh.copy()
     marks = np.flatnonzero(fresh)
-    for begin, end in zip(marks, np.r_[marks[1:], len(fresh)], strict=True):
-        if end - begin >= 2 * every:
-            fresh[begin:end:every] = True
+    ends = np.r_[marks[1:], len(fresh)]
+    for begin, end in zip(marks[long := ends - marks >= 2 * every], ends[long], strict=True):
+        fresh[begin:end:every] = True
     return fresh
 
 
