@@ -44,6 +44,9 @@ _CAUSES = {
         "keep the motion near one frequency and depth",
     ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
+    "missing force": Cause(
+        "a mass below zero", "compensate the tool's inertia, or measure nearer to the surface"
+    ),
     "curvature": Cause("the change of the slope over the press", "press about the force that you need"),
     "within the octave": Cause(
         "the change of the stiffness with the frequency", "move at one frequency, the one that you need"
