@@ -12,7 +12,6 @@ from palpate.cli import main
 from palpate.errors import LONGEST, InputError, PalpateError, unknown
 from palpate.files import open_file, read_table, read_text, read_toml
 from palpate.force import Gains, load_arm
-from palpate.force.arm import load_arm
 from palpate.force.gains import gains_for
 
 DEEP = "x = " + "[" * 2000 + "]" * 2000
@@ -120,7 +119,7 @@ def test_the_output_of_identify_may_be_no_pipe(tmp_path, capsys):
         (
             "force =",
             "forc = 1\nforce =",
-            "unknown field `forc`; there are: alpha, approach, arm, cap, force, force_limit",
+            "unknown field `forc`; there are: alpha, approach, arm, cap, force",
         ),
         (
             "[arm.sensor]",
