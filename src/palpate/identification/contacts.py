@@ -83,18 +83,26 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
     chain = Chain(cutoff or highest, channels.dt)
+    strokes, drift, press = strokes_of(channels), None, None
     air = None if options.bonded else _air(channels, chain, options.assumed_lag)
-    strokes, drift = strokes_of(channels), None
     if air is not None and strokes and not _crossed(channels, air, strokes):
         air = None
     if air is not None and air.drifts:
-        drift = Drift(air.stays * channels.dt, air.levels)
-        channels = _without_drift(channels, air)
-    contacts = replace(_find_contacts(channels, chain, air, options, strokes), drift=drift)
+        drift, channels = Drift(air.stays * channels.dt, air.levels), _without_drift(channels, air)
+    contacts = _find_contacts(channels, chain, air, options, strokes)
     if strokes:
-        contacts = _with_press(channels, contacts, strokes, options)
-    if strokes and contacts.press is None:
-        strokes, contacts = (), replace(_find_contacts(channels, chain, air, options, ()), drift=drift)
+        seen = contacts  # a press whose contact no threshold shows is in contact from end to end
+        if not contacts.spans:
+            seen = _never_left(channels, channels.force, channels.position, options, strokes)
+        lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
+        signs = seen.position_sign, seen.force_sign
+        press = steady_press(channels, strokes, signs, seen.resting, lag, drift)
+        if press is None or press.headline.stiffness.value <= 0:
+            strokes, press = (), None
+            contacts = _find_contacts(channels, chain, air, options, strokes)
+        else:
+            contacts = seen
+    contacts = replace(contacts, drift=drift, press=press)
     if not contacts.spans:
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
@@ -106,7 +114,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=contacts.press)
+    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -125,18 +133,6 @@ def _crossed(channels: Channels, air: FreeMotion, strokes: tuple[Stroke, ...]) -
         if np.count_nonzero(inside) >= _SEVERAL and rise(x[inside], f[inside]) < FLAT * rise(x, f):
             return True
     return False
-
-
-def _with_press(
-    channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
-) -> Contacts:
-    """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
-    whole = channels, channels.force, channels.position, options, strokes
-    seen = contacts if contacts.spans else _never_left(*whole)
-    lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
-    signs = seen.position_sign, seen.force_sign
-    press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
-    return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
 
 
 def _find_contacts(
@@ -184,12 +180,11 @@ def _find_contacts(
         return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
     found = _orient(force, position, spans, (sign, air.way if air else 0.0, level, threshold), options)
     free = sign * force[_outside(len(force), spans, int(chain.settling / chain.dt))]
-    if len(free) < _FEWEST:
-        found = replace(found, clear=False)
-    else:
+    clear = len(free) >= _FEWEST
+    if clear:
         middle = float(np.median(free))
-        noise = GAUSSIAN * float(np.median(np.abs(free - middle)))
-        found = replace(found, clear=threshold - middle > _CLEAR * noise)
+        clear = threshold - middle > _CLEAR * GAUSSIAN * float(np.median(np.abs(free - middle)))
+    found = replace(found, clear=clear)
     if payload is None:
         return found
     own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)

@@ -148,7 +148,11 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
     ahead = np.column_stack([np.ones(len(own)), count[own], np.ones(len(own))])
     sides, limits = np.vstack([ahead, ahead * [-1, -1, 1]]), np.r_[left[own], 1 - left[own]]
     every = []
-    for goal, least in (((0, 0, -1), None), ((1, 0, 0), 0.0), ((-1, 0, 0), 0.0)):  # room; least and largest phase
+    for goal, least in (
+        ((0, 0, -1), None),
+        ((1, 0, 0), 0.0),
+        ((-1, 0, 0), 0.0),
+    ):  # room; least and largest phase
         found = linprog(goal, sides, limits, bounds=[(None, None), (None, None), (least, None)])
         if not found.success or (least is None and found.x[2] <= _ROOM):
             return None

@@ -374,7 +374,11 @@ def curves_of(
             continue
         time, force = channels.time[there], signs[1] * channels.force[there]
         begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
-        gone = np.zeros(len(time)) if drift is None else np.interp(time, drift.times, drift.levels)
+        gone = (
+            np.zeros(len(time))
+            if drift is None
+            else np.interp(time - channels.start, drift.times, drift.levels)
+        )
         readings = min(channels.rate * channels.dt, 1.0)
         curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
     return curves

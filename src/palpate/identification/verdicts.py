@@ -80,13 +80,10 @@ def verdicts(
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
     parameters = {name: _parameter(name, found, holds, terms) for name in names}
     parameters = _passive(parameters, contacts.payload is not None)
-    for refused, reason in (
-        (not contacts.signed, _UNSIGNED),
-        (model.of_power and contacts.bonded, _UNTOUCHED),
-    ):
-        for name, p in parameters.items() if refused else ():
-            if p.verdict is Verdict.IDENTIFIED:
-                parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+    refused = _UNSIGNED if not contacts.signed else _UNTOUCHED if model.of_power and contacts.bonded else ""
+    for name, p in parameters.items() if refused else ():
+        if p.verdict is Verdict.IDENTIFIED:
+            parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=refused)
     if tangent is not None:
         parameters = _of_press(parameters, tangent)
     return parameters, _warnings(parameters, found, choice.problem.lag, terms)
@@ -191,24 +188,24 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     All that is seen in time shares a force that depends on the motion. A stiffness below zero leaves no model at all. A
     tool's inertia that was found in free motion and removed (`weighed`) is not that force, and K rests on the same fit.
     """
-    negative = [name for name, p in parameters.items() if _BELOW in p.reason]
+    negative = [name for name in ("K", "B", "M") if name in parameters and _BELOW in parameters[name].reason]
     if "K" in negative:
         reason, touched = "K is certainly below zero: the model does not hold", (*parameters,)
-    elif len({"B", "M"} & {*negative}) == 1:
-        name = next(name for name in ("B", "M") if name in negative)
-        reason = f"{name} is certainly below zero: the model lacks a force that depends on the motion"
+    elif len(negative) == 1:
+        reason = f"{negative[0]} is certainly below zero: the model lacks a force that depends on the motion"
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:
         return parameters
-    return parameters | {  # a number that a model gives which does not hold stands nowhere
+    return {  # a number that a model gives which does not hold stands nowhere
         name: p.without_number(reason, Verdict.REJECTED)
-        for name, p in parameters.items()
         if name in touched and p.verdict is Verdict.IDENTIFIED
+        else p
+        for name, p in parameters.items()
     }
 
 
 def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:
-    warnings = []
+    told: list[tuple[Code, str]] = []
     if LAG in found.names and not lag.known:
         at, reach = found[LAG], _FAR * lag.std
         if abs(at - lag.value) > reach or at + found.half_of(LAG) < lag.value - reach:
@@ -216,37 +213,33 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
                 f"the fit estimates a lag of {_digits(1e3 * at)} ms of the force, longer than sensors have:"
                 " something else delays the force; parameters that such a delay changes are rejected"
             )
-            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
-    damping = parameters.get("B")
-    if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
-        if "below zero" in damping.reason:
+            told.append((Code.FORCE_LAGS_POSITION, text))
+    damping, stiffness = parameters.get("B"), parameters.get("K")
+    if damping is not None and "below zero" in damping.reason and damping.verdict is not Verdict.IDENTIFIED:
+        text = f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
+        told.append((Code.FORCE_LAGS_POSITION, text))
+    elif damping is not None and damping.verdict is not Verdict.IDENTIFIED and not lag.known:
+        reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
+        if damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
             text = (
-                f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
-            )
-            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
-        elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
-            reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
-            text = (
-                f"a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
+                "a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
                 f" {_digits(reach, 2)} {_show(damping.unit)}; give --lag"
             )
-            warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
-    stiffness = parameters.get("K")
+            told.append((Code.LAG_DAMPING_CONFOUNDED, text))
     if stiffness is not None and _BELOW in stiffness.reason:
         text = f"K: {stiffness.reason}; a channel's sign or column may be wrong (--force-sign)"
-        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
-    low_names = [
+        told.append((Code.NEGATIVE_STIFFNESS, text))
+    low = [
         n for n, p in parameters.items()
         if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") != "lag"
     ]  # fmt: skip
-    if low_names:
-        remedy = NOISE.remedy
-        if low_names[-1] in ("B", "M") and np.isfinite(terms.band):
-            more, fastest = "mass needs" if low_names[-1] == "M" else "damping needs", _digits(terms.band, 2)
+    if low:
+        remedy, more = NOISE.remedy, {"B": "damping needs", "M": "mass needs"}.get(low[-1])
+        if more and np.isfinite(terms.band):
+            fastest = _digits(terms.band, 2)
             remedy = f"the position moved only below {fastest} Hz, {more} faster motion; try palpate excite"
-        text = f"the log does not show {', '.join(low_names)}: {remedy}"
-        warnings.append(Warn(Code.LOW_EXCITATION, text))
-    return tuple(warnings)
+        told.append((Code.LOW_EXCITATION, f"the log does not show {', '.join(low)}: {remedy}"))
+    return tuple(Warn(*own) for own in told)
 
 
 def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
