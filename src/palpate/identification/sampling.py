@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,17 +94,14 @@ def channels_of(record: Record) -> Channels:
     _check(time, position, force)
     rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
     force = _without_spikes(force, rounding[1], warnings)
-    step = np.diff(time)
-    twice = int((step == 0).sum())
-    if twice:
-        first = f"first in row {int(np.flatnonzero(step == 0)[0]) + 2}"
-        text = f"{twice} rows repeat the time of the row before ({first}); the first of each is kept"
+    twice = np.flatnonzero(np.diff(time) == 0)
+    if len(twice):
+        first = f"first in row {twice[0] + 2}"
+        text = f"{len(twice)} rows repeat the time of the row before ({first}); the first of each is kept"
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
-        keep = np.r_[True, step > 0]
-        time, position, force = time[keep], position[keep], force[keep]
-        step = np.diff(time)
+        time, position, force = (np.delete(own, twice + 1) for own in (time, position, force))
         _check(time, position, force)
-    dt, even = _period(time, step, warnings)
+    dt, even = _period(time, warnings)
     use_x = _usable("position", position, dt, warnings)
     use_f = _usable("force", force, dt, warnings)
     _leave_saturated(use_x, use_f, position, force, warnings)
@@ -165,12 +162,14 @@ def thinned(channels: Channels, size: int) -> Channels:
     """Average `size` neighbouring samples, in the same way on both channels."""
     if size < 2:
         return channels
-    position, force = block_means(channels.position, size), block_means(channels.force, size)
+    position, force = (block_means(own, size) for own in (channels.position, channels.force))
     valid = block_means(channels.valid.astype(float), size) == 1
     start, dt = channels.start + (size - 1) / 2 * channels.dt, channels.dt * size
-    rate, (own, other) = min(channels.rate, 1 / dt), channels.rounding
-    rounding = own / size**0.5, other / size**0.5
-    return Channels(start, dt, position, force, valid, rate, channels.raw, channels.warnings, rounding)
+    own, other = (rounding / size**0.5 for rounding in channels.rounding)
+    return replace(
+        channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=min(channels.rate, 1 / dt),
+        rounding=(own, other),
+    )  # fmt: skip
 
 
 def _common(
@@ -184,13 +183,13 @@ def _common(
     (x, use_x), (f, use_f) = position, force
     if even and use_x.all() and use_f.all():
         return x, f, np.ones(len(grid), bool)
-    slow, fast = (use_f, use_x) if use_f.sum() < use_x.sum() else (use_x, use_f)
-    instants = time[slow]
-    bridged, near = _bridge(grid, instants, (f if slow is use_f else x)[slow])
-    other, near_other = _bridge(instants, time[fast], (x if slow is use_f else f)[fast])
-    own, near_own = _bridge(grid, instants[near_other], other[near_other])
-    valid = near & near_own
-    return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
+    of_force = use_f.sum() < use_x.sum()
+    (slow, use_slow), (fast, use_fast) = (force, position) if of_force else (position, force)
+    instants = time[use_slow]
+    own, near = _bridge(grid, instants, slow[use_slow])
+    other, near_other = _bridge(instants, time[use_fast], fast[use_fast])
+    other, near_fast = _bridge(grid, instants[near_other], other[near_other])
+    return *((other, own) if of_force else (own, other)), near & near_fast
 
 
 def _check(time: Array, position: Array, force: Array) -> None:
@@ -221,10 +220,10 @@ def _check(time: Array, position: Array, force: Array) -> None:
             raise InputError(f"{still}; is it the right column, and did anything move?")
 
 
-def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
+def _period(time: Array, warnings: list[Warn]) -> tuple[float, bool]:
     """The grid's period, and whether the rows lie on it."""
-    middle = float(np.median(step))
-    gaps = step > 3 * middle
+    step = np.diff(time)
+    gaps = step > 3 * np.median(step)
     dt = float(step[~gaps].mean())
     samples = (time[-1] - time[0]) / dt
     if samples > max(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.estimators.budget import Answer, Budget, Prediction, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
-from palpate.identification.options import LAG, Lag
+from palpate.identification.options import LAG, Options
+from palpate.identification.problem import Problem
 from palpate.identification.result import WorkingPoint
 from palpate.identification.selection import Choice
 from palpate.identification.uncertainty import Parameter, Verdict, half_width
@@ -39,31 +41,12 @@ _UNTOUCHED = (
 )
 
 
-@dataclass(frozen=True)
-class Terms:
-    """Inputs of a verdict besides the answer.
-
-    Args:
-        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
-        calibration: relative standard deviation of the force's and position's scales together.
-        force_unit, position_unit: of the record.
-        band: frequency below which the probe moved [Hz].
-    """
-
-    tolerance: float
-    calibration: float
-    force_unit: str
-    position_unit: str
-    band: float = np.inf
-
-    @property
-    def stiffness_unit(self) -> str:
-        """Of force over position."""
-        return impedance_units(self.force_unit, self.position_unit)["K"]
+Units = Mapping[str, str]
+"""Of a record's columns; here of its force and its position."""
 
 
 def verdicts(
-    choice: Choice, holds: Fit, point: WorkingPoint | None, terms: Terms
+    choice: Choice, holds: Fit, point: WorkingPoint | None, options: Options, units: Units
 ) -> tuple[dict[str, Parameter], tuple[Warn, ...]]:
     """Pass a verdict on each parameter.
 
@@ -75,10 +58,10 @@ def verdicts(
     found = against_working_point(choice.answer, point)
     if tangent is not None:
         found = replace(found, budget=_with_presses(found, tangent))
-    scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
+    scales = np.array([0.0 if name in (*_SHAPE, LAG) else options.calibration for name in found.names])
     found = found.with_cause("calibration", scales * found.theta)
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
-    parameters = {name: _parameter(name, found, holds, terms) for name in names}
+    parameters = {name: _parameter(name, found, holds, options.tolerance, units) for name in names}
     parameters = _passive(parameters, contacts.payload is not None)
     refused = _UNSIGNED if not contacts.signed else _UNTOUCHED if model.of_power and contacts.bonded else ""
     for name, p in parameters.items() if refused else ():
@@ -86,11 +69,11 @@ def verdicts(
             parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=refused)
     if tangent is not None:
         parameters = _of_press(parameters, tangent)
-    return parameters, _warnings(parameters, found, choice.problem.lag, terms)
+    return parameters, _warnings(parameters, found, choice.problem, options.tolerance)
 
 
-def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
-    value, unit = found[name], unit_of(name, found.fit, terms)
+def _parameter(name: str, found: Answer, holds: Fit, tolerance: float, units: Units) -> Parameter:
+    value, unit = found[name], unit_of(name, found.fit, units)
     half, parts = found.half_of(name), found.contributions(name)
     whole = Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, "", parts)
     low, high = interval = (value - half, value + half)
@@ -103,13 +86,13 @@ def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
     if half > _NOTHING * max(abs(value), 1e-300):
         return whole.without_number(f"the log does not show it: {NOISE.remedy}")
     clear = low > 0 or high < 0
-    if half <= terms.tolerance * abs(value) and clear:
+    if half <= tolerance * abs(value) and clear:
         reason, depth = f"known to {100 * half / abs(value):.2g} % (95 %)", found.fit.model.depth
         if depth is not None and name not in _SHAPE:  # it grows with the depth
-            reason += f", at a penetration of {_digits(depth)} {terms.position_unit}"
+            reason += f", at a penetration of {_digits(depth)} {units['position']}"
         return replace(whole, verdict=Verdict.IDENTIFIED, reason=reason)
     bounds = f"95 %: {_digits(low)} to {_digits(high)} {_show(unit)}".rstrip()
-    limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
+    limit = f"wider than {tolerance:.0%}" if clear else "zero is within it"
     main = cause_of(next(iter(whole.budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
     return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
@@ -204,7 +187,10 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     }
 
 
-def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:
+def _warnings(
+    parameters: dict[str, Parameter], found: Answer, problem: Problem, tolerance: float
+) -> tuple[Warn, ...]:
+    lag = problem.lag
     told: list[tuple[Code, str]] = []
     if LAG in found.names and not lag.known:
         at, reach = found[LAG], _FAR * lag.std
@@ -220,7 +206,7 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
         told.append((Code.FORCE_LAGS_POSITION, text))
     elif damping is not None and damping.verdict is not Verdict.IDENTIFIED and not lag.known:
         reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
-        if damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
+        if damping.budget.get("lag", 0.0) > tolerance * abs(found["B"]):
             text = (
                 "a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
                 f" {_digits(reach, 2)} {_show(damping.unit)}; give --lag"
@@ -235,27 +221,27 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
     ]  # fmt: skip
     if low:
         remedy, more = NOISE.remedy, {"B": "damping needs", "M": "mass needs"}.get(low[-1])
-        if more and np.isfinite(terms.band):
-            fastest = _digits(terms.band, 2)
+        if more and np.isfinite(problem.band):
+            fastest = _digits(problem.band, 2)
             remedy = f"the position moved only below {fastest} Hz, {more} faster motion; try palpate excite"
         told.append((Code.LOW_EXCITATION, f"the log does not show {', '.join(low)}: {remedy}"))
     return tuple(Warn(*own) for own in told)
 
 
-def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Prediction, units: Units) -> str:
     """The unit of one parameter of a model."""
-    units = impedance_units(terms.force_unit, terms.position_unit)
-    plain = units["K"] == "1"
+    force, position = units["force"], units["position"]
+    own = impedance_units(force, position)
     if name == "tau":
         return "s"
     if name == "Fc":
-        return terms.force_unit
-    if name == "n" or plain:
+        return force
+    if name == "n" or own["K"] == "1":
         return "1"
     if fitted.model.of_power and fitted.model.depth is None:
         n = fitted["n"] + (name == "B")
-        return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"
-    return units["K" if name == "K1" else name]
+        return f"{force}{' s' if name == 'B' else ''}/{position}^{n:.3g}"
+    return own["K" if name == "K1" else name]
 
 
 def _digits(value: float, count: int = 3) -> str:
