@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -17,7 +16,7 @@ from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
-from palpate.signals.samples import GAUSSIAN, runs
+from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
 
 FLAT = 0.4
@@ -35,8 +34,6 @@ _MOST = 1 << 16
 """Rows that are looked at; more are averaged."""
 _SEEN = 10.0
 """Power of the motion in a stay over that of the position's noise, at least: the slope would be off by a tenth."""
-_OUTLYING = 5.0
-"""Deviations from the middle of a stay that no noise reaches."""
 _OF_MEDIAN = 2 / np.pi
 """Variance of a mean over that of a median, of normal noise."""
 _MIDDLE = (0.05, 0.95)
@@ -120,23 +117,33 @@ def free_motion_of(
     force, position = block_means(force, size), block_means(position, size)
     slope = _in_contact(force, position, ends)
 
-    @cache
-    def steep() -> float:
-        """The largest slope at either end of the position's range that its interval leaves, of any share [N/m]."""
-        found = [abs(slope)]
-        for x in (position, -position):
-            white = white_noise(x)
-            stays = [own for share in _SHARES if (own := _stays_in(x < _limit(x, share)))]
-            slopes = [_slope(force, x, stay, white, np.inf) for stay in stays]
-            found.append(max((abs(own[0]) - own[1] for own in slopes if own is not None), default=0.0))
-        return max(found)
+    white = white_noise(position)
 
-    found = [0.0, 0.0]
-    for bound in (np.inf, _OUTLYING):
-        for i, way in enumerate((1.0, -1.0)) if slope and not any(found) else ():
-            own = _share(force, way * position, (way * slope, steep), bound, none)
-            found[i] = own * _quiet(force, way * position, own)
-    way = 1.0 if found[0] >= found[1] else -1.0
+    @cache
+    def slope_at(way: float, share: float) -> tuple[float, float] | None:
+        """Slope over a share of the position's range from its lower (1) or upper (-1) end, and its half-width."""
+        stays = _stays_in(way * position < _limit(way * position, share))
+        return _slope(force, position, stays, white) if stays else None
+
+    def share_of(way: float) -> float:
+        """The largest share over which the force stays: its slope is clearly below that of the contact.
+
+        That of an inertia is held against the steepest that an interval leaves at either end: it is in the force over
+        the whole range, and takes from the contact's.
+        """
+        for share in _SHARES:
+            own, half = slope_at(way, share) or (np.inf, 0.0)
+            own = own if slope > 0 else -own
+            if own + half >= FLAT * abs(slope) or (none and own > half):
+                continue
+            least = abs(own - half if none else own)
+            every = (slope_at(end, other) for end in (1.0, -1.0) for other in _SHARES)
+            if least < FLAT * abs(slope) or any(least < FLAT * (abs(k) - h) for k, h in filter(None, every)):
+                return float(share) * _quiet(force, way * position, share)
+        return 0.0
+
+    found = [share_of(way) for way in (1.0, -1.0)] if slope else [0.0]
+    way = 1.0 if found[0] >= found[-1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
     limit = _limit(way * position, max(found))
@@ -168,39 +175,11 @@ def _limit(position: Array, share: float) -> float:
     return float(bottom + share * (top - bottom))
 
 
-def _share(
-    force: Array, position: Array, slopes: tuple[float, Callable[[], float]], bound: float, none: bool
-) -> float:
-    """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
-
-    Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch. That of
-    an inertia is held against the steepest: it is in the force over the whole range, and takes from the contact's.
-    `bound` is as `_slope` has it, `none` as `free_motion_of` has it.
-    """
-    slope, steep = slopes
-    clear, white = False, white_noise(position)
-    for share in _SHARES:
-        stays = _stays_in(position < _limit(position, share))
-        found = _slope(force, position, stays, white, bound) if stays else None
-        if found is None:
-            continue
-        own, doubt = found[0] / slope, found[1] / abs(slope)
-        before, clear = clear, own + doubt < FLAT
-        if not (clear or before) or (none and own > doubt):
-            continue
-        least = (own - doubt if none else abs(own)) * abs(slope)
-        if abs(least) < FLAT * abs(slope) or abs(least) < FLAT * steep():
-            return float(share)
-    return 0.0
-
-
 def _quiet(force: Array, position: Array, share: float) -> bool:
     """Whether the force has no clearly larger range at the lower end of the position's than at the upper one.
 
     Steps that a damper ends leave no slope of force over position at the deep end either.
     """
-    if not share:
-        return False
     low, high = (force[way * position <= _limit(way * position, share)] for way in (1.0, -1.0))
     own, other = (float(np.ptp(np.percentile(end, [0.1, 99.9]))) for end in (low, high))
     return FLAT * own <= other
@@ -223,24 +202,18 @@ def _medians(values: Array, number: NDArray[np.intp]) -> Array:
 
 
 def _slope(
-    force: Array, position: Array, stays: list[tuple[int, int]], white: float, bound: float
+    force: Array, position: Array, stays: list[tuple[int, int]], white: float
 ) -> tuple[float, float] | None:
-    """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves.
-
-    What is more than a bound of deviations from the middle of its stay may be left out: a force that is read late has
-    a touch in it that the position no longer shows.
-    """
+    """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves."""
     at, stay = _rows_of(stays)
     x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
     f = force[at] - _medians(force[at], stay)[stay]
-    near = np.abs(f) <= bound * GAUSSIAN * float(np.median(np.abs(f)))
-    rows = np.flatnonzero(near | np.isinf(bound))
-    x, f = x[rows] - x[rows].mean(), f[rows] - f[rows].mean()
+    f -= f.mean()
     size = float(x @ x)
-    if len(rows) < _FEWEST or size <= _SEEN * len(x) * white**2:
+    if size <= _SEEN * len(x) * white**2:
         return None
     own = float(x @ f) / size
-    noise = noise_of(f - own * x, rows, len(stays) + 1)
+    noise = noise_of(f - own * x, np.arange(len(x)), len(stays) + 1)
     std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
     return own, student(noise.effective - 2) * std
 

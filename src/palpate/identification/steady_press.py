@@ -151,8 +151,6 @@ NEAR = 0.2
 """Half of the share of the force about a level in which its tangent is taken: the levels beside it lie so far off."""
 _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
-_FOLLOWED = 0.5
-"""Share of a stroke's force that a smooth curve of the position follows, of a contact."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
 _DEGREES = (2, 4, 6, 8)
@@ -167,7 +165,6 @@ class _Tangent(NamedTuple):
         change: of the speed, relative [1/s].
         drift: part of the slope that a removed drift would be [N/m].
         depth: where it is [m].
-        explained: share of the force that the curve follows.
     """
 
     slope: float
@@ -175,7 +172,6 @@ class _Tangent(NamedTuple):
     change: float
     drift: float
     depth: float
-    explained: float
 
 
 @dataclass(frozen=True)
@@ -264,9 +260,8 @@ class Curve:
         spread = float(share @ (own + (values - mean) ** 2))
         acceleration, speed, _ = np.polyfit(self.time - self.time.mean(), u, 2)
         drift = float(self.drift[-1] - self.drift[0]) / float(self.depth[-1] - self.depth[0])
-        explained = 1 - float(left @ left) / max(float(np.var(force)) * len(left), 1e-300)
         change = float(2 * acceleration / (speed or 1e-300))
-        return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * at, explained)
+        return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * at)
 
 
 @dataclass(frozen=True)
@@ -279,7 +274,6 @@ class Slopes:
         each: slope of each [N/m].
         again: 95 % half-width for one more; None for fewer than three [N/m].
         rise: mean duration of one [s]; of an octave, a quarter of a period.
-        explained: least share of a stroke's force that its curve follows.
     """
 
     force: float
@@ -288,7 +282,6 @@ class Slopes:
     each: tuple[float, ...]
     again: float | None
     rise: float
-    explained: float = 1.0
 
     def spread_as(self, wider: Slopes | None) -> Slopes:
         """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
@@ -341,7 +334,7 @@ def steady_press(
         return None
     named = named or curves
     headline = slopes_at(named, WINDOW, lag, rest)
-    if headline is None or headline.explained < _FOLLOWED:
+    if headline is None:
         return None
     beside = [own for own in every if own.loads is named[0].loads and own.span > _STROKE * deepest]
     if len(beside) > len(named):  # at a force that all reach
@@ -400,7 +393,7 @@ def slopes_at(
         return None
     level = float(np.mean([chebyshev.chebval(0.0, own.fit(2)) for own in windows]))
     every = [own.tangent(level) for own in windows]
-    values, variances, bends, drifts, depths, follows = np.array(every).T
+    values, variances, bends, drifts, depths = np.array(every).T
     # A bend that no smooth curve follows, as a second layer, biases the slope, in half of the window less. The slopes
     # differ by that bias and the noise of the narrower: it is known as well as its excess over the noise (James and
     # Stein's shrinkage).
@@ -427,7 +420,5 @@ def slopes_at(
         "other forces": Contribution.within(float(weight @ np.abs(drifts))),
     }
     rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
-    return Slopes(
-        level - rest, float(weight @ depths), Measurement(value, parts), tuple(values.tolist()), mean.next_half,
-        rise, float(follows.min()),
-    )  # fmt: skip
+    at, stiffness = (level - rest, float(weight @ depths)), Measurement(value, parts)
+    return Slopes(*at, stiffness, tuple(values.tolist()), mean.next_half, rise)
