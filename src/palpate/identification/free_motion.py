@@ -126,15 +126,19 @@ def free_motion_of(
         return _slope(force, position, stays, white) if stays else None
 
     def share_of(way: float) -> float:
-        """The largest share over which the force stays: its slope is clearly below that of the contact.
+        """The largest share over which the force stays: its slope is clearly below that of the contact there.
 
+        Or over the next larger share, which may hold a touch.
         That of an inertia is held against the steepest that an interval leaves at either end: it is in the force over
         the whole range, and takes from the contact's.
         """
+        clear = False
         for share in _SHARES:
-            own, half = slope_at(way, share) or (np.inf, 0.0)
-            own = own if slope > 0 else -own
-            if own + half >= FLAT * abs(slope) or (none and own > half):
+            if (found := slope_at(way, share)) is None:
+                continue
+            own, half = float(np.sign(slope)) * found[0], found[1]
+            before, clear = clear, own + half < FLAT * abs(slope)
+            if not (clear or before) or (none and own > half):
                 continue
             least = abs(own - half if none else own)
             every = (slope_at(end, other) for end in (1.0, -1.0) for other in _SHARES)
