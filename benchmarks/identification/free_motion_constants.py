@@ -36,6 +36,7 @@ NUISANCES = ("clean", "payload", "never-leaves")
 VALUES: dict[tuple[Any, str], tuple[Any, ...]] = {
     (free_motion, "FLAT"): (0.1, 0.2, 0.4, 0.6, 0.8),
     (free_motion, "_TWICE"): (1.0, 1.5, 2.0, 4.0),
+    (free_motion, "_OUTLYING"): (3.0, 5.0, 8.0),
     (free_motion, "_EXPLAINED"): (0.3, 0.5, 0.7, 0.9),
     (free_motion, "_OTHERS"): (1.0, 1.5, 2.0, 4.0),
 }

@@ -16,7 +16,7 @@ from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
-from palpate.signals.samples import runs
+from palpate.signals.samples import GAUSSIAN, runs
 from palpate.signals.types import NORMAL
 
 FLAT = 0.4
@@ -34,6 +34,8 @@ _MOST = 1 << 16
 """Rows that are looked at; more are averaged."""
 _SEEN = 10.0
 """Power of the motion in a stay over that of the position's noise, at least: the slope would be off by a tenth."""
+_OUTLYING = 5.0
+"""Deviations from the middle of a stay that no noise reaches."""
 _OF_MEDIAN = 2 / np.pi
 """Variance of a mean over that of a median, of normal noise."""
 _MIDDLE = (0.05, 0.95)
@@ -115,17 +117,15 @@ def free_motion_of(
 
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
-    slope = _in_contact(force, position, ends)
-
-    white = white_noise(position)
+    slope, white = _in_contact(force, position, ends), white_noise(position)
 
     @cache
-    def slope_at(way: float, share: float) -> tuple[float, float] | None:
+    def slope_at(way: float, share: float, bound: float) -> tuple[float, float] | None:
         """Slope over a share of the position's range from its lower (1) or upper (-1) end, and its half-width."""
         stays = _stays_in(way * position < _limit(way * position, share))
-        return _slope(force, position, stays, white) if stays else None
+        return _slope(force, position, stays, white, bound) if stays else None
 
-    def share_of(way: float) -> float:
+    def share_of(way: float, bound: float) -> float:
         """The largest share over which the force stays: its slope is clearly below that of the contact there.
 
         Or over the next larger share, which may hold a touch.
@@ -134,20 +134,23 @@ def free_motion_of(
         """
         clear = False
         for share in _SHARES:
-            if (found := slope_at(way, share)) is None:
+            if (found := slope_at(way, share, bound)) is None:
                 continue
             own, half = float(np.sign(slope)) * found[0], found[1]
             before, clear = clear, own + half < FLAT * abs(slope)
             if not (clear or before) or (none and own > half):
                 continue
             least = abs(own - half if none else own)
-            every = (slope_at(end, other) for end in (1.0, -1.0) for other in _SHARES)
+            every = (slope_at(end, other, np.inf) for end in (1.0, -1.0) for other in _SHARES)
             if least < FLAT * abs(slope) or any(least < FLAT * (abs(k) - h) for k, h in filter(None, every)):
                 return float(share) * _quiet(force, way * position, share)
         return 0.0
 
-    found = [share_of(way) for way in (1.0, -1.0)] if slope else [0.0]
-    way = 1.0 if found[0] >= found[-1] else -1.0
+    found = [0.0, 0.0]
+    for bound in (np.inf, _OUTLYING):
+        if slope and not any(found):
+            found = [share_of(way, bound) for way in (1.0, -1.0)]
+    way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
     limit = _limit(way * position, max(found))
@@ -206,18 +209,24 @@ def _medians(values: Array, number: NDArray[np.intp]) -> Array:
 
 
 def _slope(
-    force: Array, position: Array, stays: list[tuple[int, int]], white: float
+    force: Array, position: Array, stays: list[tuple[int, int]], white: float, bound: float
 ) -> tuple[float, float] | None:
-    """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves."""
+    """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves.
+
+    What is more than a bound of deviations from the middle of its stay may be left out: a force that is read late has
+    a touch in it that the position no longer shows.
+    """
     at, stay = _rows_of(stays)
     x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
     f = force[at] - _medians(force[at], stay)[stay]
-    f -= f.mean()
+    near = np.abs(f) <= bound * GAUSSIAN * float(np.median(np.abs(f)))
+    rows = np.flatnonzero(near | np.isinf(bound))
+    x, f = x[rows] - x[rows].mean(), f[rows] - f[rows].mean()
     size = float(x @ x)
-    if size <= _SEEN * len(x) * white**2:
+    if len(rows) < _FEWEST or size <= _SEEN * len(x) * white**2:
         return None
     own = float(x @ f) / size
-    noise = noise_of(f - own * x, np.arange(len(x)), len(stays) + 1)
+    noise = noise_of(f - own * x, rows, len(stays) + 1)
     std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
     return own, student(noise.effective - 2) * std
 

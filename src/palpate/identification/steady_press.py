@@ -1,9 +1,11 @@
 """Presses at constant speed, as testing machines and arms make them: strokes of the position, and their tangents.
 
 A position that is a straight line in time has no power in any octave, so what a press shows is read from position and
-force themselves. A stroke is an advance or a retreat at about one speed. Where force and position are both smooth
-curves of one variable, the tangent is the quotient of their derivatives: at constant speed a lag of the force moves it
-along the curve, and does not change it; where the speed changes, it changes the slope by that change.
+force themselves: strokes of the position, advances or retreats at about one speed (`strokes_of`); the force of each
+over its depth (`curves_of`); its tangents (`slopes_at`); and of these the press (`steady_press`). Where force and
+position are both smooth curves of one variable, the tangent is the quotient of their derivatives: at constant speed a
+lag of the force moves it along the curve, and does not change it; where the speed changes, it changes the slope by that
+change.
 
 In a window about one force the force is a smooth curve of the position. How bent it is, the log tells: curves of
 several degrees are averaged by Akaike's weights, with the variance between them (Burnham and Anderson, Model selection
@@ -264,6 +266,27 @@ class Curve:
         return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * at)
 
 
+def curves_of(
+    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
+) -> list[Curve]:
+    """The force of each stroke over its depth."""
+    curves = []
+    for rows in (stroke.rows(channels) for stroke in strokes):
+        there = np.flatnonzero(channels.valid[rows]) + rows.start
+        if len(there) < 2 * _FEWEST:
+            continue
+        time, force = channels.time[there], signs[1] * channels.force[there]
+        begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
+        gone = (
+            np.zeros(len(time))
+            if drift is None
+            else np.interp(time - channels.start, drift.times, drift.levels)
+        )
+        readings = min(channels.rate * channels.dt, 1.0)
+        curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
+    return curves
+
+
 @dataclass(frozen=True)
 class Slopes:
     """Stiffness of some loadings, or of an octave, and where it is.
@@ -293,6 +316,53 @@ class Slopes:
             return self
         stiffness = self.stiffness.with_cause("repetition", spread)
         return replace(self, stiffness=stiffness, each=wider.each, again=None)
+
+
+def slopes_at(
+    curves: Sequence[Curve], shares: tuple[float, float], lag: Lag, rest: float = 0.0
+) -> Slopes | None:
+    """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
+
+    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
+    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
+    contact [N].
+    """
+    low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
+    ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
+    windows = [own for curve in curves if (own := curve.between(*ends)) is not None]
+    if not windows or high <= low:
+        return None
+    level = float(np.mean([chebyshev.chebval(0.0, own.fit(2)) for own in windows]))
+    every = [own.tangent(level) for own in windows]
+    values, variances, bends, drifts, depths = np.array(every).T
+    # A bend that no smooth curve follows, as a second layer, biases the slope, in half of the window less. The slopes
+    # differ by that bias and the noise of the narrower: it is known as well as its excess over the noise (James and
+    # Stein's shrinkage).
+    nearer = [own.about(depth).tangent(level) for own, depth in zip(windows, depths, strict=True)]
+    apart = np.array([own.slope for own in nearer]) - values
+    noises = np.array([own.variance for own in nearer])
+    share = np.maximum(1 - noises / np.maximum(apart**2, 1e-300), 0.0)
+    values, bent = values + share * apart, share * noises
+    mean = random_effects(values, variances + bent)
+    n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
+    weight /= weight.sum()
+    noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
+    # Satterthwaite: the noise is known, the differences by n - 1.
+    part = differ**2 / max(noise**2 + differ**2, 1e-300)
+    freedom = (n - 1) / part**2 if part else np.inf
+    bend = float(weight @ bends)
+    value = float(weight @ values) * (1 + lag.value * bend)
+    parts = {
+        "repetition": Contribution(differ, freedom),
+        "noise": Contribution(noise, freedom),
+        "lag": Contribution(lag.std * abs(value * bend)),
+        "curvature": Contribution(float(np.sqrt(weight**2 @ bent))),
+        # Known where the probe is free, not in between.
+        "other forces": Contribution.within(float(weight @ np.abs(drifts))),
+    }
+    rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
+    at, stiffness = (level - rest, float(weight @ depths)), Measurement(value, parts)
+    return Slopes(*at, stiffness, tuple(values.tolist()), mean.next_half, rise)
 
 
 @dataclass(frozen=True)
@@ -354,71 +424,3 @@ def steady_press(
 def few_points(curve: Array) -> Array:
     """A curve, shape (2, n), with so few points that it is drawn."""
     return curve[:, :: max(curve.shape[1] // _SHOWN, 1)]
-
-
-def curves_of(
-    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
-) -> list[Curve]:
-    """The force of each stroke over its depth."""
-    curves = []
-    for rows in (stroke.rows(channels) for stroke in strokes):
-        there = np.flatnonzero(channels.valid[rows]) + rows.start
-        if len(there) < 2 * _FEWEST:
-            continue
-        time, force = channels.time[there], signs[1] * channels.force[there]
-        begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
-        gone = (
-            np.zeros(len(time))
-            if drift is None
-            else np.interp(time - channels.start, drift.times, drift.levels)
-        )
-        readings = min(channels.rate * channels.dt, 1.0)
-        curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
-    return curves
-
-
-def slopes_at(
-    curves: Sequence[Curve], shares: tuple[float, float], lag: Lag, rest: float = 0.0
-) -> Slopes | None:
-    """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
-
-    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
-    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
-    contact [N].
-    """
-    low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
-    ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
-    windows = [own for curve in curves if (own := curve.between(*ends)) is not None]
-    if not windows or high <= low:
-        return None
-    level = float(np.mean([chebyshev.chebval(0.0, own.fit(2)) for own in windows]))
-    every = [own.tangent(level) for own in windows]
-    values, variances, bends, drifts, depths = np.array(every).T
-    # A bend that no smooth curve follows, as a second layer, biases the slope, in half of the window less. The slopes
-    # differ by that bias and the noise of the narrower: it is known as well as its excess over the noise (James and
-    # Stein's shrinkage).
-    nearer = [own.about(depth).tangent(level) for own, depth in zip(windows, depths, strict=True)]
-    apart = np.array([own.slope for own in nearer]) - values
-    noises = np.array([own.variance for own in nearer])
-    share = np.maximum(1 - noises / np.maximum(apart**2, 1e-300), 0.0)
-    values, bent = values + share * apart, share * noises
-    mean = random_effects(values, variances + bent)
-    n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
-    weight /= weight.sum()
-    noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
-    # Satterthwaite: the noise is known, the differences by n - 1.
-    part = differ**2 / max(noise**2 + differ**2, 1e-300)
-    freedom = (n - 1) / part**2 if part else np.inf
-    bend = float(weight @ bends)
-    value = float(weight @ values) * (1 + lag.value * bend)
-    parts = {
-        "repetition": Contribution(differ, freedom),
-        "noise": Contribution(noise, freedom),
-        "lag": Contribution(lag.std * abs(value * bend)),
-        "curvature": Contribution(float(np.sqrt(weight**2 @ bent))),
-        # Known where the probe is free, not in between.
-        "other forces": Contribution.within(float(weight @ np.abs(drifts))),
-    }
-    rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
-    at, stiffness = (level - rest, float(weight @ depths)), Measurement(value, parts)
-    return Slopes(*at, stiffness, tuple(values.tolist()), mean.next_half, rise)

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.estimators.budget import Answer, Budget, Prediction, Spread
 from palpate.identification.estimators.fit import Fit
@@ -108,17 +107,23 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
-    shown = stiffness_of(found.problem, found.problem.force, point)
-    own, slope = _model_stiffness(found, point)
+    problem, fitted = found.problem, found.fit
+    shown, own = (stiffness_of(problem, force, point) for force in (problem.force, fitted.force))
     if shown is None or own is None:
         return found
+    slope = np.zeros(len(found.names))
+    for i, name in enumerate(found.names):
+        if name in fitted.theta:
+            step = 1e-4 * (abs(fitted.theta[name]) or 1.0)
+            theta = fitted.theta | {name: fitted.theta[name] + step}
+            moved = Prediction.of(fitted.model, problem.motion, problem.force, theta, fitted.lag)
+            slope[i] = ((stiffness_of(problem, moved.force, point) or own) - own) / step
     common = "calibration", "friction", "loadings"  # of the answer, too
     parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause not in common}
     along = found.cov @ slope
     power = float(slope @ along)
     gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(parts))), 0.0)
-    moved = along * gap / power if power > 0 else np.zeros(len(slope))
-    return found.with_cause("dynamic stiffness", moved)
+    return found.with_cause("dynamic stiffness", along * gap / power if power > 0 else np.zeros(len(slope)))
 
 
 def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
@@ -132,21 +137,6 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     if apart.std**2 > variance[place]:
         variance[place], freedom[place] = apart.std**2, apart.freedom
     return found.budget | {"repetition": Spread(variance, freedom)}
-
-
-def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float | None, Array]:
-    """Stiffness of a model's force, read as the log's own is, and its derivatives by the parameters, shape (p,)."""
-    own, problem = stiffness_of(found.problem, found.fit.force, point), found.problem
-    slope = np.zeros(len(found.names))
-    for i, name in enumerate(found.names):
-        if own is None or name not in found.fit.theta:
-            continue
-        step = 1e-4 * (abs(found.fit.theta[name]) or 1.0)
-        theta = found.fit.theta | {name: found.fit.theta[name] + step}
-        moved = Prediction.of(found.fit.model, problem.motion, problem.force, theta, found.fit.lag)
-        other = stiffness_of(problem, moved.force, point)
-        slope[i] = 0.0 if other is None else (other - own) / step
-    return own, slope
 
 
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
