@@ -63,9 +63,8 @@ def sample_clock_of(values: Array) -> SampleClock:
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
-    period, phase, room, spread = max(
-        even, key=lambda grid: grid[0]
-    )  # with the fewest samples that no change shows
+    # That with the fewest samples that no change shows.
+    period, phase, room, spread = max(even, key=lambda grid: grid[0])
     first = int(np.ceil((-0.5 - phase) / period))
     last = int(np.floor((len(values) - 1 - phase) / period))
     instants = phase + np.arange(first, last + 1) * period
@@ -148,11 +147,8 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
     ahead = np.column_stack([np.ones(len(own)), count[own], np.ones(len(own))])
     sides, limits = np.vstack([ahead, ahead * [-1, -1, 1]]), np.r_[left[own], 1 - left[own]]
     every = []
-    for goal, least in (
-        ((0, 0, -1), None),
-        ((1, 0, 0), 0.0),
-        ((-1, 0, 0), 0.0),
-    ):  # room; least and largest phase
+    # Largest room; least and largest phase.
+    for goal, least in (((0, 0, -1), None), ((1, 0, 0), 0.0), ((-1, 0, 0), 0.0)):
         found = linprog(goal, sides, limits, bounds=[(None, None), (None, None), (least, None)])
         if not found.success or (least is None and found.x[2] <= _ROOM):
             return None

@@ -194,30 +194,32 @@ def _common(
 
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
-        several, whose = ("", "its") if len(time) == 1 else ("s", "their")
-        count = f"{len(time)} row{several} with a time of {whose} own"
-        raise InputError(
-            f"the log has {count}; at least {_FEWEST} are needed: log longer, or check --time, --start and --end"
+        count = (
+            "1 row with a time of its own" if len(time) == 1 else f"{len(time)} rows with a time of their own"
         )
+        advice = "log longer, or check --time, --start and --end"
+        raise InputError(f"the log has {count}; at least {_FEWEST} are needed: {advice}")
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
     if (rate := _rate(time)) > _FASTEST:
-        fast = f"there are {rate:.3g} rows a second, faster than any sensor"
-        raise InputError(f"{fast}; is the unit of time right?")
+        raise InputError(
+            f"there are {rate:.3g} rows a second, faster than any sensor; is the unit of time right?"
+        )
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
-            large = f"the {name} reaches {reach:.3g}, beyond any sensor"
-            raise InputError(f"{large}; is it the right column and unit?")
+            raise InputError(
+                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
+            )
         if np.ptp(seen) == 0:
-            still = f"the {name} is {seen[0]:.6g} in every row"
-            raise InputError(f"{still}; is it the right column, and did anything move?")
+            always = f"the {name} is {seen[0]:.6g} in every row"
+            raise InputError(f"{always}; is it the right column, and did anything move?")
 
 
 def _period(time: Array, warnings: list[Warn]) -> tuple[float, bool]:
@@ -225,11 +227,8 @@ def _period(time: Array, warnings: list[Warn]) -> tuple[float, bool]:
     step = np.diff(time)
     gaps = step > 3 * np.median(step)
     dt = float(step[~gaps].mean())
-    samples = (time[-1] - time[0]) / dt
-    if samples > max(
-        _BRIDGED * len(time), _FEW
-    ):  # little else than gaps: its even grid would fill the memory
-        widest = int(np.argmax(step))
+    samples, widest = (time[-1] - time[0]) / dt, int(np.argmax(step))
+    if samples > max(_BRIDGED * len(time), _FEW):  # its even grid would fill the memory
         raise InputError(
             f"the time jumps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
             f" {samples:.3g} samples; cut the log there with --start and --end"

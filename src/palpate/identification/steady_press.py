@@ -231,7 +231,8 @@ class Curve:
         near = np.abs(self.depth - depth) <= self.scaled[2] / 2
         if len(np.unique(self.depth[near])) < _FEWEST:
             return self
-        return Curve(*(own[near] for own in (self.time, self.depth, self.force, self.drift)), self.loads, 1.0)
+        time, x, force, drift = (own[near] for own in (self.time, self.depth, self.force, self.drift))
+        return Curve(time, x, force, drift, self.loads, 1.0)
 
     def fit(self, degree: int) -> Array:
         """Chebyshev coefficients of the force over the scaled depth, shape (degree + 1,)."""
@@ -251,7 +252,9 @@ class Curve:
         every = []
         for degree in degrees:
             inverse = np.linalg.pinv(chebyshev.chebvander(u, degree))
-            weights = chebyshev.chebval(at, chebyshev.chebder(inverse))  # of each block on the slope
+            weights = np.asarray(
+                chebyshev.chebval(at, chebyshev.chebder(inverse))
+            )  # of each block on the slope
             misfit = force - chebyshev.chebval(u, inverse @ force)
             criterion = float(misfit @ misfit) / variance + 2 * (degree + 1)
             every.append((float(weights @ force), variance * float(weights @ weights), criterion))
