@@ -223,8 +223,8 @@ class Curve:
         rows = slice(first, last) if self.loads else slice(len(force) - last, len(force) - first)
         edges = np.linspace(0, last - first, count + 1).astype(np.intp)
         every = np.stack([self.time, self.depth, self.force, self.drift])[:, rows]
-        means = np.add.reduceat(every, edges[:-1], axis=1) / np.diff(edges)
-        return Curve(*means, self.loads, 1.0) if len(np.unique(means[1])) > _DEGREES[0] else None
+        time, x, f, drift = np.add.reduceat(every, edges[:-1], axis=1) / np.diff(edges)
+        return Curve(time, x, f, drift, self.loads, 1.0) if len(np.unique(x)) > _DEGREES[0] else None
 
     def about(self, depth: float) -> Curve:
         """The half of it about a depth [m]; the whole where that has blocks at too few depths."""
