@@ -17,7 +17,6 @@ from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem, problem_of, with_fewer_rows
 from palpate.identification.result import (
-    DynamicStiffness,
     Identification,
     LagFound,
     Press,
@@ -67,17 +66,7 @@ def identify(record: Record, **given: Any) -> Identification:
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
         return _nothing(channels, chain, options, units, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    unit = impedance_units(units["force"], units["position"])["K"]
-    evidence = evidence_of(problem, options, unit, choice.answer)
-    series = SeriesSpring.of(options)
-    if series is not None:
-        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
-        holds = series.parameters(holds, problem.band)
-    if contacts.payload is not None:
-        weighed = np.where(np.array(choice.answer.names) == "M", contacts.payload.std, 0.0)
-        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
-    parameters, told = verdicts(choice, holds, evidence[2], options, units)
-    return _outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, units)
+    return _outcome(channels, chain, choice, holds, warnings, options, units)
 
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
@@ -89,21 +78,27 @@ _NARROWER = 0.5
 """Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
-# More than seven arguments: it gathers what every stage has found.
 def _outcome(
     channels: Channels,
     chain: Chain,
     choice: Choice,
     holds: Fit,
-    evidence: tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None],
-    parameters: dict[str, Parameter],
     warnings: tuple[Warn, ...],
     options: Options,
     units: Units,
 ) -> Identification:
-    """Identification from the fit, its verdicts and its evidence."""
-    problem, found = choice.problem, choice.answer
-    spectrum, press, point = evidence
+    """Identification from the fit: its evidence, and the verdicts that rest on both."""
+    problem, unit = choice.problem, impedance_units(units["force"], units["position"])["K"]
+    spectrum, press, point = evidence_of(problem, options, unit, choice.answer)
+    series, payload = SeriesSpring.of(options), problem.contacts.payload
+    if series is not None:
+        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
+        holds = series.parameters(holds, problem.band)
+    if payload is not None:
+        weighed = np.where(np.array(choice.answer.names) == "M", payload.std, 0.0)
+        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
+    parameters, told = verdicts(choice, holds, point, options, units)
+    warnings, found = (*warnings, *told), choice.answer
     mass, name = parameters.get("M"), found.fit.model.name
     massless = options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
     delay = 0.0 if problem.contacts.bonded else chain.delay
