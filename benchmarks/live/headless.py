@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-PATIENCE = 60.0
+PATIENCE = 120.0
 """Within which what has to happen does, on whatever machine [s]: a loaded one is slow, not wrong."""
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 QUIET = [

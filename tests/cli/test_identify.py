@@ -199,7 +199,10 @@ def test_the_sign_of_the_force_is_handed_on(log, capsys, word):
     assert found["parameters"]["K"]["value"] == own.parameters["K"].value
 
 
-@pytest.mark.parametrize("words", [["--indenter", "sphere:10:mm"], ["--indenter", "sphere:10mm"]])
+@pytest.mark.parametrize(
+    "words",
+    [pytest.param(["--indenter", "sphere:10:mm"], marks=pytest.mark.long), ["--indenter", "sphere:10mm"]],
+)
 def test_an_indenter_adds_youngs_modulus(log, capsys, words):
     _, found = ask(capsys, log, *OWN, *words, "--poisson", "0.45:0.02")
     own = found["parameters"]["E"]
@@ -216,7 +219,7 @@ def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
     assert other.read_bytes() == b"a holiday"
 
 
-@pytest.mark.parametrize("words", ["0.000:0.0005", "0:0.5:ms"])
+@pytest.mark.parametrize("words", ["0:0.5:ms", pytest.param("0.000:0.0005", marks=pytest.mark.long)])
 def test_a_lag_with_its_std(log, capsys, words):
     _, found = ask(capsys, log, *OWN, "--lag", words)
     assert found["lag_s"] == {"value": 0.0, "std": 0.0005, "bound": pytest.approx(0.00098), "kind": "told"}
@@ -229,9 +232,13 @@ def test_a_lag_with_its_std(log, capsys, words):
     ("words", "doubt"),
     [
         (("--position", "position_mm:m"), "'position_mm' is taken in m as given, but its name says mm"),
-        (("--position", "1:m"), "is the position in mm?"),
-        (("--time", "time_s:min"), "is taken in min as given, but its name says s"),
-        (("--force", "force_N:mN"), "is taken in mN as given, but its name says N"),
+        pytest.param(("--position", "1:m"), "is the position in mm?", marks=pytest.mark.long),
+        pytest.param(
+            ("--time", "time_s:min"), "is taken in min as given, but its name says s", marks=pytest.mark.long
+        ),
+        pytest.param(
+            ("--force", "force_N:mN"), "is taken in mN as given, but its name says N", marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_doubtful_unit_stands_before_the_answer_which_then_is_no(log, capsys, words, doubt):

@@ -78,6 +78,7 @@ def test_the_page_and_the_figure(tmp_path, capsys):
     assert all(line in unescape(text) for line in told)
 
 
+@pytest.mark.long
 def test_a_slower_pose(tmp_path, capsys):
     press_bag(tmp_path / "press", every=8)
     _, found = ask(capsys, "identify", "press")
@@ -99,6 +100,7 @@ def press_bag_path(tmp_path, **said):
     return tmp_path / "press"
 
 
+@pytest.mark.long
 def test_clocks_that_disagree_are_said(tmp_path, capsys):
     """The force's computer is 0.7 s behind; the recorder's own times put it right but for the way to it."""
     _, record = a_press(2)
@@ -112,6 +114,7 @@ def test_clocks_that_disagree_are_said(tmp_path, capsys):
     assert stiffness(found) == pytest.approx(5000, rel=0.005)
 
 
+@pytest.mark.long
 def test_one_axis_of_a_joint(tmp_path, capsys):
     flat = pressed()
     sent = joints("/joint_states", flat["time"], ["lift"], flat["position"][:, None], flat["force"][:, None])
@@ -154,6 +157,7 @@ def test_two_sensors_of_opposite_signs(tmp_path, capsys):
     assert stiffness(found[0]) == pytest.approx(stiffness(found[1]), rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_force_at_the_end_of_its_range(tmp_path, capsys):
     """An axis of a tilted sensor stands at its limit while the tool goes on; those readings are left out."""
     _, record = a_press(8, noise=0.02)
@@ -206,6 +210,7 @@ def test_many_short_contacts(tmp_path, capsys):
     assert point["ci95"][0] < 5000 < point["ci95"][1]
 
 
+@pytest.mark.long
 def test_a_table_of_an_arm(tmp_path, capsys):
     """The same wrench and pose as columns of a CSV file."""
     world, record = a_press(4, frame="base")

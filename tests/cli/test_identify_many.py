@@ -56,6 +56,7 @@ def test_a_folder_is_its_logs_and_what_they_say_together(presses, capsys):
     assert point["force_N"][0] < point["force_N"][1]
 
 
+@pytest.mark.long
 def test_the_dependence_on_a_temperature_is_pooled(presses, capsys):
     table = presses.parent / "conditions.csv"
     table.write_text("log,temperature_C\npress_2.csv,30\npress_10,20.5\npress_9.csv,10\n")

@@ -31,6 +31,7 @@ def ur_log(elsewhere):
     return elsewhere / "ur.csv"
 
 
+@pytest.mark.long
 def test_a_preset_and_a_saved_file_say_the_same_as_all_words(ur_log, capsys):
     words = ["--preset", "ur-rtde", "--tcp", "0,0,100:mm", "--save-options", "my-cell.toml"]
     code, found = ask(capsys, "identify", ur_log, *words)

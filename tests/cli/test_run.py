@@ -160,6 +160,7 @@ def test_no_contact_is_an_answer_and_exit_code_1(mine, capsys):
     assert summary["force"] is None
 
 
+@pytest.mark.long
 def test_an_interrupted_run_is_saved_and_exits_130(mine, monkeypatch):
     class Interrupting:
         def __init__(self, march):
@@ -377,6 +378,7 @@ def test_a_warm_run_compiles_nothing():
     assert ran.stdout.strip() == "True"
 
 
+@pytest.mark.long
 def test_the_verdict_is_that_of_identify(evil, capsys):
     """On whatever was run: the page, the summary and `palpate identify` of the record say one thing."""
     assert main(["identify", str(evil / "record.parquet"), "--json"]) in {0, 1}

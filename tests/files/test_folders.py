@@ -116,7 +116,7 @@ def test_a_place_under_a_file_is_the_systems_error_and_leaves_nothing(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from palpate.files import writing as folders
+from palpate import files as folders
 path, at = Path(sys.argv[1]), int(sys.argv[2])
 count, rename = 0, Path.rename
 

@@ -326,7 +326,7 @@ def test_several_presses_foretell_the_next():
     assert 5500 < high < 7000
 
 
-@pytest.mark.parametrize("play", [0.0, 5e-5])
+@pytest.mark.parametrize("play", [pytest.param(0.0, marks=pytest.mark.long), 5e-5])
 def test_play_before_the_position_sensor_is_in_the_interval_of_an_octave(play):
     """Steps of 0.6 mm: over 0.55 mm that are read the force is a tenth stiffer, and only its friction says so."""
     rng = np.random.default_rng(3)

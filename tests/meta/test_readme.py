@@ -85,8 +85,11 @@ def test_python_of_the_readme_runs(root, tmp_path, monkeypatch):
         exec(compile(code, "README.md", "exec"), {})
 
 
-LONG = ("docs/arms.md", "docs/force.md", "docs/analysis.md", "docs/online.md", "docs/logs.md")
-"""They press, tune or prove for seconds."""
+LONG = {
+    f"docs/{name}.md"
+    for name in ("arms", "force", "analysis", "online", "logs", "moving", "identify", "excite")
+}
+"""They identify, press, tune or prove for seconds."""
 
 
 def give_logs(folder):

@@ -206,7 +206,7 @@ def test_pairs_differ_by_light_and_dark():
     ("name", "head"), [("a.png", b"\x89PNG"), ("a.SVG", b"<!-- Made by palpate"), ("a.pdf", b"%PDF-")]
 )
 def test_a_figure_is_what_its_ending_says_and_known_again(tmp_path, name, head):
-    from palpate.files.writing import ours
+    from palpate.files import ours
 
     figure, (axis,) = style.figure()
     axis.plot([0, 1], [0, 1], color=style.K)

@@ -9,7 +9,7 @@ import pytest
 
 from identification.synthetic_contacts import shaken
 from palpate.cli import main
-from palpate.files.writing import ours
+from palpate.files import ours
 from palpate.identification import identify, pool
 from palpate.identification.indenter import Indenter, with_modulus
 from palpate.report.identification.words import Source

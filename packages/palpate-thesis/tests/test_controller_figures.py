@@ -245,6 +245,7 @@ def test_a_regain_that_is_late_hard_or_missing_is_not_well():
         assert found_again([bad] * 10).verdict == "differs"
 
 
+@pytest.mark.long
 def test_the_network_alone_follows_and_an_untaught_one_does_not():
     assert fig_2_04.by_network(fig_2_04.FOAM, 5e-5, 0).follows
     assert not fig_2_04.by_network(fig_2_04.FOAM, 1e-7, 0).follows

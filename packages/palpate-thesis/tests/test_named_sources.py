@@ -204,11 +204,3 @@ def test_the_models_slopes_are_those_of_its_force():
     K, B = part.slopes(memory, 0.4705, 0.01)
     assert (force(0.470501, 0.01) - force(0.470499, 0.01)) / 2e-6 == pytest.approx(K, rel=1e-5)
     assert (force(0.4705, 0.01001) - force(0.4705, 0.00999)) / 2e-5 == pytest.approx(B, rel=1e-5)
-
-
-@pytest.mark.long
-def test_a_network_finds_the_slopes_of_a_stiffening_surface():
-    found = e9.tune(e9.PARAMETERS["foam"], 1)
-    assert found.wrong("network") < 0.7 * found.wrong("line")
-    assert found.apart("network") < found.apart("line")
-    assert not found.lost

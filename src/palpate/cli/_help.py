@@ -1,17 +1,13 @@
 """The pages of `--help`: lines end between phrases where they can, and an example is a command that can be copied."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from cyclopts.help import DefaultFormatter
-
-if TYPE_CHECKING:
-    from cyclopts import App
-    from cyclopts.help import HelpPanel
-    from rich.console import Console, ConsoleOptions, RenderResult
+from attrs import evolve
+from cyclopts import App
+from cyclopts.help import DefaultFormatter, HelpPanel
+from rich.console import Console, ConsoleOptions, RenderResult
 
 EXAMPLE = "palpate "
 """Begins a paragraph that is an example."""
@@ -103,8 +99,6 @@ class PhraseFormatter(DefaultFormatter):
 
     def __call__(self, console: Console, options: ConsoleOptions, panel: HelpPanel) -> None:
         """Render one panel of the help."""
-        from attrs import evolve
-
         entries = [evolve(entry, **_describe(entry)) for entry in panel.entries]
         super().__call__(console, options, panel.copy(entries=entries))
 

@@ -5,10 +5,12 @@ A name from a log or a path may hold escape sequences, or brackets that rich wou
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from palpate.cli._streams import flush
@@ -16,8 +18,6 @@ from palpate.files import as_json
 from palpate.text import duration, printable
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rich.console import Console
     from rich.progress import Progress
 
@@ -39,8 +39,6 @@ def print_lines(*lines: str) -> None:
 
 def print_json(value: Any) -> None:
     """Print one JSON value, in ASCII; numbers that are none are null."""
-    import json
-
     import msgspec
 
     plain = msgspec.json.decode(as_json(value))

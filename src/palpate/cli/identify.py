@@ -8,8 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
+from palpate.arrays import Array
 from palpate.cli._program import command, print_result
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
@@ -18,13 +20,13 @@ from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, L
 from palpate.cli.options.values import FLAG, options
 from palpate.errors import InputError, PalpateError
 from palpate.files import check_place, write_text
+from palpate.logs import formats
+from palpate.records import Record
 
 if TYPE_CHECKING:
-    from palpate.arrays import Array
     from palpate.from_log import LogIdentifier
     from palpate.identification import Identification
     from palpate.identification.pooling import Pooled
-    from palpate.records import Record
     from palpate.report.identification.words import Source
     from palpate.report.many.table import LogRow
 
@@ -180,8 +182,6 @@ def _row(log: Path, asked: OneLog) -> LogRow:
 
 def _light(found: Identification) -> Identification:
     """Without the samples, which a row does not need: a thousand logs fit into memory."""
-    import numpy as np
-
     traces, none = found.traces, np.empty(0)
     if traces is not None:
         traces = replace(
@@ -260,13 +260,13 @@ class CovariateOptions:
 
     def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
         """One number of each log, by the covariate's name."""
-        from palpate.logs.formats import read_covariates
-
         if self.covariates is not None and not self.covariate:
             raise InputError(
                 "--covariates names a table; name its columns, too, as in --covariate temperature_C"
             )
-        return read_covariates(logs, self.covariate, self.covariates, source.missing, source.delimiter)
+        return formats.read_covariates(
+            logs, self.covariate, self.covariates, source.missing, source.delimiter
+        )
 
 
 # More than seven arguments: one for each group of options.
@@ -326,21 +326,19 @@ def identify(
 
 def _identify(logs: tuple[Path, ...], asked: OneLog, beside: CovariateOptions, output: IdentifyOutput) -> int:
     """Identify one log, or many together."""
-    from palpate.logs.formats import gather_logs, is_folder_of_logs, log_of, sheets_as_logs
-
     if not logs:
         raise InputError(
             "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
-    logs = sheets_as_logs(logs, asked.source.names, asked.source.limits)
-    if len(logs) == 1 and not is_folder_of_logs(logs[0]):
+    logs = formats.sheets_as_logs(logs, asked.source.names, asked.source.limits)
+    if len(logs) == 1 and not formats.is_folder_of_logs(logs[0]):
         if beside != CovariateOptions():
             raise InputError("--covariate is of several logs; name more than one, or a folder of them")
-        return _one(log_of(logs[0]), asked, output)
+        return _one(formats.log_of(logs[0]), asked, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")
     figure, page, table = output.png("pooled"), output.page(), output.paper_table()
-    logs = gather_logs(logs)
+    logs = formats.gather_logs(logs)
     known = beside.of(logs, asked.source)
     return many(logs, asked, known, (figure, page, table), json=output.json, dpi=output.dpi)
 

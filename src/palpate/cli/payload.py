@@ -11,10 +11,10 @@ from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, options, si
 from palpate.errors import InputError
 from palpate.files import write_text
+from palpate.records import Record
 
 if TYPE_CHECKING:
     from palpate.contact_frame.tool_payload import Weighed
-    from palpate.records import Record
 
 
 _ENDINGS = (".toml", ".script", ".json", ".yaml")

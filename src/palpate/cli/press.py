@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -249,13 +250,11 @@ def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int
 
 
 def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
-    from dataclasses import replace as changed
-
     from palpate.logs.tables.parquet import write_record
     from palpate.press.pressing import summarise
     from palpate.report.press import write_report
 
-    record = changed(record, meta={**record.meta, "command": printable(command())})
+    record = replace(record, meta={**record.meta, "command": printable(command())})
     summary = with_author({"command": printable(command()), **summarise(record, pressing.asked)})
     write_record(record, folder / RECORD)
     write_json(folder / "summary.json", summary)

@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.cli._program import print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import COMPILING, console, simulation_progress
-from palpate.cli.options.common import (
-    QUIET,
-    Experiment,
-    FigureOptions,
-    FolderOptions,
-    KnownOptions,
-    PluginOptions,
-    print_names,
-    source_of,
-)
+from palpate.cli.options import common
 from palpate.cli.options.values import WHOLE
 from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
@@ -35,14 +26,14 @@ if TYPE_CHECKING:
 
 
 def run(
-    name: Annotated[Experiment | None, QUIET] = None,
+    name: Annotated[common.Experiment | None, common.QUIET] = None,
     /,
     *,
     seed: Annotated[int, WHOLE] = 0,
-    known: KnownOptions | None = None,
-    own: PluginOptions | None = None,
-    output: FolderOptions | None = None,
-    drawn: FigureOptions | None = None,
+    known: common.KnownOptions | None = None,
+    own: common.PluginOptions | None = None,
+    output: common.FolderOptions | None = None,
+    drawn: common.FigureOptions | None = None,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
@@ -57,20 +48,24 @@ def run(
     seed
         Of the noise; the same seed gives the same numbers.
     """
-    known, output, drawn = known or KnownOptions(), output or FolderOptions(), drawn or FigureOptions()
+    known, output, drawn = (
+        known or common.KnownOptions(),
+        output or common.FolderOptions(),
+        drawn or common.FigureOptions(),
+    )
     from palpate.bench.from_experiment import FILES, load_any, parse_any
 
     if known.list_:
-        print_names(FILES, lambda one: load_any(one).title)
+        common.print_names(FILES, lambda one: load_any(one).title)
         return 0
-    source = source_of(FILES, name, "run", known.print_)
+    source = common.source_of(FILES, name, "run", known.print_)
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
     from palpate.bench.summary import DONE, INTERRUPTED
 
     drawn.check()
-    with (own or PluginOptions()).consent():
+    with (own or common.PluginOptions()).consent():
         experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
         with notice_signals() as interrupted:
             ran = _run(_RunRequest(name, source, experiment, seed), folder, output, drawn, interrupted)
@@ -107,8 +102,8 @@ class _RunRequest:
 def _run(
     asked: _RunRequest,
     folder: Path,
-    output: FolderOptions,
-    drawn: FigureOptions,
+    output: common.FolderOptions,
+    drawn: common.FigureOptions,
     interrupted: Callable[[], bool],
 ) -> _Ran:
     """Runs and writes the folder of results."""
@@ -143,7 +138,7 @@ def _draw(
     summary: dict[str, Any],
     found: Identification | None,
     source: str,
-    drawn: FigureOptions,
+    drawn: common.FigureOptions,
 ) -> None:
     """Figures, page and film of a run."""
     if "loop" in record.meta:

@@ -7,15 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from palpate.cli._program import command, print_result
+from palpate.cli.options import force
 from palpate.cli.options.common import ReportOption, read_found
-from palpate.cli.options.force import (
-    ColumnOptions,
-    LoopArmOptions,
-    PressOptions,
-    SlideTuningOptions,
-    SurfaceOptions,
-    TuningOutputOptions,
-)
 from palpate.cli.options.values import si
 from palpate.errors import InputError
 from palpate.files import write_text
@@ -29,12 +22,12 @@ def tune(
     found: Path | None = None,
     /,
     *,
-    arm: LoopArmOptions,
-    press: PressOptions,
-    surface: SurfaceOptions | None = None,
-    columns: ColumnOptions | None = None,
-    slide: SlideTuningOptions | None = None,
-    output: TuningOutputOptions | None = None,
+    arm: force.LoopArmOptions,
+    press: force.PressOptions,
+    surface: force.SurfaceOptions | None = None,
+    columns: force.ColumnOptions | None = None,
+    slide: force.SlideTuningOptions | None = None,
+    output: force.TuningOutputOptions | None = None,
     page: ReportOption | None = None,
 ) -> int:
     """Tune a force loop for an arm, and prove on which surfaces it is stable.
@@ -65,8 +58,8 @@ def tune(
     found
         The output of palpate identify --json, as a .json file; or a log.
     """
-    surface, columns = surface or SurfaceOptions(), columns or ColumnOptions()
-    output, report = output or TuningOutputOptions(), (page or ReportOption()).page()
+    surface, columns = surface or force.SurfaceOptions(), columns or force.ColumnOptions()
+    output, report = output or force.TuningOutputOptions(), (page or ReportOption()).page()
     output.check_new(output.out, ending=".toml")
     from palpate.force import tune as tune_loop
     from palpate.report.tuning import answer_of
@@ -82,14 +75,16 @@ def tune(
         surface_speed=surface.surface_speed,
         theta=None if theta is None else theta.high,
     )
-    told = replace(told, gains=(slide or SlideTuningOptions()).tuned_for(told.gains))
+    told = replace(told, gains=(slide or force.SlideTuningOptions()).tuned_for(told.gains))
     written = _write(told, output.out, report)
     loop = None if inner is None else inner.to_json() | ({"theta_s": theta.to_json()} if theta else {})
     print_result(answer_of(told, loop, written, verbose=output.verbose), json=output.json)
     return 0 if told.proved else 1
 
 
-def _surface_of(found: Path | None, surface: SurfaceOptions, columns: ColumnOptions) -> Known | None:
+def _surface_of(
+    found: Path | None, surface: force.SurfaceOptions, columns: force.ColumnOptions
+) -> Known | None:
     from palpate.force import Known, known_from
     from palpate.from_log import log_identifier
 

@@ -3,23 +3,14 @@
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
+from palpate.contact_frame import weighing
 from palpate.contact_frame.free_motion import BLOCKS, FEWEST, Vector, free_inertia, read_rows
 from palpate.contact_frame.load import Payload
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
-from palpate.contact_frame.weighing import (
-    Estimated,
-    PoseFit,
-    Poses,
-    WeighingFit,
-    fit_centre,
-    fit_force,
-    groups_of,
-    poses_of,
-)
 from palpate.contact_frame.weighing_checks import noise_of, notes_against
 from palpate.errors import InputError
 from palpate.records import Record, Result
@@ -51,7 +42,7 @@ class Weighed(Result):
     """
 
     payload: Payload | None
-    parameters: dict[str, Estimated]
+    parameters: dict[str, weighing.Estimated]
     lacking: list[str]
     notes: list[dict[str, Any]]
     poses: int
@@ -60,8 +51,6 @@ class Weighed(Result):
 
     def to_json(self) -> dict[str, Any]:
         """As plain JSON values."""
-        import msgspec
-
         told = {
             name: {
                 "value": one.value.tolist(),
@@ -123,10 +112,10 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     )
 
 
-def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> PoseFit:
+def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> weighing.PoseFit:
     time = signals.time[there] - signals.time[there].mean()
     turns, force = signals.rotations[there], signals.force[there]
-    poses = poses_of(time, turns, force, groups_of(turns))
+    poses = weighing.poses_of(time, turns, force, weighing.groups_of(turns))
     fitted = _fit_with_drift(poses, tolerance)
     parameters = {"mass": fitted.mass, "weight": fitted.weight, "bias": fitted.bias}
     if fitted.drift is not None:
@@ -135,11 +124,14 @@ def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> PoseFit:
         parameters |= _centre(signals, there, time, poses, fitted)
     left = force - _model_force(time, turns, fitted)
     means = np.add.reduceat(left, poses.first, axis=0) / poses.count[:, None]
-    return PoseFit(poses, fitted, parameters, means)
+    return weighing.PoseFit(poses, fitted, parameters, means)
 
 
 def _at_rest(
-    signals: BaseSignals, fitted: WeighingFit, parameters: dict[str, Estimated], frame: ContactFrame
+    signals: BaseSignals,
+    fitted: weighing.WeighingFit,
+    parameters: dict[str, weighing.Estimated],
+    frame: ContactFrame,
 ) -> BaseSignals:
     """Force and torque without the tool's inertia; unchanged if it is not determined."""
     from scipy.signal import savgol_filter
@@ -160,35 +152,35 @@ def _at_rest(
     return replace(signals, force=signals.force + added, torque=torque)
 
 
-def _centre_of(signals: BaseSignals, parameters: dict[str, Estimated], frame: ContactFrame) -> Array:
+def _centre_of(signals: BaseSignals, parameters: dict[str, weighing.Estimated], frame: ContactFrame) -> Array:
     """Where the centre of mass is, in the base [m], shape (n, 3); the sensor if it is not determined."""
     at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
     place: Array = signals.place + signals.rotations @ at
     return place
 
 
-def _fit_with_drift(poses: Poses, tolerance: float) -> WeighingFit:
+def _fit_with_drift(poses: weighing.Poses, tolerance: float) -> weighing.WeighingFit:
     """With a drift if the poses determine it beside the weight, without one otherwise."""
     if len(poses.count) < _FEWEST:
-        return fit_force(poses, drift=False)
-    with_drift, without = fit_force(poses, drift=True), fit_force(poses, drift=False)
+        return weighing.fit_force(poses, drift=False)
+    with_drift, without = weighing.fit_force(poses, drift=True), weighing.fit_force(poses, drift=False)
     return (
         with_drift if _determines(with_drift, tolerance) or not _determines(without, tolerance) else without
     )
 
 
-def _determines(fitted: WeighingFit, tolerance: float) -> bool:
+def _determines(fitted: weighing.WeighingFit, tolerance: float) -> bool:
     mass = fitted.mass
     return bool(np.isfinite(mass.half) and float(mass.half) <= max(tolerance * float(mass.value), 1e-3))
 
 
-def _model_force(time: Array, turns: Array, fitted: WeighingFit) -> Array:
+def _model_force(time: Array, turns: Array, fitted: weighing.WeighingFit) -> Array:
     whole = np.where(np.isfinite(fitted.whole), fitted.whole, 0.0)
     force: Array = np.einsum("nji,j->ni", turns, whole[:3]) + whole[3:6]
     return force + time[:, None] * whole[6:] if len(whole) > 6 else force
 
 
-def _lacking(poses: Poses, fitted: WeighingFit, tolerance: float) -> list[str]:
+def _lacking(poses: weighing.Poses, fitted: weighing.WeighingFit, tolerance: float) -> list[str]:
     """The undetermined direction, and the motion to add."""
     if _determines(fitted, tolerance) and poses.effective > 2.0:
         return []
@@ -219,8 +211,8 @@ def _lacking(poses: Poses, fitted: WeighingFit, tolerance: float) -> list[str]:
 
 
 def _centre(
-    signals: BaseSignals, there: Mask, time: Array, poses: Poses, fitted: WeighingFit
-) -> dict[str, Estimated]:
+    signals: BaseSignals, there: Mask, time: Array, poses: weighing.Poses, fitted: weighing.WeighingFit
+) -> dict[str, weighing.Estimated]:
     """Centre of mass and bias of the torque, if there is one."""
     if (
         signals.torque is None
@@ -228,8 +220,8 @@ def _centre(
         or not np.ptp(signals.torque[there])
     ):
         return {}
-    own = poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
-    found = fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
+    own = weighing.poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
+    found = weighing.fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
     centre = found.jackknife(found.left_out[:, :3], found.whole[:3], "m")
     if not np.isfinite(centre.half).all():
         return {}
@@ -238,10 +230,12 @@ def _centre(
     std = np.hypot(centre.std, scale * np.abs(centre.value))
     half = np.hypot(centre.half, float(fitted.mass.half / fitted.mass.value) * np.abs(centre.value))
     bias = found.jackknife(found.left_out[:, 3:6], found.whole[3:6], "N m")
-    return {"centre": Estimated(centre.value, std, half, "m"), "torque_bias": bias}
+    return {"centre": weighing.Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 
-def _inertia(signals: BaseSignals, fit: PoseFit, frame: ContactFrame) -> dict[str, Estimated]:
+def _inertia(
+    signals: BaseSignals, fit: weighing.PoseFit, frame: ContactFrame
+) -> dict[str, weighing.Estimated]:
     """The mass by which the force follows the acceleration, if the tool is shaken."""
     from scipy.special import stdtrit
 
@@ -257,7 +251,7 @@ def _inertia(signals: BaseSignals, fit: PoseFit, frame: ContactFrame) -> dict[st
         return {}
     value, std = found
     return {
-        "inertia": Estimated(
+        "inertia": weighing.Estimated(
             np.array(value), np.array(std), np.array(float(stdtrit(BLOCKS - 1, 0.975)) * std), "kg"
         )
     }
@@ -275,11 +269,11 @@ def side_of(weight: Array) -> float | None:
 
 
 def _payload(
-    parameters: dict[str, Estimated],
+    parameters: dict[str, weighing.Estimated],
     signals: BaseSignals,
     frame: ContactFrame,
     force: Array,
-    first: NDArray[np.intp],
+    first: Indices,
 ) -> Payload:
     def vector(name: str) -> Vector | None:
         return _three(parameters[name].value) if name in parameters else None

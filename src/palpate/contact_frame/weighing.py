@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.units import GRAVITY
 
 APART = np.radians(30.0)
@@ -57,7 +56,7 @@ class Poses:
         in_base: mean of the signal turned into the base, likewise.
     """
 
-    first: NDArray[np.intp]
+    first: Indices
     count: Array
     turns: Array
     turns_t: Array
@@ -72,7 +71,7 @@ class Poses:
         return float(self.count.sum() ** 2 / (self.count**2).sum())
 
 
-def groups_of(rotations: Array, apart: float = APART) -> NDArray[np.intp]:
+def groups_of(rotations: Array, apart: float = APART) -> Indices:
     """Rows at which another orientation begins, by so much [rad], of rotations of shape (n, 3, 3)."""
     begins, at = [0], 0
     limit = 1.0 + 2.0 * np.cos(apart)
@@ -88,7 +87,7 @@ def groups_of(rotations: Array, apart: float = APART) -> NDArray[np.intp]:
     return np.array(begins)
 
 
-def poses_of(time: Array, rotations: Array, signal: Array, first: NDArray[np.intp]) -> Poses:
+def poses_of(time: Array, rotations: Array, signal: Array, first: Indices) -> Poses:
     """Means over each stretch; `time` is counted from the middle of the log."""
     count = np.diff(np.r_[first, len(time)]).astype(float)
 

@@ -4,20 +4,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
+from palpate.contact_frame import weighing
 from palpate.contact_frame.free_motion import CHANCE, wrong_sign
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
-from palpate.contact_frame.weighing import (
-    Estimated,
-    PoseFit,
-    Poses,
-    WeighingFit,
-    groups_of,
-    poses_of,
-    solve_force,
-)
 from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
 
@@ -28,7 +19,7 @@ _FINE = np.radians(2.0)
 
 
 def notes_against(
-    record: Record, frame: ContactFrame, signals: BaseSignals, there: Mask, fit: PoseFit
+    record: Record, frame: ContactFrame, signals: BaseSignals, there: Mask, fit: weighing.PoseFit
 ) -> list[dict[str, Any]]:
     """Notes, as a record's meta has them.
 
@@ -52,7 +43,9 @@ def notes_against(
     return notes
 
 
-def _saturation_notes(signals: BaseSignals, there: Mask, fitted: WeighingFit) -> list[dict[str, Any]]:
+def _saturation_notes(
+    signals: BaseSignals, there: Mask, fitted: weighing.WeighingFit
+) -> list[dict[str, Any]]:
     """Axes that rest at their extreme value while the weight turns in the sensor."""
     weight = np.einsum("nji,j->ni", signals.rotations[there], fitted.whole[:3])
     stuck = 0
@@ -66,19 +59,26 @@ def _saturation_notes(signals: BaseSignals, there: Mask, fitted: WeighingFit) ->
 
 
 def _another_frame(
-    record: Record, frame: ContactFrame, signals: BaseSignals, there: Mask, poses: Poses, fitted: WeighingFit
+    record: Record,
+    frame: ContactFrame,
+    signals: BaseSignals,
+    there: Mask,
+    poses: weighing.Poses,
+    fitted: weighing.WeighingFit,
 ) -> list[dict[str, Any]]:
     """Whether the forces fit another reading of the poses, or of the axes, so much better that chance is out."""
     if _misfit(poses, fitted.whole) < _by_noise(signals.force[there], poses):
         return []
     time, turns = signals.time[there] - signals.time[there].mean(), signals.rotations[there]
-    fine = poses_of(time, turns, signals.force[there], groups_of(turns, _FINE))
-    own = _misfit(fine, solve_force(fine, drift=len(fitted.whole) > 6))
+    fine = weighing.poses_of(time, turns, signals.force[there], weighing.groups_of(turns, _FINE))
+    own = _misfit(fine, weighing.solve_force(fine, drift=len(fitted.whole) > 6))
     readings = {
         "the pose is of the base in the tool: give its inverse": _invert(fine),
         **_in_other_axes(record, frame, fine),
     }
-    found = [(_misfit(other, solve_force(other, drift=False)), text) for text, other in readings.items()]
+    found = [
+        (_misfit(other, weighing.solve_force(other, drift=False)), text) for text, other in readings.items()
+    ]
     turn = _best_rotation(fine)
     if turn is not None:
         rpy, misfit = turn
@@ -105,13 +105,13 @@ def _better(own: float, other: float, rows: int) -> bool:
     return dof > 0 and own > max(other, 1e-12) * float(fdtri(dof, dof, 1 - CHANCE))
 
 
-def noise_of(force: Array, first: NDArray[np.intp]) -> float:
+def noise_of(force: Array, first: Indices) -> float:
     """Standard deviation of a reading of an axis [N], by the steps between readings of one orientation."""
     steps = np.delete(np.diff(force, axis=0), first[1:] - 1, axis=0)
     return float(np.sqrt(np.mean(steps**2) / 2.0)) if len(steps) else 0.0
 
 
-def _by_noise(force: Array, poses: Poses) -> float:
+def _by_noise(force: Array, poses: weighing.Poses) -> float:
     """The largest mean square of the orientations' means that white noise of the readings leaves by chance [N^2]."""
     from scipy.special import chdtri
 
@@ -120,7 +120,7 @@ def _by_noise(force: Array, poses: Poses) -> float:
     return noise_of(force, poses.first) ** 2 * len(poses.count) / poses.count.sum() * share
 
 
-def _misfit(poses: Poses, whole: Array) -> float:
+def _misfit(poses: weighing.Poses, whole: Array) -> float:
     """Mean square of the residuals of the orientations' means [N^2]."""
     left = poses.signal - np.einsum("gji,j->gi", poses.turns, whole[:3]) - whole[3:6]
     if len(whole) > 6:
@@ -128,13 +128,13 @@ def _misfit(poses: Poses, whole: Array) -> float:
     return float(np.average((left**2).mean(axis=1), weights=poses.count))
 
 
-def _invert(poses: Poses) -> Poses:
+def _invert(poses: weighing.Poses) -> weighing.Poses:
     turns = poses.turns.transpose(0, 2, 1)
     in_base = np.einsum("gij,gj->gi", turns, poses.signal)
     return replace(poses, turns=turns, turns_t=poses.turns_t.transpose(0, 2, 1), in_base=in_base)
 
 
-def _in_other_axes(record: Record, frame: ContactFrame, poses: Poses) -> dict[str, Poses]:
+def _in_other_axes(record: Record, frame: ContactFrame, poses: weighing.Poses) -> dict[str, weighing.Poses]:
     """The wrench read in the base's axes if declared in the tool's, and the other way round."""
     found = {}
     for axes in ("base", "tool"):
@@ -144,11 +144,11 @@ def _in_other_axes(record: Record, frame: ContactFrame, poses: Poses) -> dict[st
         rows = np.isfinite(other.force).all(axis=1)
         time = other.time[rows] - other.time[rows].mean()
         text = f"the wrench is in the {axes}'s axes: --wrench-frame {axes}"
-        found[text] = poses_of(time, other.rotations[rows], other.force[rows], poses.first)
+        found[text] = weighing.poses_of(time, other.rotations[rows], other.force[rows], poses.first)
     return found
 
 
-def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
+def _best_rotation(poses: weighing.Poses) -> tuple[Array, float] | None:
     """Roll, pitch and yaw [rad] of the best rotation of the wrench's axes, and the residual [N^2]."""
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
@@ -164,7 +164,7 @@ def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
     starts = []
     for turn in Rotation.create_group("O"):  # with the turn held, all else is linear
         other = _in_axes(poses, turn.as_matrix())
-        fit = solve_force(other, drift=False)
+        fit = weighing.solve_force(other, drift=False)
         if np.isfinite(fit).all():
             start = np.r_[turn.as_rotvec(), fit[:3], turn.inv().apply(fit[3:6])]
             starts.append((_misfit(other, fit), start))
@@ -176,14 +176,14 @@ def _best_rotation(poses: Poses) -> tuple[Array, float] | None:
     return Rotation.from_rotvec(best.x[:3]).as_euler("xyz"), 2.0 * float(best.cost)
 
 
-def _in_axes(poses: Poses, turn: Array) -> Poses:
+def _in_axes(poses: weighing.Poses, turn: Array) -> weighing.Poses:
     """The wrench in axes that are rotated against the declared ones."""
     signal = poses.signal @ turn.T
     in_base = np.einsum("gij,gj->gi", poses.turns, signal)
     return replace(poses, signal=signal, signal_t=poses.signal_t @ turn.T, in_base=in_base)
 
 
-def _touch_notes(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]]:
+def _touch_notes(time: Array, poses: weighing.Poses, means: Array) -> list[dict[str, Any]]:
     """An interval whose force contradicts the prediction from the others."""
     from scipy.special import fdtri
 
@@ -204,7 +204,7 @@ def _touch_notes(time: Array, poses: Poses, means: Array) -> list[dict[str, Any]
     return [{"code": "not-free", "text": text}]
 
 
-def _inertia(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
+def _inertia(parameters: dict[str, weighing.Estimated]) -> list[dict[str, Any]]:
     if "inertia" not in parameters:
         return []
     found, mass = parameters["inertia"], parameters["mass"]
@@ -226,7 +226,7 @@ def _inertia(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
     return []
 
 
-def _tare_notes(parameters: dict[str, Estimated]) -> list[dict[str, Any]]:
+def _tare_notes(parameters: dict[str, weighing.Estimated]) -> list[dict[str, Any]]:
     size = float(np.linalg.norm(parameters["bias"].value))
     weight = float(np.linalg.norm(parameters["weight"].value))
     if size <= weight:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import AnyArray
 from palpate.errors import InputError
 from palpate.files.reading import COPIES, OWN, ReadingBudget
 
@@ -29,7 +29,7 @@ _TOO_LARGE = 3
 
 def read_confined(
     reader: str, path: Path, what: str, budget: ReadingBudget, question: Any = None
-) -> tuple[dict[str, NDArray[Any]], Any]:
+) -> tuple[dict[str, AnyArray], Any]:
     """Read a file in a process of its own.
 
     Args:
@@ -74,7 +74,7 @@ def read_confined(
     return arrays, about["also"]
 
 
-def _answer(arrays: Mapping[str, NDArray[Any]], also: Any) -> bytes:
+def _answer(arrays: Mapping[str, AnyArray], also: Any) -> bytes:
     about = np.frombuffer(json.dumps({"names": list(arrays), "also": also}).encode(), np.uint8)
     file = io.BytesIO()
     np.savez(file, about=about, **{str(i): array for i, array in enumerate(arrays.values())})  # type: ignore[arg-type]

@@ -205,7 +205,8 @@ def _rows_of(stays: list[tuple[int, int]]) -> tuple[NDArray[np.intp], NDArray[np
 
 def _medians(values: Array, number: NDArray[np.intp]) -> Array:
     """Of the values of each number, which only grows."""
-    return np.array([np.median(own) for own in np.split(values, np.flatnonzero(np.diff(number)) + 1)])
+    ordered = [np.sort(own) for own in np.split(values, np.flatnonzero(np.diff(number)) + 1)]
+    return np.array([(own[(len(own) - 1) // 2] + own[len(own) // 2]) / 2 for own in ordered])
 
 
 def _slope(

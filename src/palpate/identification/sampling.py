@@ -147,12 +147,15 @@ def _without_spikes(force: Array, rounding: float, warnings: list[Warn]) -> Arra
 
 def last_digit(values: Array) -> float:
     """The step whose multiples all readings are: what a log of few digits was rounded to; 0 if there is none."""
-    found = np.unique(values[np.isfinite(values)])
-    steps = np.diff(found)
-    least = _ROUNDED * float(np.spacing(np.abs(found).max()))
-    if len(found) < _FEWEST or float(steps.min()) <= least:
+    seen = values[np.isfinite(values)]
+    least = _ROUNDED * float(np.spacing(np.abs(seen).max()))
+    for some in (seen[: 50 * _FEWEST], seen):  # a log of all digits is told by its first rows
+        found = np.unique(some)
+        step = float(np.diff(found).min(initial=np.inf))
+        if step <= least:
+            return 0.0
+    if len(found) < _FEWEST:
         return 0.0
-    step = float(steps.min())
     whole = np.rint((found - found[0]) / step)
     step = float((found[-1] - found[0]) / whole[-1])  # the mean of many is finer than one
     return step if float(np.abs(found - found[0] - whole * step).max()) < _WHOLE * step else 0.0
@@ -278,7 +281,8 @@ def _leave_saturated(
 
 def _rate(time: Array) -> float:
     """Readings per second, long gaps left aside."""
-    step = np.diff(np.unique(time))
+    step = np.diff(time)
+    step = step[step > 0]
     usual = step[step <= 3 * np.median(step)]
     return float(1 / usual.mean())
 

@@ -10,18 +10,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
+from palpate.logs import roles
 from palpate.logs.formats import Kind, bag_reader, kind_of, open_table
-from palpate.logs.roles import (
-    Loaded,
-    check_apart,
-    check_quantity,
-    check_range,
-    epoch_unit,
-    family,
-    implausible_times,
-    quantity,
-    si_unit,
-)
 from palpate.logs.tables.parquet import read_record, stored_about
 from palpate.logs.tables.sheet import Sheet, Stated, find_sentinel, own_columns, read_frame
 from palpate.records import Record
@@ -87,13 +77,13 @@ def read_log(
             loaded = bag_reader().from_bag(bag, columns, missing, held)
     else:
         loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
-    check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
+    roles.check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
     if "time" in columns:
-        loaded.notes += implausible_times(loaded.columns, loaded.start, columns["time"])
+        loaded.notes += roles.implausible_times(loaded.columns, loaded.start, columns["time"])
     return _record(loaded, path, start, end)
 
 
-def _record(loaded: Loaded, path: Path, start: float | None, end: float | None) -> Record:
+def _record(loaded: roles.Loaded, path: Path, start: float | None, end: float | None) -> Record:
     meta: dict[str, Any] = {"source": str(path), "start_s": loaded.start, "notes": loaded.notes}
     if loaded.facts:
         meta["facts"] = loaded.facts
@@ -230,19 +220,19 @@ _LOSSLESS = 2.0**53
 
 def from_table(
     table: Sheet, columns: Mapping[str, str], rate: float | None, missing: Sequence[str | float]
-) -> Loaded:
+) -> roles.Loaded:
     """The columns asked for, by role as `NAME` or `NAME:UNIT`; time from its column or from the rows per second.
 
     Raises:
         InputError: a fault in the file or with these arguments.
     """
     places = {role: table.resolve(split_spec(spec)[0]) for role, spec in columns.items()}
-    check_apart(places, {role: table.names[place] for role, place in places.items()}, table.path)
+    roles.check_apart(places, {role: table.names[place] for role, place in places.items()}, table.path)
     words = [str(word) for word in missing]
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
     if not len(next(iter(arrays.values()))):
         raise InputError(f"{table.path} holds a header and no rows; give a log with a row for each sample")
-    loaded = Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
+    loaded = roles.Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
     origin = _from_first(table, places, arrays)
     for role, spec in columns.items():
         name, stated = table.names[places[role]], table.stated.get(table.names[places[role]], Stated(None))
@@ -280,7 +270,7 @@ def _from_first(table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Ar
 def _epoch(time: Array, origin: float) -> str | None:
     """The unit in which a time counts from 1970; None if it does not."""
     steps = np.diff(time[:1000])
-    return epoch_unit(origin + float(time[0]), float(np.median(steps)) if len(steps) else 0.0)
+    return roles.epoch_unit(origin + float(time[0]), float(np.median(steps)) if len(steps) else 0.0)
 
 
 def _symbol(
@@ -295,19 +285,19 @@ def _symbol(
             raise InputError(
                 f"{name!r} holds dates and times, which are read as seconds; leave :{symbol} out"
             )
-        check_quantity(role, name, "s")
+        roles.check_quantity(role, name, "s")
         return "s"
     if symbol is not None:
-        check_quantity(role, name, symbol)
+        roles.check_quantity(role, name, symbol)
         _note_contradiction(name, symbol, own, role, stated, notes)
         return symbol
     if stated.unit is not None:
-        check_quantity(role, name, stated.unit)
+        roles.check_quantity(role, name, stated.unit)
         if stated.where:
             text = f"{name!r} is taken in {stated.unit}, by {stated.where}; give {name}:UNIT if that is wrong"
             notes.append({"code": "unit-stated", "text": text})
         return stated.unit
-    guess, why = unit_in_name(own, quantity(role)), "its name"
+    guess, why = unit_in_name(own, roles.quantity(role)), "its name"
     if guess is None and epoch:
         guess, why = epoch, "its values, which then are dates"
     if guess and unit(guess).factor != 1.0:
@@ -318,7 +308,7 @@ def _symbol(
     if other:
         text = f"{role} is read from {own!r}, whose name says {other}, a unit of {unit(other).quantity}"
         notes.append({"code": "columns-swapped", "text": f"{text}: is it the right column?"})
-    return si_unit(role)
+    return roles.si_unit(role)
 
 
 def _note_contradiction(
@@ -327,7 +317,7 @@ def _note_contradiction(
     """Note that a unit is another than the column's name carries, or the file states."""
     other, where = (stated.unit, stated.where) if stated.unit and stated.where else (None, "its name")
     if other is None and name == own:  # a column that is named by its number is meant so
-        other = unit_in_name(own, quantity(role))
+        other = unit_in_name(own, roles.quantity(role))
     if other and unit(symbol) != unit(other):
         text = f"{name!r} is taken in {symbol} as given, but {where} says {other}: is it {name}:{other}?"
         notes.append({"code": "unit-doubtful", "text": text})
@@ -335,8 +325,8 @@ def _note_contradiction(
 
 def _other_unit(role: str, name: str) -> str | None:
     """A unit that a column's name carries, of a quantity that the role is not."""
-    others = {"time", "length", "force"} - {quantity(role)}
-    if family(role) not in {"time", "position", "force"}:
+    others = {"time", "length", "force"} - {roles.quantity(role)}
+    if roles.family(role) not in {"time", "position", "force"}:
         return None
     return next((symbol for other in sorted(others) if (symbol := unit_in_name(name, other))), None)
 
@@ -363,7 +353,7 @@ def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str,
     return notes
 
 
-def _time(table: Sheet, arrays: dict[str, Array], rate: float | None, loaded: Loaded) -> float:
+def _time(table: Sheet, arrays: dict[str, Array], rate: float | None, loaded: roles.Loaded) -> float:
     """Make time start at 0, so that unix time keeps its digits; make it from the rate where there is no column."""
     if "time" not in arrays:
         arrays["time"] = np.arange(len(next(iter(arrays.values())))) / _rate(table, rate, loaded)
@@ -381,7 +371,7 @@ def _time(table: Sheet, arrays: dict[str, Array], rate: float | None, loaded: Lo
     return origin
 
 
-def _rate(table: Sheet, rate: float | None, loaded: Loaded) -> float:
+def _rate(table: Sheet, rate: float | None, loaded: roles.Loaded) -> float:
     """Rows per second: said, or stated in the file."""
     if rate is None and table.rate is not None:
         loaded.facts.append(

@@ -10,16 +10,21 @@ from palpate.contact_frame.load import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
+from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
+from palpate.press import sequence
+from palpate.press.by_torque import CONTROLLERS, ByTorque
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
-from palpate.press.pressing import CAUTIOUS, CONTROLLERS, Asked, Progress, driver_of, press
-from palpate.press.sequence import SURE, Plan, check_drift, check_range, fitting, noise_and_drift, plan_for
+from palpate.press.pressing import Asked, Progress, press
+from palpate.press.sequence import SURE, Plan
 from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
+from palpate.robots.serial.loading import mujoco
 from palpate.robots.serial.serial_arm import SerialArm
 
+CAUTIOUS = "cautious"
 _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
@@ -83,12 +88,26 @@ class Pressing:
         if asked.payload is not None:
             arm.tare()
             most = self.plan.force + SURE * loop.sensor.noise
-            check_range(abs(arm.zero), most, loop.sensor.full_scale)
+            sequence.check_range(abs(arm.zero), most, loop.sensor.full_scale)
         gains = fit_gains(asked.gains, resting.at_rest(), self.plan)
-        driver = driver_of(asked.controller, arm, gains, asked.place, self.plan.force)
+        driver = _driver(asked, arm, gains, self.plan.force)
         record = press(arm, driver, asked.place, self.plan, progress)
         meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
         return Record(record.columns, record.units, meta)
+
+
+def _driver(asked: Asked, arm: SimulatedArm, gains: Gains, force: float) -> sequence.PressDriver:
+    """The driver of the controller asked for.
+
+    Raises:
+        InputError: no such controller; one of torques on an arm of positions.
+    """
+    name, place = asked.controller, asked.place
+    if name == CAUTIOUS:
+        return sequence.CautiousDriver(arm, ForceLoop(gains), place.normal)
+    if gains.arm.kind != "torque":
+        raise InputError(f"--controller {name} gives torques, and the arm takes positions; add --mode torque")
+    return ByTorque(arm, place, name, gains.approach, 8.0 * gains.arm.sensor.noise, force)
 
 
 def fit_gains(gains: Gains, shown: Array, plan: Plan) -> Gains:
@@ -102,9 +121,11 @@ def fit_gains(gains: Gains, shown: Array, plan: Plan) -> Gains:
     Raises:
         InputError: a drift, or a noise, with which there is no press.
     """
-    noise, drift, std = noise_and_drift(gains.arm.tick * np.arange(len(shown), dtype=np.float64), shown)
-    check_drift(drift, std, plan.force, plan.longest + plan.seconds, gains.arm.sensor)
-    return fitting(gains, noise, len(shown)) or gains
+    noise, drift, std = sequence.noise_and_drift(
+        gains.arm.tick * np.arange(len(shown), dtype=np.float64), shown
+    )
+    sequence.check_drift(drift, std, plan.force, plan.longest + plan.seconds, gains.arm.sensor)
+    return sequence.fitting(gains, noise, len(shown)) or gains
 
 
 def prepare_press(question: Question) -> Pressing:
@@ -126,7 +147,9 @@ def prepare_press(question: Question) -> Pressing:
         arm=arm, gains=gains, place=place, surface=question.surface, controller=question.controller,
         physics=question.physics, seed=question.seed, payload=question.payload, notes=tuple(notes),
     )  # fmt: skip
-    return Pressing(asked, plan_for(question.force, question.seconds, question.probe, GAP, gains.approach))
+    return Pressing(
+        asked, sequence.plan_for(question.force, question.seconds, question.probe, GAP, gains.approach)
+    )
 
 
 def _load(question: Question, arm: SerialArm) -> SerialArm:
@@ -202,11 +225,9 @@ def _check_words(question: Question) -> None:
         raise unknown("physics", question.physics, ENGINES)
     if question.mode is not None and question.mode not in MODES:
         raise unknown("mode", question.mode, MODES)
-    if question.controller not in CONTROLLERS:
-        raise unknown("controller", question.controller, CONTROLLERS)
+    if question.controller not in {CAUTIOUS, *CONTROLLERS}:
+        raise unknown("controller", question.controller, (CAUTIOUS, *CONTROLLERS))
     if question.physics == "mujoco":
-        from palpate.robots.serial.loading import mujoco
-
         mujoco()
 
 

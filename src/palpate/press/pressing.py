@@ -1,4 +1,4 @@
-"""A simulated press: its drivers, its record, and its summary with the keys of `palpate run`."""
+"""A simulated press: its record, and its summary with the keys of `palpate run`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -6,130 +6,25 @@ from typing import Any
 
 import numpy as np
 
-from palpate._vector import ZERO3, Vec3, Vec6
 from palpate.arrays import Array
-from palpate.bench.summary import (
-    APPROACH,
-    CONTACT,
-    DIVERGED,
-    DONE,
-    INTERRUPTED,
-    LOST,
-    LOST_CONTACT,
-    NO_CONTACT,
-    WINDOW,
-    Ending,
-    force_figures,
-    losses,
-)
+from palpate.bench import summary
 from palpate.contact_frame.arm import identify_contact
 from palpate.contact_frame.load import Payload
-from palpate.controllers import Hybrid, Impedance, ProportionalIntegral, ResolvedAcceleration
-from palpate.controllers.proportional_integral import integral_gain
 from palpate.environments.kelvin_voigt import KelvinVoigt
-from palpate.errors import InputError, unknown
+from palpate.errors import InputError
 from palpate.force.arm import PositionLoop
-from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.press.engines import series_of
-from palpate.press.sequence import Action, CautiousDriver, Plan, PressDriver, PressSequence, Tick, TipSample
+from palpate.press.sequence import Action, Plan, PressDriver, PressSequence, Tick, TipSample
 from palpate.press.setting import Place, held_tool
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.records import Record
 from palpate.robots.serial.serial_arm import SerialArm
-from palpate.signals.types import Task, alike, triple
-
-CAUTIOUS = "cautious"
-CONTROLLERS = (CAUTIOUS, "hybrid", "proportional-integral", "impedance")
-_POSITION, _RATE = 400.0, 40.0
-"""K_pp [1/s^2] and K_pv [1/s] of the directions that hold their place: 3 Hz, critically damped."""
-_BANDWIDTH = 0.25
-"""Of the proportional-integral controller [Hz]: a fifth of B/m, what a surface of 50 N s/m and a tip of 6 kg bear."""
-_GIVING = 2000.0
-"""Stiffness of the impedance [N/m]."""
-
-
-class ByTorque:
-    """A controller of `palpate.controllers` in six directions on the simulated arm: it approaches, and then presses.
-
-    Args:
-        arm: of torques.
-        place: where it starts.
-        controller: by name.
-        speed: of the approach [m/s].
-        switch: reading above which the controller takes over, eight deviations of the noise [N].
-        force: that the impedance's target is placed for [N].
-    """
-
-    def __init__(
-        self, arm: SimulatedArm, place: Place, controller: str, speed: float, switch: float, force: float
-    ):
-        self._arm, self._normal, self._speed, self._switch = arm, place.normal, speed, switch
-        at = place.axes @ place.pose[:3, 3]
-        self._at, self._gone, self._phase = triple(at), 0.0, APPROACH
-        self._approach = ResolvedAcceleration(_six(_POSITION), _six(_RATE))
-        self._controller = self._make(controller, place.place, force)
-
-    def _make(self, name: str, surface: float, force: float) -> Any:
-        tick = self._arm.loop.tick
-        held, rate, none = _six(_POSITION), _six(_RATE), _six(0.0)
-        if name == "hybrid":
-            return Hybrid(held, rate, _six(1.0), _six(0.003))
-        if name == "proportional-integral":
-            return ProportionalIntegral(held, rate, none, _six(integral_gain(_BANDWIDTH)), tick)
-        if name == "impedance":
-            inner: Any = self._arm.loop.inner  # of torques, so that it has a mass
-            damping = 1.4 * float(np.sqrt(_GIVING * inner.mass))
-            target: Any = Vec6(Vec3(surface + force / _GIVING, self._at.y, self._at.z), ZERO3)
-            return Impedance(_six(inner.mass), _six(damping), _six(_GIVING), target)
-        raise unknown("controller", name, CONTROLLERS)
-
-    def step(self, sample: TipSample, desired: float, since: float) -> Action:
-        """One tick, as `PressDriver` describes it."""
-        force = float(sample.force @ self._normal)
-        if self._phase == CONTACT and force <= 0.0:
-            self._phase = LOST
-            self._at = self._at._replace(x=float(self._normal @ sample.position))
-            self._gone = 0.0
-        elif force > self._switch:
-            self._phase = CONTACT
-        nothing = _six(0.0)
-        if self._phase == CONTACT:
-            at: Any = Vec6(self._at, ZERO3)
-            s: Any = Vec6(Vec3(1.0, 0.0, 0.0), ZERO3)
-            self._arm.act(self._controller, Task(at, nothing, nothing, desired * s, s))
-            return Action(CONTACT, 0.0, 0.0 * self._normal, 0.0)
-        self._gone += self._arm.loop.tick * self._speed
-        x: Any = Vec6(self._at + Vec3(self._gone, 0.0, 0.0), ZERO3)
-        xd: Any = Vec6(Vec3(self._speed, 0.0, 0.0), ZERO3)
-        self._arm.act(self._approach, Task(x, xd, nothing, nothing, nothing))
-        return Action(self._phase, self._speed, self._speed * self._normal, 0.0)
-
-
-def driver_of(name: str, arm: SimulatedArm, gains: Gains, place: Place, force: float) -> PressDriver:
-    """The driver of that name.
-
-    Raises:
-        InputError: no such controller; one of torques on an arm of positions.
-    """
-    if name == CAUTIOUS:
-        return CautiousDriver(arm, ForceLoop(gains), place.normal)
-    if name not in CONTROLLERS:
-        raise unknown("controller", name, CONTROLLERS)
-    if gains.arm.kind != "torque":
-        raise InputError(f"--controller {name} gives torques, and the arm takes positions; add --mode torque")
-    return ByTorque(arm, place, name, gains.approach, 8.0 * gains.arm.sensor.noise, force)
-
-
-def _six(value: float) -> Any:
-    """The same number in six directions; the types of tasks and controllers name those of three."""
-    return Vec6(alike(value), alike(value))
-
 
 Progress = Callable[[float, str], None]
 
-PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
+PHASES = {summary.APPROACH: "approach", summary.CONTACT: "contact", summary.LOST: "lost contact"}
 JOINT_LIMIT, TROUBLE = "joint limit", "trouble"
 _SHOWN = 200
 """Ticks between two looks at the progress."""
@@ -195,7 +90,7 @@ def press(
         except KeyboardInterrupt:
             if not rows.rows:
                 raise
-            ending = Ending(INTERRUPTED, f"interrupted at {k * arm.loop.tick:.3f} s")
+            ending = summary.Ending(summary.INTERRUPTED, f"interrupted at {k * arm.loop.tick:.3f} s")
             break
         row = _row(arm, place, tick, sequence.touch, k * arm.loop.tick)
         ending = _judge(arm, plan, row, tick.action, sequence, k)
@@ -207,7 +102,7 @@ def press(
 
 def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, time: float) -> Array:
     (_, force, position, *_), action, truth = tick.sample, tick.action, arm.truth
-    seen, pressing = place.axes @ position, action.phase == CONTACT
+    seen, pressing = place.axes @ position, action.phase == summary.CONTACT
     true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else seen
     reading = float(place.normal @ force)
     moved = seen[0] - float(place.normal @ touch.position) if touch is not None and pressing else 0.0
@@ -221,29 +116,35 @@ def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, t
 
 def _judge(
     arm: SimulatedArm, plan: Plan, row: Array, action: Action, sequence: PressSequence, k: int
-) -> Ending | None:
+) -> summary.Ending | None:
     tick, robot = arm.loop.tick, arm.arm
     if not np.isfinite(row).all():
-        return Ending(DIVERGED, f"the arm's motion is no finite number from {k * tick:.3f} s on")
+        return summary.Ending(
+            summary.DIVERGED, f"the arm's motion is no finite number from {k * tick:.3f} s on"
+        )
     q = row[2 : 2 + robot.joints]
     beyond = np.flatnonzero((q < robot.lower) | (q > robot.upper))
     if len(beyond):
-        return Ending(
+        return summary.Ending(
             JOINT_LIMIT, f"{robot.names[beyond[0]]} reached the end of its range at {k * tick:.3f} s"
         )
     if action.ended is not None:
-        return Ending(TROUBLE, f"{action.ended}; at {k * tick:.3f} s")
+        return summary.Ending(TROUBLE, f"{action.ended}; at {k * tick:.3f} s")
     if sequence.touch is None:
         late = (k + 1) * tick >= plan.longest
-        return Ending(NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s") if late else None
+        return (
+            summary.Ending(summary.NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s")
+            if late
+            else None
+        )
     if sequence.next_since < plan.seconds:
         return None
-    if action.phase != CONTACT:
-        return Ending(LOST_CONTACT, "the surface was lost, and not in contact at the end")
-    return Ending(DONE, "as asked for")
+    if action.phase != summary.CONTACT:
+        return summary.Ending(summary.LOST_CONTACT, "the surface was lost, and not in contact at the end")
+    return summary.Ending(summary.DONE, "as asked for")
 
 
-def _record(arm: SimulatedArm, rows: _Rows, ending: Ending) -> Record:
+def _record(arm: SimulatedArm, rows: _Rows, ending: summary.Ending) -> Record:
     units = rows.columns()
     for i, slides in enumerate(arm.arm.chain.slide, start=1):
         if slides:
@@ -342,9 +243,9 @@ class Asked:
 
 def summarise(record: Record, asked: Asked) -> dict[str, Any]:
     """Plain JSON values: how it went, the force, the motors' limits, what was identified, the truth."""
-    pressing, t = record["phase"] == CONTACT, record["t"]
+    pressing, t = record["phase"] == summary.CONTACT, record["t"]
     n = asked.arm.joints
-    summary: dict[str, Any] = {
+    result: dict[str, Any] = {
         "arm": asked.arm.title,
         "mode": asked.gains.arm.kind,
         "controller": asked.controller,
@@ -354,7 +255,7 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
         "seed": asked.seed,
         "duration_s": float(t[-1]) if len(t) else 0.0,
         "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,
-        "contacts_lost": losses(record),
+        "contacts_lost": summary.losses(record),
         "force": None,
         "tip": None,
         "saturated": {f"joint{i}": _mean(record[f"saturated{i}"]) for i in range(1, n + 1)},
@@ -369,15 +270,15 @@ def summarise(record: Record, asked: Asked) -> dict[str, Any]:
         "notes": list(asked.notes),
     }
     if pressing.any():
-        last = pressing & (t > t[pressing][-1] - WINDOW)
-        summary["force"] = force_figures(record, pressing, last)
+        last = pressing & (t > t[pressing][-1] - summary.WINDOW)
+        result["force"] = summary.force_figures(record, pressing, last)
         start = [record[name][0] for name in ("y", "z")]
         moved = [
             float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
         ]
-        summary["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
-        summary["identified"] = identification_of(record, asked)
-    return summary
+        result["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
+        result["identified"] = identification_of(record, asked)
+    return result
 
 
 def identification_of(record: Record, asked: Asked) -> dict[str, Any]:

@@ -12,23 +12,17 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.report import style
-from palpate.report.look.assets import (
-    ABSENT,
-    CHARTS,
-    DATA,
-    PAIRS,
-    SERIES,
-    TABLES,
-    data,
-    packed_column,
-    scripts,
-)
+from palpate.report.look import assets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = DATA | SERIES | {name: PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card")}
+COLOURS = (
+    assets.DATA
+    | assets.SERIES
+    | {name: assets.PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card")}
+)
 """Colours of what is drawn, by the tokens that a page turns to dark."""
 KNOWN: Mapping[str, Any] = {"colour": "ink", "width": 1.1, "dash": "--"}
 """Look of what is desired, or known to be true."""
@@ -243,7 +237,7 @@ def _panel(chart: Chart, x: str, most: int) -> dict[str, Any]:
         ends = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
         own = look(band) if is_line else _area(band)
         series.append(own | {key: f"{key}{len(series)}" for key in ends})
-        columns |= {series[-1][key]: packed_column(np.full(len(places), v)) for key, v in ends.items()}
+        columns |= {series[-1][key]: assets.packed_column(np.full(len(places), v)) for key, v in ends.items()}
     labels = [one["label"] for one in series]
     for i, (label, line) in enumerate(zip(labels, series, strict=True)):
         line["silent"] = not label or label in labels[:i]
@@ -308,18 +302,18 @@ def _join(lines: Sequence[tuple[Array, Array]], most: int) -> tuple[Array, list[
 def _column(values: Array, powers: bool) -> Any:
     """Packed; on a scale of powers as they are, for there the smallest count as much as the largest."""
     if not powers:
-        return packed_column(values)
+        return assets.packed_column(values)
     known = [None if not v > 0.0 else float(f"{v:.5g}") for v in values.tolist()]
-    return [ABSENT if np.isinf(v) else k for v, k in zip(values, known, strict=True)]
+    return [assets.ABSENT if np.isinf(v) else k for v, k in zip(values, known, strict=True)]
 
 
 def panel_scripts() -> tuple[str, ...]:
     """Scripts of a page's panels, which are read as JSON from `#panels`, by the id of their element."""
-    return scripts(*CHARTS, "panels.js")
+    return assets.scripts(*assets.CHARTS, "panels.js")
 
 
 def page_figures(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Figures for `page.html`, each an image (`source`) or `panels`, with a caption; and the scripts that they need."""
     drawn = {str(i): one["panels"] for i, one in enumerate(figures, 1) if "panels" in one}
-    codes = (*scripts(*TABLES), *panel_scripts()) if drawn else scripts(*TABLES)
-    return {"figures": figures, "panels": data(drawn) if drawn else "", "scripts": codes}
+    codes = (*assets.scripts(*assets.TABLES), *panel_scripts()) if drawn else assets.scripts(*assets.TABLES)
+    return {"figures": figures, "panels": assets.data(drawn) if drawn else "", "scripts": codes}

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report.look.assets import DATA, PAIRS
@@ -17,7 +16,7 @@ Panel = tuple[float, float, float, float]
 """Left, top, width and height of a part of the picture."""
 
 
-def frames_of(record: Record, before: float) -> NDArray[np.intp]:
+def frames_of(record: Record, before: float) -> Indices:
     """Rows evenly in time, from so many seconds before the first contact to the end."""
     t, pressing = record["t"], record["phase"] == CONTACT
     touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])

@@ -1,4 +1,4 @@
-"""A page that opens without a network: a sentence, what is wrong, cards, a scale, figures, and the rest folded."""
+"""A result as text, as a table in a notebook, and as a page that opens without a network."""
 
 from __future__ import annotations
 
@@ -6,19 +6,24 @@ import base64
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from html import escape
+from io import StringIO
 from math import ceil, floor, inf, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from palpate.files import SIGNATURE
+from palpate.files import SIGNATURE, check_place, write_text
+from palpate.report import style
 from palpate.report.chart import page_figures
+from palpate.report.look import assets
 from palpate.text import OPTION, printable
 from palpate.units import quantity
 
 if TYPE_CHECKING:
     from markupsafe import Markup
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -81,11 +86,15 @@ def render(template: str, *packages: str, **values: Any) -> str:
 
     from jinja2 import ChoiceLoader, Environment, PackageLoader
 
-    from palpate.report.look.assets import TABLES, policy, scripts, styles
-
-    codes = tuple(values.pop("scripts", scripts(*TABLES)))
+    codes = tuple(values.pop("scripts", assets.scripts(*assets.TABLES)))
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    values = {"styles": styles(), "scripts": codes, "policy": policy(codes), "made": now, **values}
+    values = {
+        "styles": assets.styles(),
+        "scripts": codes,
+        "policy": assets.policy(codes),
+        "made": now,
+        **values,
+    }
     folders = dict.fromkeys((*packages, "palpate.report"))
     loader = ChoiceLoader([PackageLoader(folder, "") for folder in folders])
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -291,3 +300,63 @@ def log_scale(
         "ticks": ticks,
         "mark": place(mark) if mark else None,
     }
+
+
+_NOTEBOOK = 100
+"""Letters of a line in a notebook."""
+
+
+def console_text(show: Callable[[Console], None]) -> str:
+    """Console output of a function, as plain text."""
+    file = StringIO()
+    show(Console(file=file, width=_NOTEBOOK, no_color=True, markup=False, emoji=False, highlight=False))
+    return printable("\n".join(line.rstrip() for line in file.getvalue().rstrip().splitlines()))
+
+
+def as_text(head: str, rows: Sequence[Sequence[str]]) -> str:
+    """A line, and a table of text under it, its columns as wide as they need to be."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+    return printable("\n".join([head, *(f"  {line}" for line in lines)]))
+
+
+def as_html(head: str, rows: Sequence[Sequence[str]], notes: Sequence[str] = ()) -> str:
+    """A line and a table for a notebook, the first row being the table's head: escaped, and without a script."""
+    table = [_html_row(row, "th" if i == 0 else "td") for i, row in enumerate(rows)]
+    parts = [f"<p><b>{_safe(head)}</b></p>", f"<table>{''.join(table)}</table>" if rows else ""]
+    return "<div>" + "".join([*parts, *(f"<p>{_safe(note)}</p>" for note in notes)]) + "</div>"
+
+
+def write_page(result: Any, page: Callable[[Any], str], path: Path) -> Path:
+    """Make and write a page of a result, atomically; a place that will not do is refused before.
+
+    Raises:
+        InputError: palpate may not write there, or the name has another ending.
+    """
+    check_place(path, ending=".html")
+    write_text(path, page(result))
+    return path
+
+
+def write_figure(result: Any, draw: Callable[[Any], Figure], path: Path) -> Figure:
+    """Draw and write a figure of a result, atomically; a place that will not do is refused before.
+
+    Raises:
+        InputError: palpate may not write there, or the name has another ending.
+    """
+    check_place(path)
+    drawn = draw(result)
+    style.save(drawn, path)
+    return drawn
+
+
+def _html_row(cells: Sequence[str], tag: str) -> str:
+    return (
+        "<tr>" + "".join(f'<{tag} style="text-align:left">{_safe(cell)}</{tag}>' for cell in cells) + "</tr>"
+    )
+
+
+def _safe(text: str) -> str:
+    return escape(printable(text), quote=True)

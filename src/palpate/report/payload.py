@@ -8,10 +8,8 @@ import numpy as np
 
 from palpate.contact_frame.tool_payload import Weighed
 from palpate.contact_frame.weighing import Estimated
+from palpate.report import page as pages
 from palpate.report import style
-from palpate.report.output import as_html, as_text
-from palpate.report.page import CommandAnswer, PageAnswer, Table, answer_page, data_address, warning_alerts
-from palpate.report.style import svg
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -32,14 +30,14 @@ _NAMES = {
 }
 
 
-def table(found: Weighed) -> Table:
+def table(found: Weighed) -> pages.Table:
     """Each number with its 95 % interval."""
     rows = [
         (_NAMES[name] + axis, f"{value:.4g}", _half(half), one.unit)
         for name, one in found.parameters.items()
         for axis, value, half in _parts(one)
     ]
-    return Table("", ("", "value", "+- 95 %", "unit"), rows)
+    return pages.Table("", ("", "value", "+- 95 %", "unit"), rows)
 
 
 def sentence(found: Weighed) -> str:
@@ -50,7 +48,7 @@ def sentence(found: Weighed) -> str:
     return f"The tool weighs {float(mass.value):.4g} +- {float(mass.half):.2g} kg (95 %, {found.poses} orientations)."
 
 
-def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfLoad]) -> CommandAnswer:
+def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfLoad]) -> pages.CommandAnswer:
     """The answer of `palpate payload`.
 
     Args:
@@ -67,10 +65,10 @@ def answer_of(found: Weighed, log: str, check: Path | None, rows: list[NumberOfL
         checked = {"file": str(check), "agrees": agrees, "numbers": numbers}
     if check is not None and rows:
         said, tables = f"{said} {check_sentence(check.name, rows)}", [*tables, check_table(rows)]
-    return CommandAnswer(found.to_json() | {"check": checked}, log, f": {said}", tables, notes)
+    return pages.CommandAnswer(found.to_json() | {"check": checked}, log, f": {said}", tables, notes)
 
 
-def check_table(rows: list[NumberOfLoad]) -> Table:
+def check_table(rows: list[NumberOfLoad]) -> pages.Table:
     """Each number of a load file beside the log's."""
     numbers = [
         (
@@ -83,7 +81,7 @@ def check_table(rows: list[NumberOfLoad]) -> Table:
         )
         for row in rows
     ]
-    return Table("", ("", "file", "log", "+- 95 %", "unit", "agrees"), numbers)
+    return pages.Table("", ("", "file", "log", "+- 95 %", "unit", "agrees"), numbers)
 
 
 def check_sentence(name: str, rows: list[NumberOfLoad]) -> str:
@@ -104,27 +102,27 @@ def line(found: Weighed) -> str:
 
 def text(found: Weighed) -> str:
     """The sentence and the table of `palpate payload`."""
-    return as_text(sentence(found), [table(found).head, *table(found).rows])
+    return pages.as_text(sentence(found), [table(found).head, *table(found).rows])
 
 
 def html(found: Weighed) -> str:
     """The same for a notebook."""
     rows = [table(found).head, *table(found).rows]
-    return as_html(sentence(found), rows, [note["text"] for note in found.notes])
+    return pages.as_html(sentence(found), rows, [note["text"] for note in found.notes])
 
 
 def page(found: Weighed, title: str = "a record") -> str:
     """The page of `palpate payload --report`."""
     caption = "The force in each orientation: measured (dots) and predicted from tool and bias (rings)"
-    answer = PageAnswer(
+    answer = pages.PageAnswer(
         title=f"Payload of the sensor, from {title}",
         sentence=sentence(found),
-        alerts=warning_alerts([*(note["text"] for note in found.notes), *found.lacking]),
+        alerts=pages.warning_alerts([*(note["text"] for note in found.notes), *found.lacking]),
         tables=[table(found)],
-        figures=[{"source": data_address(svg(draw(found)), "image/svg+xml"), "caption": caption}],
+        figures=[{"source": pages.data_address(style.svg(draw(found)), "image/svg+xml"), "caption": caption}],
         source=("The tool", "" if found.payload is None else found.payload.to_toml()),
     )
-    return answer_page(answer, room="payload", command=f"palpate payload {title}")
+    return pages.answer_page(answer, room="payload", command=f"palpate payload {title}")
 
 
 def _parts(one: Estimated) -> list[tuple[str, float, float]]:

@@ -4,29 +4,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.bench.summary import CONTACT
 from palpate.files import write_text
 from palpate.identification.uncertainty import Verdict
 from palpate.press.pressing import Asked
 from palpate.press.setting import Place
 from palpate.records import Record
-from palpate.report import style
+from palpate.report import page, style
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
 from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
 from palpate.report.identification.page import TONES
 from palpate.report.identification.words import CALLED
-from palpate.report.page import (
-    Card,
-    CommandAnswer,
-    PageAnswer,
-    Table,
-    answer_page,
-    data_address,
-    warning_alerts,
-)
 from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
@@ -89,7 +79,7 @@ def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[s
     ]
 
 
-def _tip_panel(record: Record, rows: NDArray[np.intp], seconds: float) -> list[str]:
+def _tip_panel(record: Record, rows: Indices, seconds: float) -> list[str]:
     """The tip along the normal, drawn so large that its way is seen."""
     left, top, width, height = _TIP
     depth = record["penetration"][rows]
@@ -134,7 +124,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     }
     halves = [
         {
-            "source": data_address(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
+            "source": page.data_address(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
             "caption": told,
         }
         for half, told in captions.items()
@@ -142,7 +132,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
     loop, parameters = summary["loop"], (summary["identified"] or {}).get("parameters", {})
     contact = summary["force"] is not None
     wanted = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
-    answer = PageAnswer(
+    answer = page.PageAnswer(
         title=f"A press of {asked.arm.title}{wanted}",
         sentence=sentence(summary, parameters),
         about=f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "
@@ -156,7 +146,7 @@ def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: 
         figures=figures if contact else (),
         folds=[(table.title, "all numbers", table.rows) for table in tables(summary)],
     )
-    write_text(folder / "report.html", answer_page(answer, room="press", command=summary["command"]))
+    write_text(folder / "report.html", page.answer_page(answer, room="press", command=summary["command"]))
 
 
 def sentence(summary: dict[str, Any], parameters: dict[str, Any]) -> str:
@@ -168,7 +158,7 @@ def sentence(summary: dict[str, Any], parameters: dict[str, Any]) -> str:
     return f"{outcome(summary)} The stiffness of the surface is {quantity(found['value'], 'N/m', half)}."
 
 
-def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[Card]:
+def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[page.Card]:
     """A card a parameter: value, verdict, its limit, and the truth of the simulation."""
     cards = []
     for name in (name for name in ("K", "B", "M") if name in found):
@@ -179,7 +169,7 @@ def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[Card]:
             number, _, rest = text.partition(" ± ")
             half, _, unit = rest.partition(" ")
         why, tone = f"{p['reason']}.{known}", TONES[Verdict(p["verdict"])]
-        cards.append(Card(f"{name}, {CALLED[name]}", number, unit, half, why, tone, p["verdict"], name))
+        cards.append(page.Card(f"{name}, {CALLED[name]}", number, unit, half, why, tone, p["verdict"], name))
     return cards
 
 
@@ -187,7 +177,7 @@ def _alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
     """Failures first, then the notes of the press."""
     shown = alerts(summary)
     told = {alert_line(alert) for alert in shown}
-    return [*shown, *warning_alerts(note for note in notes(summary) if note not in told)]
+    return [*shown, *page.warning_alerts(note for note in notes(summary) if note not in told)]
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
@@ -208,7 +198,7 @@ def _of_tool(identified: dict[str, Any]) -> list[dict[str, Any]]:
     return [note for note in identified.get("warnings", ()) if note["code"] == "tool-inertia"]
 
 
-def tables(summary: dict[str, Any]) -> list[Table]:
+def tables(summary: dict[str, Any]) -> list[page.Table]:
     """Force first, then what was identified."""
     if summary["force"] is None:
         return []
@@ -217,17 +207,17 @@ def tables(summary: dict[str, Any]) -> list[Table]:
     return [_force_table(summary), *([surface] if found else [])]
 
 
-def answer_of(title: str, summary: dict[str, Any]) -> CommandAnswer:
+def answer_of(title: str, summary: dict[str, Any]) -> page.CommandAnswer:
     """The answer of a press by the arm of this title."""
     found = (summary["identified"] or {}).get("parameters", {})
     head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
     said = f"{head}\n{sentence(summary, found)}"
-    return CommandAnswer(summary, title, said, tables(summary), notes(summary))
+    return page.CommandAnswer(summary, title, said, tables(summary), notes(summary))
 
 
-def _force_table(summary: dict[str, Any]) -> Table:
+def _force_table(summary: dict[str, Any]) -> page.Table:
     f, loop = summary["force"], summary["loop"]
-    return Table(
+    return page.Table(
         "Force",
         ("", "value"),
         (

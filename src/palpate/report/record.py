@@ -10,8 +10,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
 from palpate.report.chart import Chart, Series, figure_of, panels
-from palpate.report.output import as_html, as_text
-from palpate.report.page import PageAnswer, Table, answer_page
+from palpate.report.page import PageAnswer, Table, answer_page, as_html, as_text
 from palpate.report.style import with_peaks
 from palpate.text import printable
 

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.report.look import assets
@@ -36,7 +35,7 @@ def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
     return x[rows], values[rows]
 
 
-def rows_shown(values: Array, most: int, dense: Mask | None = None) -> NDArray[np.intp]:
+def rows_shown(values: Array, most: int, dense: Mask | None = None) -> Indices:
     """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
 
     Args:
@@ -143,13 +142,18 @@ def figure(rows: int = 1, *, height: float = 2.6, **subplots: Any) -> tuple[Figu
     return grid((9.0, height * rows + 0.5), rows, sharex=True, **subplots)
 
 
+def empty(width: float, height: float) -> Figure:
+    """A figure of this width and height [inches], without a panel."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+
+
 def grid(
     size: tuple[float, float], rows: int = 1, columns: int = 1, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure of this width and height [inches], and its panels row by row."""
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=size, dpi=DPI, layout="constrained")
+    drawing = empty(*size)
     axes = list(drawing.subplots(rows, columns, squeeze=False, **subplots).flat)
     for axis in axes:
         plain(axis)

@@ -7,28 +7,19 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import Console
 from rich.text import Text
 
 from palpate.force.describe import UNCOVERED, sentence
 from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
+from palpate.report import page as pages
 from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
-from palpate.report.output import as_html, console_text
-from palpate.report.page import (
-    Card,
-    CommandAnswer,
-    Extent,
-    PageAnswer,
-    answer_page,
-    log_scale,
-    warning_alerts,
-)
 from palpate.text import print_hanging, printable
 from palpate.units import plain, quantity, quantity_between
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from rich.console import Console
 
 
 def rows(told: Tuning) -> list[tuple[str, str]]:
@@ -86,7 +77,7 @@ def _peak(told: Tuning) -> str:
 
 def answer_of(
     told: Tuning, inner: dict[str, object] | None, written: Sequence[object], *, verbose: bool
-) -> CommandAnswer:
+) -> pages.CommandAnswer:
     """The answer of `palpate tune`.
 
     Args:
@@ -110,7 +101,7 @@ def answer_of(
         for line in (*filter(None, [slide]), *(f"written: {path}" for path in written if verbose)):
             console.print(line, soft_wrap=True)
 
-    return CommandAnswer(json, show=display)
+    return pages.CommandAnswer(json, show=display)
 
 
 def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:
@@ -177,24 +168,24 @@ def line(told: Tuning) -> str:
 
 def text(told: Tuning) -> str:
     """Output of `palpate tune`."""
-    return console_text(lambda console: show(told, console))
+    return pages.console_text(lambda console: show(told, console))
 
 
 def html(told: Tuning) -> str:
     """The same as a table."""
     table = [("", f"A force loop for {told.gains.arm.title}"), *rows(told)]
-    return as_html("Tuning", table, [text for _, text in told.warnings])
+    return pages.as_html("Tuning", table, [text for _, text in told.warnings])
 
 
 def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
     """The page of `palpate tune --report`; `command` is what made it."""
     gains = told.gains
-    answer = PageAnswer(
+    answer = pages.PageAnswer(
         title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
         sentence=tuning_sentence(told),
         about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
         f"{quantity(gains.theta, 's')}.",
-        alerts=warning_alerts(text for _, text in told.warnings),
+        alerts=pages.warning_alerts(text for _, text in told.warnings),
         cards={"": _cards(told)},
         lower={"Margins on the stiffest surface": _margins(told)},
         scale=_scale(told),
@@ -205,7 +196,7 @@ def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> 
         ],
         source=("The gains", gains.to_toml()),
     )
-    return answer_page(answer, room="tune", command=command)
+    return pages.answer_page(answer, room="tune", command=command)
 
 
 def tuning_sentence(told: Tuning) -> str:
@@ -227,33 +218,35 @@ def _slowest(told: Tuning) -> float:
     return max(step.settling for step in told.steps)
 
 
-def _cards(told: Tuning) -> list[Card]:
+def _cards(told: Tuning) -> list[pages.Card]:
     gains, held = told.gains, told.surface_stiffness("held")
     number, _, unit = _ends(*held).rpartition(" ") if held else ("", "", "")
     cards = [
-        Card(
+        pages.Card(
             "Stable, proved", number, unit, why="stiffness of the surface, with constant gain",
             tone="ok" if held else "fail", verdict="proved" if held else "nothing",
         ),
-        Card("Approach", plain(1e3 * gains.approach, 3), "mm/s", why="at most, before a force is felt"),
-        Card("Gain", plain(1e3 * gains.gain, 3), "mm/s per N", why="on the stiffest surface"),
+        pages.Card("Approach", plain(1e3 * gains.approach, 3), "mm/s", why="at most, before a force is felt"),
+        pages.Card("Gain", plain(1e3 * gains.gain, 3), "mm/s per N", why="on the stiffest surface"),
     ]  # fmt: skip
     known = told.known
     if known is not None:
         number, _, unit = quantity_between(*known.stiffness, "N/m").rpartition(" ")
         why = "given" if known.source == "told" else f"from {known.source}"
-        cards.append(Card("Surface", number, unit, why=why, colour="K"))
+        cards.append(pages.Card("Surface", number, unit, why=why, colour="K"))
     return cards
 
 
-def _margins(told: Tuning) -> list[Card]:
+def _margins(told: Tuning) -> list[pages.Card]:
     at = told.margins
-    cards = [Card("Gain", f"× {plain(at.gain, 3)}", why="the gain may be so many times as high")]
+    cards = [pages.Card("Gain", f"× {plain(at.gain, 3)}", why="the gain may be so many times as high")]
     if isfinite(at.phase):
-        cards.append(Card("Phase", f"{at.phase:.0f}°", why="until it rings for ever"))
+        cards.append(pages.Card("Phase", f"{at.phase:.0f}°", why="until it rings for ever"))
     if isfinite(at.delay):
         cards.append(
-            Card("Delay", plain(1e3 * at.delay, 3), "ms", why="so much more lag before it rings for ever")
+            pages.Card(
+                "Delay", plain(1e3 * at.delay, 3), "ms", why="so much more lag before it rings for ever"
+            )
         )
     return cards
 
@@ -263,28 +256,32 @@ def _scale(told: Tuning) -> dict[str, object]:
     extents = []
     if told.known is not None:
         low, high = told.known.stiffness
-        extents.append(Extent("this surface", low, high, "estimate", quantity_between(low, high, "N/m")))
+        extents.append(
+            pages.Extent("this surface", low, high, "estimate", quantity_between(low, high, "N/m"))
+        )
         if told.gains.cap > high:
             upper = quantity(told.gains.cap, "N/m")
             extents.append(
-                Extent(
+                pages.Extent(
                     "assumed for its damping", high, told.gains.cap, "assumed", f"K + B/theta up to {upper}"
                 )
             )
     held, adapting = told.surface_stiffness("held"), told.surface_stiffness("adapting")
     if held is not None:
-        extents.append(Extent("proved, constant gain", *held, "proved", _ends(*held)))
+        extents.append(pages.Extent("proved, constant gain", *held, "proved", _ends(*held)))
     if adapting is not None and told.gains.arm.kind == "position":
-        extents.append(Extent("proved, while the gain adapts", 0.0, inf, "proved", "any constant stiffness"))
+        extents.append(
+            pages.Extent("proved, while the gain adapts", 0.0, inf, "proved", "any constant stiffness")
+        )
     elif adapting is not None:
         text = quantity_between(*adapting, "N/m")
-        extents.append(Extent("proved, while the gain adapts", *adapting, "proved", text))
+        extents.append(pages.Extent("proved, while the gain adapts", *adapting, "proved", text))
     low, high = told.exact
     high = inf if high >= RIGID else high
     unstable = f"unstable from {quantity(high, 'N/m')}" if isfinite(high) else "never unstable"
-    extents.append(Extent("stable, exact, without damping", low, high, "exact", unstable))
+    extents.append(pages.Extent("stable, exact, without damping", low, high, "exact", unstable))
     caption = "The dashed line is the stiffest surface that the gains are made for; at an arrowhead nothing bounds it."
-    return log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
+    return pages.log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
 
 
 def draw(told: Tuning) -> Figure:

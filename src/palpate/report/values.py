@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from palpate.report.output import as_html, write_figure, write_page
+from palpate.report.page import as_html, write_figure, write_page
 from palpate.signals.types import NORMAL
 from palpate.text import in_python, printable
 from palpate.units import plain, quantity, quantity_between

@@ -4,10 +4,9 @@
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from palpate._jit import law
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 
 GAUSSIAN = 1.4826
 """Standard deviation of Gaussian noise over its median absolute deviation."""
@@ -40,7 +39,7 @@ def fresh_rows(values: Array) -> Mask | None:
     return _refill(fresh, round(usual))
 
 
-def _quiet_between(moved: Mask, jumps: NDArray[np.intp], usual: float) -> bool:
+def _quiet_between(moved: Mask, jumps: Indices, usual: float) -> bool:
     """Whether nothing at all moves between neighbouring jumps."""
     total = np.r_[0, np.cumsum(moved)]
     near = np.flatnonzero(np.diff(jumps) <= 2 * usual)
@@ -55,9 +54,9 @@ def _refill(fresh: Mask, every: int) -> Mask:
     """Count a long stretch without change as fresh once per period: the channel may simply rest."""
     fresh = fresh.copy()
     marks = np.flatnonzero(fresh)
-    for begin, end in zip(marks, np.r_[marks[1:], len(fresh)], strict=True):
-        if end - begin >= 2 * every:
-            fresh[begin:end:every] = True
+    ends = np.r_[marks[1:], len(fresh)]
+    for begin, end in zip(marks[long := ends - marks >= 2 * every], ends[long], strict=True):
+        fresh[begin:end:every] = True
     return fresh
 
 

@@ -9,8 +9,7 @@ from typing import TypeVar
 import msgspec
 
 from palpate.errors import InputError
-from palpate.files import check_place
-from palpate.files.writing import SQLITE_ID
+from palpate.files import SQLITE_ID, check_place
 
 T = TypeVar("T")
 

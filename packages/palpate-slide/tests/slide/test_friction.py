@@ -50,6 +50,7 @@ def test_friction_and_sign_are_those_of_the_world(action):
     assert cone_held(found, log) >= 0.95  # cones of half the width hold 92 and 94 %
 
 
+@pytest.mark.long
 def test_a_speed_on_which_friction_depends_is_a_table():
     log = wipe(replace(WORLD, path="scribble", stribeck=0.8, creep=0.02, seconds=15.0, stiffness=5e4))
     table = found_in(log).slide.values["by_speed"]
@@ -70,7 +71,7 @@ def test_force_and_position_in_other_axes_are_refused():
     assert "--wrench-frame" in mu.reason
 
 
-@pytest.mark.parametrize("path", ["line", "raster"])
+@pytest.mark.parametrize("path", ["line", pytest.param("raster", marks=pytest.mark.long)])
 def test_a_tip_that_comes_from_within_the_surface_tells_no_normal(path):
     """A wrench turned by 180 degrees about the path has the friction of the right one, and the opposite normal."""
     log = wipe(replace(WORLD, shape="plane", path=path, tilted=False, dither=0.0))
@@ -88,7 +89,7 @@ def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
 
 
 @pytest.mark.parametrize(
-    "seed", [12118, 12132, 20102]
+    "seed", [12118, *(pytest.param(s, marks=pytest.mark.long) for s in (12132, 20102))]
 )  # of a bowl, a plane and a cylinder: a press would have K at 259, 3054 and 62 N/m
 def test_a_slide_without_free_motion_is_no_press_with_a_stiffness(seed):
     found = found_in(wipe(any_wipe(seed, free=0.0)))
@@ -103,7 +104,7 @@ def test_a_slide_that_is_a_tenth_of_its_log_is_one():
 
 
 @pytest.mark.parametrize(
-    "seed", [102, 103]
+    "seed", [102, pytest.param(103, marks=pytest.mark.long)]
 )  # askew by 53 degrees on what relaxes, and by a hand that wanders
 def test_a_press_that_moves_along_the_surface_is_no_slide(seed):
     found = found_in(press(any_press(seed)))

@@ -1,6 +1,7 @@
 """Groups of options that several commands have: names, files to write, figures, consent to run code."""
 
 # No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
+import json
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -259,10 +260,8 @@ def read_found(path: Path) -> dict[str, Any]:
         InputError: it is too large, no JSON, or no object.
         OSError: no such file.
     """
-    from json import loads
-
     try:
-        value = loads(read_bytes(path, _LARGEST, "the output of palpate identify"), parse_int=_whole)
+        value = json.loads(read_bytes(path, _LARGEST, "the output of palpate identify"), parse_int=_whole)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}; give the output of palpate identify --json") from None
     if not isinstance(value, dict):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -90,8 +91,6 @@ class SlideLimits:
         Raises:
             InputError: a number out of range.
         """
-        from math import radians
-
         from msgspec.structs import replace
 
         from palpate.force.slide_table import Slide

@@ -1,18 +1,14 @@
 """Options of a cell, saved in a TOML file; the command line overrides them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from cyclopts import App
 
 from palpate.cli.options.values import options_given
 from palpate.errors import InputError, unknown
-from palpate.files import read_text, read_toml, write_text
-from palpate.files.writing import MADE
-
-if TYPE_CHECKING:
-    from cyclopts import App
+from palpate.files import MADE, read_text, read_toml, write_text
 
 _SAID = {"--options": "options", "--preset": "preset"}
 _NEVER = {

@@ -7,19 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, Model
-from palpate.cli.options.values import (
-    FLAG,
-    SIGNED,
-    Angles,
-    Interval,
-    Point,
-    lag_of,
-    options,
-    si,
-    vector,
-    with_std,
-)
 from palpate.errors import InputError
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
@@ -30,39 +19,39 @@ if TYPE_CHECKING:
     from palpate.identification.indenter import Indenter
 
 
-@options("Signals of the log", 1)
+@values.options("Signals of the log", 1)
 class LogOptions(Signals):
     """Columns or topics of a log, and which rows of it."""
 
     force: Annotated[str | None, Parameter(name=["--force-column", "--force"])] = None
     "Column of the force, in N if no unit is given; g is the reading of a scale. TOPIC.FIELD of a bag."
-    start: Annotated[float | None, SIGNED] = None
+    start: Annotated[float | None, values.SIGNED] = None
     "Leave out the rows before, in seconds from the first row."
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
 
 
-@options("Wrench and pose, and the sign of the force", 2)
+@values.options("Wrench and pose, and the sign of the force", 2)
 class FrameOptions:
     """Axes, points and signs of a wrench and a pose."""
 
     wrench_frame: Literal["base", "tool", "sensor"] | None = None
     "Axes of the wrench: the arm's base, the tool (those of the pose), or a sensor turned against the tool."
-    sensor_rpy: Angles | None = None
+    sensor_rpy: values.Angles | None = None
     "Rotation of the sensor against the tool: roll,pitch,yaw in degrees, or with :rad."
-    tcp: Point | None = None
+    tcp: values.Point | None = None
     "The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm."
-    wrench_at: Point | None = None
+    wrench_at: values.Point | None = None
     "The reference point of the torque, likewise; the pose's origin if not given."
-    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, SIGNED] = None
+    force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, values.SIGNED] = None
     """+1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction:
     from the surface on the tool. Detected if not given."""
-    normal: Annotated[str | None, SIGNED] = None
+    normal: Annotated[str | None, values.SIGNED] = None
     """Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not
     given."""
-    gravity_compensated: Annotated[bool, FLAG] = False
+    gravity_compensated: Annotated[bool, values.FLAG] = False
     "The tool's weight is already subtracted from the wrench."
-    free: Interval | None = None
+    free: values.Interval | None = None
     "BEGIN,END in seconds of an interval of free motion; detected if not given."
 
     @property
@@ -88,19 +77,19 @@ class FrameOptions:
             raise InputError(f"--normal needs x,y,z, base:x,y,z or tool:x,y,z, got {self.normal!r}")
         return ContactFrame(
             wrench_frame=self.wrench_frame,
-            sensor_rpy=si(self.sensor_rpy),
-            tcp=si(self.tcp) or (0.0, 0.0, 0.0),
-            wrench_at=si(self.wrench_at) or (0.0, 0.0, 0.0),
+            sensor_rpy=values.si(self.sensor_rpy),
+            tcp=values.si(self.tcp) or (0.0, 0.0, 0.0),
+            wrench_at=values.si(self.wrench_at) or (0.0, 0.0, 0.0),
             force_sign=sides[self.sign],
-            normal=vector("--normal", plain, "number") if plain else None,
+            normal=values.vector("--normal", plain, "number") if plain else None,
             normal_frame="tool" if axes == "tool" else "base",
             gravity_compensated=self.gravity_compensated,
-            free=si(self.free),
+            free=values.si(self.free),
             payload=hung,
         )
 
 
-@options("The arm", 3)
+@values.options("The arm", 3)
 class ArmOptions:
     """Mass and stiffness between the sensors and the surface."""
 
@@ -132,21 +121,22 @@ class ArmOptions:
             raise InputError("give --robot-stiffness or --robot-stiffness-from, not both")
         hung = self.weighed_tool()
         return ArmDynamics(
-            tool_mass=with_std("tool-mass", self.tool_mass, "0.8:0.02") or (hung.beyond if hung else None),
-            stiffness=with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
-            mass=with_std("robot-mass", self.robot_mass, "3.7:0.4"),
+            tool_mass=values.with_std("tool-mass", self.tool_mass, "0.8:0.02")
+            or (hung.beyond if hung else None),
+            stiffness=values.with_std("robot-stiffness", self.robot_stiffness, "40000:2000"),
+            mass=values.with_std("robot-mass", self.robot_mass, "3.7:0.4"),
             position_from=self.position_from,
         )
 
 
-@options("Young's modulus", 5)
+@values.options("Young's modulus", 5)
 class IndenterOptions:
     """Shape of the indenter, if it is known."""
 
     indenter: str | None = None
     """sphere:RADIUS, punch:RADIUS (flat, round) or cone:HALF_ANGLE (from its axis), as sphere:5:mm or
     cone:70:deg. It adds Young's modulus E."""
-    poisson: Annotated[str | None, SIGNED] = None
+    poisson: Annotated[str | None, values.SIGNED] = None
     "Poisson's ratio of the material, VALUE or VALUE:STD; unknown from 0 to 0.5 if not given."
 
     def check(self) -> None:
@@ -169,17 +159,17 @@ class IndenterOptions:
     @property
     def ratio(self) -> tuple[float, float] | None:
         """Poisson's ratio, with its standard deviation."""
-        return with_std("poisson", self.poisson, "0.45:0.05")
+        return values.with_std("poisson", self.poisson, "0.45:0.05")
 
 
-@options("The model", 4)
+@values.options("The model", 4)
 class ModelOptions:
     """The model, the lag, and the priors."""
 
     model: Annotated[Model | None, QUIET] = None
     """kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
     chosen if not given."""
-    lag: Annotated[str | None, SIGNED] = None
+    lag: Annotated[str | None, values.SIGNED] = None
     """Calibrated lag of the force behind the position, as 0.0076, 7.6:ms or 7.6:0.2:ms (with its standard
     deviation); 0:1:ms where one converter reads both channels every ms, unfiltered."""
     force_filter: str | None = None
@@ -198,12 +188,12 @@ class ModelOptions:
     def keywords(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
         known: dict[str, Any] = {}
-        lag = lag_of(self.lag)
+        lag = values.lag_of(self.lag)
         if lag is not None:
             known |= {"lag": lag[0], "lag_std": lag[1]}
         if self.force_filter is not None:
             known["force_filter"] = None if self.force_filter == "none" else self.force_filter
         if self.mass is not None:
-            known["mass"] = with_std("mass", self.mass, "0.5:0.02")
+            known["mass"] = values.with_std("mass", self.mass, "0.5:0.02")
         names = ("model", "tolerance", "calibration", "bonded", "cutoff")
         return known | {name: getattr(self, name) for name in names}

@@ -17,7 +17,7 @@ from typing import (
     get_type_hints,
 )
 
-from cyclopts import Group, Parameter, Token
+from cyclopts import Group, Parameter, Token, convert
 
 from palpate.errors import InputError, PalpateError, unknown
 from palpate.units import UNITS, unit
@@ -143,8 +143,6 @@ SIGNED = Parameter(allow_leading_hyphen=True)
 
 def value_of(kind: Any, tokens: Sequence[Token]) -> Any:
     """The value of any option or argument: a number must be one, and not beyond what the machine counts."""
-    from cyclopts import convert
-
     try:
         value = convert(kind, tokens)
     except OverflowError:

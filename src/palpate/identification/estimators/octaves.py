@@ -182,8 +182,9 @@ def _sums(
         block = views[starts[first : first + some]]  # (blocks, p, length)
         real = block @ seen  # (blocks, p, 2 lines)
         mine = group[first : first + some]
-        for g in np.unique(mine).tolist():
-            flat = real[mine == g].transpose(0, 2, 1).reshape(-1, width)
+        begins = np.flatnonzero(np.diff(mine, prepend=-1))  # blocks of a group follow one another
+        for g, those in zip(mine[begins].tolist(), np.split(real, begins[1:]), strict=True):
+            flat = those.transpose(0, 2, 1).reshape(-1, width)
             products, count = found.get(g, (np.zeros((width, width)), 0))
             found[g] = products + flat.T @ flat, count + len(flat)
     return list(found.items())

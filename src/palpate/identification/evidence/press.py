@@ -17,7 +17,7 @@ from palpate.identification.evidence.slope import (
     slope_between,
     slope_of,
 )
-from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, working_point
+from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, storage_near, working_point
 from palpate.identification.in_series import SeriesSpring
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Options
@@ -229,6 +229,4 @@ def stiffness_of(problem: Problem, force: Array, point: WorkingPoint) -> float |
     if point.source == "press":
         slope = slope_of(loadings_in(problem, problem.lag.value, segments))
         return None if slope is None else slope.stiffness.value
-    spectrum = dynamic_stiffness(problem, segments, problem.lag.value, problem.lag.std)
-    near = [own for own in spectrum if abs(np.log2(own.frequency / point.frequency_Hz)) < 0.5]
-    return near[0].storage if near else None
+    return storage_near(problem, segments, point.frequency_Hz)

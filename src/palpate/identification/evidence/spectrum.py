@@ -114,6 +114,22 @@ def dynamic_stiffness(
     return tuple(found)
 
 
+def storage_near(problem: Problem, segments: list[Segment], frequency: float) -> float | None:
+    """Storage of the octave within half an octave of a frequency [Hz]; None if none of the segments shows it [N/m]."""
+    motion, lag = problem.motion, problem.lag.value
+    dt = float(np.median(np.diff(problem.time)))
+    channels = motion.moved(0, lag), motion.moved(1, lag), problem.force
+    length = longest_of(segments)
+    while length >= SHORTEST:
+        if _LOWEST < np.sqrt(2) * frequency * length * dt < 2 * _HIGHEST:
+            line = _fit(_blocks(problem, channels, segments, length, 0))
+            own = line.omega / (2 * np.pi)
+            if _LOWEST <= own * length * dt <= _HIGHEST and abs(np.log2(own / frequency)) < 0.5:
+                return float(line.parts[0])
+        length //= 2
+    return None
+
+
 def _round(problem: Problem, position: Array, lag: float) -> list[Array]:
     """Error of an encoder in this motion, once for each phase of its counts, behind the same filter, shape (m,) each.
 
@@ -192,12 +208,13 @@ def _fit(blocks: _Blocks) -> _Line:
     spread = float((power @ u**2).sum()) / total
     slope = spread > _FLAT
     columns = np.stack([x, v / omega, u * x, u * v / omega] if slope else [x, v / omega], axis=-1)
-    bread = np.linalg.pinv(np.einsum("blp,blq->pq", columns.conj(), columns).real)
-    theta = bread @ np.einsum("blp,bl->p", columns.conj(), f).real
+    flat = columns.reshape(-1, columns.shape[-1])
+    bread = np.linalg.pinv((flat.conj().T @ flat).real)
+    theta = bread @ (flat.conj().T @ f.ravel()).real
     left = f - columns @ theta
     own = power.sum(axis=1)
     independent = max(OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
-    tied = bread @ np.einsum("blp,lm,bmq->pq", columns.conj(), _TIED, columns).real
+    tied = bread @ (flat.conj().T @ (_TIED @ columns).reshape(flat.shape)).real
     noise = float((np.abs(left) ** 2).sum()) / max(3 * len(x) - float(np.trace(tied)) / 2, 1e-3)
     within = noise / 2 * np.diag(tied @ bread)[:2] / OVERLAP
     moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]

@@ -73,44 +73,40 @@ class Chain:
         """The same, but for 2e-5 of it [s]."""
         return 20.0 / self.rate
 
-    def __call__(self, signal: Array, derivative: int = 0, lag: float = 0.0) -> Array:
-        """The filtered signal, or one of its derivatives 0 to 4, at the times t - lag [s], shape (n,).
+    def __call__(
+        self, signal: Array, derivative: int = 0, lag: float = 0.0, first: int = 0, every: int = 1
+    ) -> Array:
+        """The filtered signal, or one of its derivatives 0 to 4, at the times t - lag, shape (n,).
 
         Before its first and after its last sample the signal, shape (n,), is taken to rest there; the lag may be
-        negative.
+        negative. Of the samples one in `every` from the `first` on is returned, by as many short filters, each of whose
+        inputs is one sample in as many (a polyphase decimator; Crochiere and Rabiner, 1983).
         """
-        taps, first = _taps(self, derivative, lag)
-        reach = len(taps) + abs(first)
+        taps, begin = _taps(self, derivative, lag)
+        reach = len(taps) + abs(begin)
         level = float(signal[0])
         padded = np.empty(len(signal) + 2 * reach)
         np.subtract(signal, level, out=padded[reach:-reach])
         padded[:reach], padded[-reach:] = padded[reach], padded[-reach - 1]
-        start = reach - first
-        full = convolve(padded, taps)
-        return full[start : start + len(signal)] + (level if derivative == 0 else 0.0)
+        found = np.zeros(-(-(len(signal) - first) // every))
+        for start in range(reach - begin + first, reach - begin + first - min(every, len(taps)), -1):
+            own = convolve(padded[start % every :: every], taps[reach - begin + first - start :: every])
+            found += own[start // every :][: len(found)]
+        return found + (level if derivative == 0 else 0.0)
 
     def read(self, signal: Array, derivative: int, lag: float, rows: NDArray[np.intp]) -> Array:
         """The same at the samples `rows` only, in their order, shape (len(rows),).
 
-        Stretches that are far apart are filtered as one signal, each with what the filter remembers on either side.
+        Each stretch of neighbouring rows is filtered with what the filter remembers on either side.
         """
-        if not len(rows):
-            return np.empty(0)
-        memory = (
-            int(np.ceil(_LENGTH / (self.rate * self.dt) + abs(lag) / self.dt)) + 5
-        )  # samples on either side
-        cuts = np.flatnonzero(np.diff(rows) > 2 * memory) + 1
-        stretches = np.split(rows, cuts) if len(cuts) else [rows]
-        begins = [max(int(own[0]) - memory, 0) for own in stretches]
-        parts = [signal[a : int(own[-1]) + memory] for a, own in zip(begins, stretches, strict=True)]
-        firsts = np.cumsum([0, *(len(part) for part in parts[:-1])])
-        at = np.concatenate([own + (f - b) for own, f, b in zip(stretches, firsts, begins, strict=True)])
-        joined = parts[0] - parts[0][0] if len(parts) == 1 else np.concatenate([p - p[0] for p in parts])
-        found: Array = self(joined, derivative, lag)[at]
-        if derivative == 0:
-            levels = [float(part[0]) for part in parts]
-            found += np.repeat(levels, [len(own) for own in stretches])
-        return found
+        memory = int(np.ceil((_LENGTH / self.rate + abs(lag)) / self.dt)) + 5  # samples on either side
+        found = [np.empty(0)]
+        for own in np.split(rows, np.flatnonzero(np.diff(rows) > 2 * memory) + 1) if len(rows) else ():
+            first, last = int(own[0]), int(own[-1])
+            begin, every = max(first - memory, 0), int(np.gcd.reduce(np.diff(own))) or 1
+            part = signal[begin : last + memory]
+            found.append(self(part, derivative, lag, first - begin, every)[(own - first) // every])
+        return np.concatenate(found)
 
     def noise_spread(self, noise: PositionNoise) -> Array:
         """Covariance of what noise of the position leaves in the derivatives 0 to 3, shape (4, 4)."""

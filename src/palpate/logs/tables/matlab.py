@@ -9,8 +9,8 @@ from typing import Any
 from zlib import decompressobj
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import AnyArray
 from palpate.errors import InputError
 from palpate.files.confined import read_confined
 from palpate.files.reading import ReadingBudget
@@ -54,7 +54,7 @@ def read_matlab(path: Path, budget: ReadingBudget) -> Sheet:
     )  # fmt: skip
 
 
-def _cells(values: NDArray[Any], missing: Sequence[str]) -> Cells:
+def _cells(values: AnyArray, missing: Sequence[str]) -> Cells:
     if np.iscomplexobj(values):
         return Cells(np.full(len(values), np.nan), ("row 1", str(values[0])))
     column = values.astype(float)
@@ -70,7 +70,7 @@ def _export(name: str, kind: str) -> str:
     return f"only MATLAB itself reads; export it there with: {way.format(name)}"
 
 
-def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyArray], dict[str, Any]]:
     """All columns of a file, the names and classes of its objects, and what is too wide for columns.
 
     Runs in a process of its own.
@@ -121,7 +121,7 @@ def _unpacked_sizes(path: Path) -> Iterator[int]:
                     yield total
 
 
-def _class(value: NDArray[Any]) -> tuple[str, str]:
+def _class(value: AnyArray) -> tuple[str, str]:
     """Name and class of an object, which its own header holds."""
     words = [
         field.decode(errors="replace") if isinstance(field, bytes) else str(field) for field in value.flat[0]
@@ -129,7 +129,7 @@ def _class(value: NDArray[Any]) -> tuple[str, str]:
     return words[0], words[2]
 
 
-def _arrays(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
+def _arrays(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, AnyArray]]:
     for own, value in variables.items():
         name = f"{prefix}{own}"
         if own.startswith("__"):
@@ -140,16 +140,16 @@ def _arrays(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[st
             yield name, value.squeeze()
 
 
-def _width(value: NDArray[Any]) -> int:
+def _width(value: AnyArray) -> int:
     """How many columns an array makes: none if it holds less than two values."""
     return value.size // max(value.shape) if value.size > 1 else 0
 
 
-def _size(value: NDArray[Any]) -> str:
+def _size(value: AnyArray) -> str:
     return f"an array of {' x '.join(map(str, value.shape))}, which has too many columns for a log"
 
 
-def _columns(name: str, value: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _columns(name: str, value: AnyArray) -> Iterator[tuple[str, AnyArray]]:
     """The columns along the longest side; the first of those that are equally long."""
     rows = np.moveaxis(value, int(np.argmax(value.shape)), -1)
     for place in product(*map(range, rows.shape[:-1])):

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import AnyArray, Array, Counts
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.files.confined import read_confined
@@ -95,7 +94,7 @@ def _read(path: Path, budget: ReadingBudget, places: Sequence[int], missing: Seq
     return cells
 
 
-def _read_counts(path: Path, budget: ReadingBudget, place: int) -> NDArray[np.int64] | None:
+def _read_counts(path: Path, budget: ReadingBudget, place: int) -> Counts | None:
     found = _query(path, budget, [place], exact=True)[0]
     return as_counts(found["counts"]) if found else None
 
@@ -118,7 +117,7 @@ def _query(
     missing: Sequence[str] = (),
     *,
     exact: bool = False,
-) -> tuple[dict[str, NDArray[Any]], Any]:
+) -> tuple[dict[str, AnyArray], Any]:
     budget.check(_BYTES * head(path, budget.limits).rows * len(places))
     question = {"places": list(places), "missing": list(missing), "exact": exact}
     return read_confined(__name__, path, "Parquet", budget, question)
@@ -165,7 +164,7 @@ def _head(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> tuple[Pa
     return msgspec.convert(also, ParquetHead), arrays.get("numbers")
 
 
-def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, NDArray[Any]], Any]:
+def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, AnyArray], Any]:
     """A file's head, some of its columns as numbers, or one as counts. Runs in a process of its own."""
     import polars
 
@@ -213,7 +212,7 @@ def _wrong(cells: polars.Series, numbers: Array, words: set[str]) -> tuple[int, 
     return None
 
 
-def _counts(cells: polars.Series) -> dict[str, NDArray[Any]]:
+def _counts(cells: polars.Series) -> dict[str, AnyArray]:
     if not cells.dtype.is_integer() or cells.null_count():
         return {}
     return {"counts": cells.to_numpy()}

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import AnyArray, Array, Counts, Mask
 from palpate.errors import InputError, unknown
 from palpate.text import shorten
 
@@ -82,7 +81,7 @@ class Sheet:
     path: Path
     names: list[str]
     read: Callable[[Sequence[int], Sequence[str]], tuple[list[Cells], list[dict[str, Any]]]]
-    counts: Callable[[int], NDArray[np.int64] | None] = _no_counts
+    counts: Callable[[int], Counts | None] = _no_counts
     stated: dict[str, Stated] = field(default_factory=dict)
     rate: float | None = None
     left_out: dict[str, str] = field(default_factory=dict)
@@ -171,7 +170,7 @@ def is_finite(word: str) -> bool:
         return False
 
 
-def as_counts(column: NDArray[Any]) -> NDArray[np.int64] | None:
+def as_counts(column: AnyArray) -> Counts | None:
     """An array of integers as signed ones; None if it holds others, or too large ones."""
     if column.dtype.kind not in "iu" or (
         column.dtype.kind == "u" and (column > np.iinfo(np.int64).max).any()
@@ -202,7 +201,7 @@ def read_frame(table: Any) -> Sheet:
     )
 
 
-def _cells(cells: NDArray[Any]) -> Cells:
+def _cells(cells: AnyArray) -> Cells:
     if cells.dtype.kind == "M":
         return Cells(cells.astype("datetime64[ns]").astype(np.int64) / _NANOSECONDS, clock=True)
     try:
@@ -228,7 +227,7 @@ def own_columns(frame: Sheet, rate: float | None) -> dict[str, str]:
     return {name: name for name in wanted}
 
 
-def _columns(table: Any) -> dict[Any, NDArray[Any]]:
+def _columns(table: Any) -> dict[Any, AnyArray]:
     names = getattr(table, "column_names", None) or (
         list(table) if isinstance(table, Mapping) else getattr(table, "columns", None)
     )

@@ -9,8 +9,8 @@ from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
+from palpate.arrays import AnyArray
 from palpate.errors import InputError, unknown
 from palpate.files.confined import read_confined
 from palpate.files.reading import LimitError, ReadingBudget, ReadingLimits
@@ -119,7 +119,7 @@ def _contents(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> dict
     return {title: content.tobytes().decode() for title, content in arrays.items()}
 
 
-def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, NDArray[Any]], None]:
+def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyArray], None]:
     """Each sheet as lines of text, its cells parted by tabs. Runs in a process of its own."""
     try:
         from python_calamine import CalamineWorkbook

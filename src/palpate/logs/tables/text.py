@@ -8,28 +8,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import polars
 
+from palpate.arrays import Counts
 from palpate.errors import InputError
 from palpate.files.reading import ReadingBudget
+from palpate.logs.tables import lines
 from palpate.logs.tables.layout import Layout, find_layout, read_preamble
-from palpate.logs.tables.lines import (
-    COMMENTS,
-    NO_READING,
-    POINTED_THOUSANDS,
-    THOUSANDS,
-    Parting,
-    first_lines,
-    lines_of,
-    seconds_of_text,
-)  # fmt: skip
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
-
-if TYPE_CHECKING:
-    import polars
 
 _NEVER = "\x1f"
 """Stands in no log of text, so that polars takes each line for one cell."""
@@ -57,10 +46,10 @@ def read_text_sheet(
     """
     if content is None:
         budget.take(path.stat().st_size)
-        lines, bare_returns = first_lines(path)
+        head, bare_returns = lines.first_lines(path)
     else:
-        lines, bare_returns = lines_of(path, content), False
-    layout = find_layout(path, lines, budget, delimiter)
+        head, bare_returns = lines.lines_of(path, content), False
+    layout = find_layout(path, head, budget, delimiter)
     names = list(layout.names)
     preamble = read_preamble(layout.above, names)
     units = {name: Stated(symbol, "the row of units") for name, symbol in layout.units.items()}
@@ -112,7 +101,7 @@ class _TextRows:
 
     def _column(self, whole: polars.DataFrame, place: int, missing: Sequence[str]) -> Cells:
         first = self._first[place].strip() if place < len(self._first) else ""
-        if first and not is_finite(first) and seconds_of_text(first) is not None:
+        if first and not is_finite(first) and lines.seconds_of_text(first) is not None:
             return self._clock(place)
         numbers = whole.get_column(str(place)).to_numpy().astype(float, copy=True)
         absent = ~np.isfinite(numbers)
@@ -124,7 +113,7 @@ class _TextRows:
         """A column of dates and times."""
         frame = self._cells(place)
         cells = frame.get_column(str(place)).to_list()
-        seconds = [seconds_of_text(text) for text in cells]
+        seconds = [lines.seconds_of_text(text) for text in cells]
         self.budget.take(0)
         row = seconds.index(None) if None in seconds else None
         wrong = None if row is None else (_place(row, frame["line"][row]), str(cells[row]))
@@ -132,19 +121,15 @@ class _TextRows:
 
     def _wrong(self, place: int, missing: Sequence[str]) -> tuple[str, str] | None:
         """The first cell that holds something, and yet no finite number."""
-        import polars
-
         cell = polars.col(str(place))
-        words = [*NO_READING, *(word.lower() for word in missing)]
+        words = [*lines.NO_READING, *(word.lower() for word in missing)]
         finite = self._number(cell).is_finite().fill_null(False)
         wrong = cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~finite
         rows = self._cells(place).with_row_index("row").filter(wrong).head(1)
         return next(((_place(row, line), str(text)) for row, line, text in rows.rows()), None)
 
-    def counts(self, place: int) -> NDArray[np.int64] | None:
+    def counts(self, place: int) -> Counts | None:
         """A column of whole numbers, exact; None if it holds others."""
-        import polars
-
         counts = self._cells(place).get_column(str(place)).cast(polars.Int64, strict=False)
         return None if counts.null_count() else counts.to_numpy()
 
@@ -162,8 +147,6 @@ class _TextRows:
 
     def _frame(self, places: Sequence[int]) -> polars.DataFrame:
         """Line, whether it is whole, and the numbers at some places, by place."""
-        import polars
-
         count = int(self._collect(self._rows.select(polars.len())).item())
         self.budget.check(_BYTES * count * len(places))
         if len(places) > _MANY:
@@ -175,8 +158,6 @@ class _TextRows:
 
     def _wide_frame(self, places: Sequence[int]) -> polars.DataFrame:
         """The same for many places, which polars would else look for one after the other in every line."""
-        import polars
-
         lists = self._collect(self._rows.with_columns(polars.col("text").str.split(self._delimiter)))
         cells = lists.get_column("text").list
         names = dict.fromkeys(map(str, places))
@@ -197,8 +178,6 @@ class _TextRows:
         return str(top or "").split(self._delimiter)
 
     def _collect(self, rows: polars.LazyFrame) -> polars.DataFrame:
-        import polars
-
         self.budget.take(0)
         try:
             return rows.collect(engine="streaming")
@@ -209,11 +188,9 @@ class _TextRows:
     @cached_property
     def _rows(self) -> polars.LazyFrame:
         """The lines from the first row on that are no comments, and whether they are whole."""
-        import polars
-
         line, cell = polars.col("text"), self._delimiter
         text = line.str.strip_chars()
-        marks = [mark for mark in COMMENTS if mark != self.layout.parting.delimiter]
+        marks = [mark for mark in lines.COMMENTS if mark != self.layout.parting.delimiter]
         comment = polars.any_horizontal(text.str.starts_with(mark) for mark in marks)
         if cell == " ":
             line = text.str.replace_all(r"\s+", " ")
@@ -239,17 +216,13 @@ class _TextRows:
 
     def _cells_up_to(self, last: int) -> polars.Expr:
         """The cells of a line up to a last one."""
-        import polars
-
         return polars.col("text").str.split_exact(self._delimiter, max(last, 1)).alias("cells")
 
     def _number(self, cell: polars.Expr) -> polars.Expr:
         """Numbers of cells; points or commas that part thousands are left out."""
-        import polars
-
         comma = self.layout.parting.decimal_comma
         if self._delimiter != ",":
-            pattern, mark = (POINTED_THOUSANDS, ".") if comma else (THOUSANDS, ",")
+            pattern, mark = (lines.POINTED_THOUSANDS, ".") if comma else (lines.THOUSANDS, ",")
             parted = cell.str.contains(f"^(?:{pattern})$")
             cell = polars.when(parted).then(cell.str.replace_all(mark, "", literal=True)).otherwise(cell)
         if comma:
@@ -262,8 +235,6 @@ class _TextRows:
 
     def _lines(self) -> polars.LazyFrame:
         """The log's lines by number, each as one text."""
-        import polars
-
         return polars.scan_csv(
             self._source,
             separator=_NEVER,
@@ -298,9 +269,9 @@ class _TextRows:
         with self.path.open(encoding="utf-8-sig", errors="replace") as file:
             return self._parted_lines(file)
 
-    def _parted_lines(self, lines: Iterable[str]) -> bytes:
+    def _parted_lines(self, texts: Iterable[str]) -> bytes:
         out = io.BytesIO()
-        for line in lines:
+        for line in texts:
             out.write(
                 _CELL.join(_cells(line.rstrip("\r\n"), self.layout.parting)).encode(errors="replace") + b"\n"
             )
@@ -309,8 +280,6 @@ class _TextRows:
 
 
 def _cell(place: int) -> polars.Expr:
-    import polars
-
     return polars.col("cells").struct.field(f"field_{place}").str.strip_chars()
 
 
@@ -318,7 +287,7 @@ def _place(row: int, line: int) -> str:
     return f"row {row + 1} (line {line})"
 
 
-def _cells(line: str, parting: Parting) -> list[str]:
+def _cells(line: str, parting: lines.Parting) -> list[str]:
     try:
         return next(csv.reader([line], delimiter=parting.delimiter), [])
     except csv.Error:

@@ -13,33 +13,9 @@ from palpate.errors import InputError
 from palpate.identification.causes import Cause, Code, cause_of
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification import details, figure
+from palpate.report.identification import details, figure, words
 from palpate.report.identification import page as pages
-from palpate.report.identification.words import (
-    ADVICE,
-    APART,
-    CALLED,
-    MARKS,
-    STYLES,
-    UNIT_WARNINGS,
-    UNTOUCHED,
-    Source,
-    as_json,
-    behind_the_arm,
-    by_the_model,
-    each_press,
-    full_number,
-    interval,
-    limited_by,
-    loss_of,
-    no_contact_in,
-    place_of,
-    press_facts,
-    sentence,
-    unit_warnings,
-)
-from palpate.report.output import as_html, console_text
-from palpate.report.page import CommandAnswer
+from palpate.report.page import CommandAnswer, as_html, console_text
 from palpate.signals.types import NORMAL
 from palpate.text import print_hanging, printable
 from palpate.units import NONE, plain, quantity, with_half
@@ -115,7 +91,13 @@ def show(
 
 
 def answer_of(
-    found: Identification, source: Source, places: Sequence[str], more: str, *, verbose: bool, budget: bool
+    found: Identification,
+    source: words.Source,
+    places: Sequence[str],
+    more: str,
+    *,
+    verbose: bool,
+    budget: bool,
 ) -> CommandAnswer:
     """The answer of `palpate identify` for one log.
 
@@ -139,12 +121,12 @@ def answer_of(
             details.show_budgets(found, console)
 
     file = {"file": source.file, "sha256": source.sha256}
-    return CommandAnswer({"files": [file], **as_json(found, source)}, show=display)
+    return CommandAnswer({"files": [file], **words.as_json(found, source)}, show=display)
 
 
 def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
     """The lines, with their styles."""
-    for text in unit_warnings(found):
+    for text in words.unit_warnings(found):
         yield Text(printable(f"! {text}"), style="bold yellow")
     point = found.working_point
     if found.slide is not None:
@@ -154,16 +136,16 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
     elif not found.contacts or point is None:
         title = f"{name} shows no stiffness: no stretch in contact is long enough"
         if not found.contacts:
-            title = no_contact_in(name, found)
+            title = words.no_contact_in(name, found)
         yield Text(printable(f"{title}."), style="bold")
         if found.contacts:
             yield Text("Log longer, or press deeper.")
-        elif title.startswith(UNTOUCHED.partition("in")[0]):
-            yield Text(ADVICE[Code.NO_CONTACT])
+        elif title.startswith(words.UNTOUCHED.partition("in")[0]):
+            yield Text(words.ADVICE[Code.NO_CONTACT])
     else:
         modulus = found.parameters.get("E")
         if modulus is not None:
-            mark = _IN_DOUBT if unit_warnings(found) else _mark(modulus)
+            mark = _IN_DOUBT if words.unit_warnings(found) else _mark(modulus)
             yield from _head(modulus, "Young's modulus", name, f"{_sentence(modulus.reason)}.", mark)
             name = ""
         yield from _stiffness(found, name)
@@ -173,7 +155,7 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
         yield Text("")
         yield Text(printable(_contact(found)))
         if point.source == "press" and found.press is not None and len(found.press.tangent) > 1:
-            yield Text(printable(" ".join(press_facts(found))))
+            yield Text(printable(" ".join(words.press_facts(found))))
         if found.lag is not None and found.lag.kind == "prior" and found.n:
             yield Text(_assumed_lag(found))
     yield from _foot(found, notes)
@@ -182,24 +164,24 @@ def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterat
 def _stiffness(found: Identification, name: str) -> Iterator[Text]:
     point = found.working_point
     assert point is not None
-    own, what, at = point.stiffness, "stiffness", place_of(found, point)
-    lost = own.verdict is Verdict.NOT_IDENTIFIABLE and loss_of(found, point)
+    own, what, at = point.stiffness, "stiffness", words.place_of(found, point)
+    lost = own.verdict is Verdict.NOT_IDENTIFIABLE and words.loss_of(found, point)
     if lost:
         at += f", beside {lost}"
-    mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
-    detail = _limit(at, limited_by(found))
-    if behind_the_arm(found):
+    mark = _IN_DOUBT if words.unit_warnings(found) else _mark(own)
+    detail = _limit(at, words.limited_by(found))
+    if words.behind_the_arm(found):
         what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
         detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
     elif point.differs:
-        text = f"{each_press(point)}   stiffness of each press   "
-        line = Text(text, style="bold").append("? they differ", style=STYLES[own.verdict])
+        text = f"{words.each_press(point)}   stiffness of each press   "
+        line = Text(text, style="bold").append("? they differ", style=words.STYLES[own.verdict])
         yield line.append(printable(f"        {name}") if name else "")
-        yield Text(printable(f"   {at}: {APART}."))
+        yield Text(printable(f"   {at}: {words.APART}."))
         return
-    elif by_the_model(found):
+    elif words.by_the_model(found):
         own, what = found.parameters["K"], f"stiffness by the model {found.model}"
-        mark = _IN_DOUBT if unit_warnings(found) else _mark(own)
+        mark = _IN_DOUBT if words.unit_warnings(found) else _mark(own)
         detail = _limit(at, cause_of(next(iter(own.budget), None)))
     elif own.value is not None and own.ci95 is not None and own.ci95[1] < 0:
         detail = (
@@ -216,7 +198,7 @@ def _limit(at: str, cause: Cause) -> str:
 
 def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
     """The value, what it is and its verdict; below, what it belongs to."""
-    value = "no number" if p.value is None else full_number(p)
+    value = "no number" if p.value is None else words.full_number(p)
     line = Text(value, style="bold").append(f"   {what}   ").append(mark)
     yield line.append(printable(f"        {name}") if name else "")
     yield Text(printable(f"{' ' * (len(value) + 3)}{detail}"))
@@ -232,7 +214,7 @@ def _sentence(reason: str) -> str:
 
 
 def _mark(p: Parameter) -> Text:
-    return Text(f"{MARKS[p.verdict]} {p.verdict}", style=STYLES[p.verdict])
+    return Text(f"{words.MARKS[p.verdict]} {p.verdict}", style=words.STYLES[p.verdict])
 
 
 def _rows(found: Identification) -> Iterator[Text]:
@@ -261,7 +243,7 @@ def _reasons(found: Identification) -> Iterator[Text]:
 
 
 def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
-    bound = name == "K" and behind_the_arm(found)
+    bound = name == "K" and words.behind_the_arm(found)
     cause = next(iter(p.budget), "")
     why = (
         f"lag, ± {plain(1e3 * _lag_half(found), 2)} ms"
@@ -274,20 +256,20 @@ def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
     texts = (name, _interval(p, bound), "", why, remedy)
     cells = [Text(printable(text)) for text in texts]
     cells[2] = _BOUND if bound else _mark(p)
-    if unit_warnings(found) and p.verdict is Verdict.IDENTIFIED:
+    if words.unit_warnings(found) and p.verdict is Verdict.IDENTIFIED:
         cells[2] = Text("? in doubt", style="yellow")
     return cells
 
 
 def _interval(p: Parameter, bound: bool) -> str:
     if p.value is not None and (bound or p.verdict is Verdict.IDENTIFIED):
-        return full_number(p)
+        return words.full_number(p)
     if p.ci95 is None or p.verdict is Verdict.REJECTED:
         return NONE
     low, high = p.ci95
     if low < 0 < high and p.unit in {"N/m", "N s/m", "kg", "Pa", "1"}:
         return f"below {quantity(high, p.unit, digits=2)}"
-    return interval(p.ci95, p.unit)
+    return words.interval(p.ci95, p.unit)
 
 
 def _lag_half(found: Identification) -> float:
@@ -312,7 +294,7 @@ def _contact(found: Identification) -> str:
 
 def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
     """The other warnings, and how the log was read."""
-    shown = {*_SHOWN_OTHERWISE, *UNIT_WARNINGS}
+    shown = {*_SHOWN_OTHERWISE, *words.UNIT_WARNINGS}
     others = dict.fromkeys(warn.code.word for warn in found.warnings if warn.code not in shown)
     if others:
         yield Text(f"Seen, too: {', '.join(others)} (--verbose explains each).", style="yellow")
@@ -336,9 +318,7 @@ def _assumed_lag(found: Identification) -> str:
         whole = hypot(*p.budget.values())
         rest = sqrt(max(whole**2 - p.budget["lag"] ** 2, 0.0))
         if rest:
-            text += (
-                f": a calibration makes the {CALLED[name]}'s interval {plain(whole / rest, 2)} times narrower"
-            )
+            text += f": a calibration makes the {words.CALLED[name]}'s interval {plain(whole / rest, 2)} times narrower"
             break
     return f"{text}. {_ONE_CLOCK}"
 
@@ -361,7 +341,7 @@ def text(found: Identification) -> str:
 def html(found: Identification) -> str:
     """The sentence, a row a parameter, and the warnings."""
     rows = [HEAD, *(_row(name, parameter) for name, parameter in found.parameters.items())]
-    return as_html(sentence(found), rows, [f"{warn.code.word}: {warn.text}" for warn in found.warnings])
+    return as_html(words.sentence(found), rows, [f"{warn.code.word}: {warn.text}" for warn in found.warnings])
 
 
 def _row(name: str, own: Parameter) -> tuple[str, ...]:
@@ -369,7 +349,7 @@ def _row(name: str, own: Parameter) -> tuple[str, ...]:
 
 
 def _value(own: Parameter) -> str:
-    return "-" if own.value is None else full_number(own)
+    return "-" if own.value is None else words.full_number(own)
 
 
 def draw(found: Identification) -> Figure:
@@ -387,4 +367,4 @@ def draw(found: Identification) -> Figure:
 
 def page(found: Identification) -> str:
     """The page of `palpate identify --report`."""
-    return pages.page(found, Source(NAME, found.options, command="palpate.identify(...).report(...)"))
+    return pages.page(found, words.Source(NAME, found.options, command="palpate.identify(...).report(...)"))

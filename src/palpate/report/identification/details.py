@@ -9,18 +9,7 @@ from rich.text import Text
 
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification.words import (
-    CALLED,
-    STYLES,
-    facts_of,
-    full_number,
-    interval,
-    lag_of,
-    number,
-    press_facts,
-    sentence,
-    unit,
-)
+from palpate.report.identification import words
 from palpate.text import printable
 from palpate.units import NONE, between, plain, quantity
 
@@ -36,10 +25,10 @@ def show(found: Identification, name: str, console: Console) -> None:
         name: of the log.
         console: where to.
     """
-    console.print(Text(printable(sentence(found)), style="bold"))
+    console.print(Text(printable(words.sentence(found)), style="bold"))
     console.print(Text(printable(f"{name}: {_contacts(found)}")))
     _point(found, console)
-    for fact in press_facts(found):
+    for fact in words.press_facts(found):
         console.print(Text(fact))
     for fact in found.slide.facts if found.slide else ():
         console.print(Text(fact))
@@ -51,7 +40,7 @@ def show(found: Identification, name: str, console: Console) -> None:
         console.print(Text(f"resonance {frequency:.4g} Hz, damping ratio {ratio:.3g}"))
     for parameter, p in found.parameters.items():
         if p.verdict is not Verdict.IDENTIFIED or parameter == "E":
-            note(console, f"{parameter}:", p.reason, STYLES[p.verdict])
+            note(console, f"{parameter}:", p.reason, words.STYLES[p.verdict])
     for warn in found.warnings:
         note(console, f"{warn.code.word}:", warn.text, "yellow")
 
@@ -69,20 +58,22 @@ def _point(found: Identification, console: Console) -> None:
     if point is None:
         return
     own = point.stiffness
-    value = NONE if own.value is None else full_number(own)
-    line = Text.assemble(("working point", "bold"), f": {value}, ", (str(own.verdict), STYLES[own.verdict]))
-    line.append(f"; {', '.join(facts_of(found, point))}; from the {point.source}")
+    value = NONE if own.value is None else words.full_number(own)
+    line = Text.assemble(
+        ("working point", "bold"), f": {value}, ", (str(own.verdict), words.STYLES[own.verdict])
+    )
+    line.append(f"; {', '.join(words.facts_of(found, point))}; from the {point.source}")
     console.print(line)
     if own.value is None:
-        note(console, "working point:", own.reason, STYLES[own.verdict])
+        note(console, "working point:", own.reason, words.STYLES[own.verdict])
     if point.prediction95:
-        console.print(Text(f"the next press: {interval(point.prediction95, own.unit)} (95 %)"))
+        console.print(Text(f"the next press: {words.interval(point.prediction95, own.unit)} (95 %)"))
 
 
 def _fit(found: Identification) -> str:
     text = f"{found.model}: R2 {found.r2:.4f}, rms misfit {plain(found.rmse, 3)}, {found.n} samples"
     text += f", filters {found.cutoff:.3g} Hz"
-    return f"{text}, {lag_of(found)}" if found.lag else text
+    return f"{text}, {words.lag_of(found)}" if found.lag else text
 
 
 def _parameters(found: Identification) -> Table:
@@ -93,14 +84,14 @@ def _parameters(found: Identification) -> Table:
             title, justify=justify, no_wrap=title != "limited by", min_width=3 if title != "unit" else 5
         )
     for name, p in found.parameters.items():
-        style = STYLES[p.verdict]
+        style = words.STYLES[p.verdict]
         limit = next(iter(p.budget), NONE)
-        table.add_row(name, _value(p), _own(p), unit(p), Text(str(p.verdict), style=style), limit)
+        table.add_row(name, _value(p), _own(p), words.unit(p), Text(str(p.verdict), style=style), limit)
     return table
 
 
 def _value(p: Parameter) -> str:
-    return NONE if p.value is None else number(p)
+    return NONE if p.value is None else words.number(p)
 
 
 def _own(p: Parameter) -> str:
@@ -149,7 +140,7 @@ def budgets(found: Identification) -> Iterator[BudgetTable]:
     if point is not None:
         yield _budget("stiffness at the working point", point)
     for name, one in own["parameters"].items():
-        yield _budget(f"{name}, {CALLED[name]}" if name in CALLED else name, one)
+        yield _budget(f"{name}, {words.CALLED[name]}" if name in words.CALLED else name, one)
 
 
 def correlation(found: Identification) -> str:

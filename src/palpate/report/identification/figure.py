@@ -318,7 +318,7 @@ def draw(found: Identification, title: str) -> Figure:
         raise ValueError("an identification without traces has no figure")
     with style.ink():
         fitted = len(traces.fitted_time) > 0
-        figure = _figure(WIDE, _HIGH if fitted else _HIGH / 2)
+        figure = style.empty(WIDE, _HIGH if fitted else _HIGH / 2)
         parts: Any = figure.subfigures(2, 1, height_ratios=(_HEAD, figure.get_figheight() - _HEAD))
         head, body = parts
         _head(head, found, title)
@@ -367,7 +367,7 @@ def dynamic(figure: Any, found: Identification, traces: Traces, title: str = "")
 def one(panel: Panel, found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """A figure of one panel, so many pixels wide and high on a page."""
     with style.ink(LETTERS):
-        figure = _figure(width * _PIXEL, height * _PIXEL)
+        figure = style.empty(width * _PIXEL, height * _PIXEL)
         panel(figure.subplots(), found, traces)
     return figure
 
@@ -375,15 +375,9 @@ def one(panel: Panel, found: Identification, traces: Traces, width: int, height:
 def both_parts(found: Identification, traces: Traces, width: int, height: int) -> Figure:
     """Storage above loss, likewise."""
     with style.ink(LETTERS):
-        figure = _figure(width * _PIXEL, height * _PIXEL)
+        figure = style.empty(width * _PIXEL, height * _PIXEL)
         dynamic(figure, found, traces)
     return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), dpi=style.DPI, layout="constrained")
 
 
 def _title(axis: Axes, text: str) -> Axes:

@@ -10,26 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.identification.result import Identification, Traces
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification import figure
+from palpate.report.identification import figure, words
 from palpate.report.identification.details import BUDGET_HEAD, BUDGET_WORDS, METHOD, budgets, correlation
 from palpate.report.identification.figure import Panel, both_parts, one, shown_by
 from palpate.report.identification.spectra import over_noise, whiteness_of
-from palpate.report.identification.words import (
-    CALLED,
-    NO_NUMBER,
-    Source,
-    advice,
-    as_json,
-    facts_of,
-    full_number,
-    interval,
-    limited_by,
-    model_line,
-    sentence,
-    subtitle,
-    units_of,
-    work_loss,
-)
 from palpate.report.page import data_address, render
 from palpate.report.style import svg
 from palpate.text import printable
@@ -74,10 +58,10 @@ def press(found: Identification, traces: Traces) -> str:
     own = found.press
     if own is None:
         return "The log has no loading long enough for a slope."
-    force = units_of(found)[0]
+    force = words.units_of(found)[0]
     told = ["The slope is the stiffness, the width of the loop the lost work. The ring is the working point."]
     if own.hysteresis_loss is not None:
-        told.append(f"{work_loss(own.hysteresis_loss)}.")
+        told.append(f"{words.work_loss(own.hysteresis_loss)}.")
     if own.relaxation is not None:
         r = own.relaxation
         told.append(
@@ -150,7 +134,7 @@ _MOST_CONTACTS = 20
 """That a page lists one by one."""
 
 
-def page(found: Identification, source: Source) -> str:
+def page(found: Identification, source: words.Source) -> str:
     """The page of an identification as HTML."""
     listed = found.contacts[:_MOST_CONTACTS]
     return render(
@@ -160,15 +144,16 @@ def page(found: Identification, source: Source) -> str:
         made=source.made,
         scripts=(),
         title=source.title,
-        sentence=sentence(found),
-        model_line=model_line(found),
-        subtitle=subtitle(found),
+        sentence=words.sentence(found),
+        model_line=words.model_line(found),
+        subtitle=words.subtitle(found),
         notes=[printable(note) for note in source.notes],
         point=_point(found),
         first=_evidence(found),
         cards=[_card(name, p) for name, p in found.parameters.items()],
         warnings=[
-            {"code": w.code.word, "text": printable(w.text), "advice": advice(w.code)} for w in found.warnings
+            {"code": w.code.word, "text": printable(w.text), "advice": words.advice(w.code)}
+            for w in found.warnings
         ],
         figures=_figures(found),
         budgets=list(budgets(found)),
@@ -178,10 +163,10 @@ def page(found: Identification, source: Source) -> str:
         models=_models(found),
         octaves=_octaves(found),
         unit=_of(found.working_point.stiffness.unit if found.working_point else "1"),
-        force_unit=_of(units_of(found)[0]),
+        force_unit=_of(words.units_of(found)[0]),
         contacts=listed,
         more=len(found.contacts) - len(listed),
-        json=json.dumps(as_json(found, source), indent=1),
+        json=json.dumps(words.as_json(found, source), indent=1),
         source=source,
         options=", ".join(
             f"{printable(str(k))} {printable(str(v))}" for k, v in _describe(found, source).items()
@@ -191,7 +176,7 @@ def page(found: Identification, source: Source) -> str:
     )
 
 
-def _describe(found: Identification, source: Source) -> dict[str, Any]:
+def _describe(found: Identification, source: words.Source) -> dict[str, Any]:
     return {**source.options, **found.options}
 
 
@@ -200,17 +185,17 @@ def _point(found: Identification) -> dict[str, Any] | None:
     point = found.working_point
     if point is None:
         return None
-    own, limit = point.stiffness, limited_by(found)
-    force, depth, frequency = facts_of(found, point)
+    own, limit = point.stiffness, words.limited_by(found)
+    force, depth, frequency = words.facts_of(found, point)
     return {
         "number": split(own),
         "tone": TONES[own.verdict],
         "verdict": str(own.verdict),
-        "interval": interval(own.ci95, own.unit),
+        "interval": words.interval(own.ci95, own.unit),
         "force": force,
         "depth": depth,
         "frequency": frequency,
-        "next": interval(point.prediction95, own.unit),
+        "next": words.interval(point.prediction95, own.unit),
         "reason": printable(own.reason),
         "limit": f"{limit.described}. {limit.remedy.capitalize()}.",
         "scale": _scale(own, found),
@@ -231,15 +216,15 @@ def _scale(p: Parameter, found: Identification) -> str:
 def _card(name: str, p: Parameter) -> dict[str, Any]:
     return {
         "name": name,
-        "called": CALLED.get(name, ""),
+        "called": words.CALLED.get(name, ""),
         "colour": name if name in _COLOURED else "other",
         "value": p.value,
         "number": split(p),
         "tone": TONES[p.verdict],
         "verdict": str(p.verdict),
         "reason": printable(p.reason),
-        "interval": interval(p.ci95, p.unit),
-        "own": interval(p.ci95_if_model_holds, p.unit),
+        "interval": words.interval(p.ci95, p.unit),
+        "own": words.interval(p.ci95_if_model_holds, p.unit),
         "bar": _bar(p),
         "budget": _budget(p),
     }
@@ -248,8 +233,8 @@ def _card(name: str, p: Parameter) -> dict[str, Any]:
 def split(p: Parameter) -> dict[str, Any]:
     """A number, its half-width and its unit, to be written large and less large."""
     if p.value is None:
-        return {"value": None, "text": NO_NUMBER, "half": "", "unit": ""}
-    text = full_number(p)
+        return {"value": None, "text": words.NO_NUMBER, "half": "", "unit": ""}
+    text = words.full_number(p)
     plus, _, unit = text.rpartition(" ") if p.unit != "1" else (text, "", "")
     if p.unit != "1" and " " in p.unit:  # N s/m: two words
         head, _, first = plus.rpartition(" ")

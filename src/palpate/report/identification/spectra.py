@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import AnyArray, Array, Mask
 from palpate.identification.filters.state_variable import ORDER
 from palpate.identification.result import Identification, Traces
 from palpate.signals.samples import GAUSSIAN
@@ -120,7 +118,7 @@ def stretches(time: Array) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(edges)]
 
 
-def _periodogram(values: Array, dt: float) -> tuple[NDArray[Any], Array]:
+def _periodogram(values: Array, dt: float) -> tuple[AnyArray, Array]:
     """Frequencies above 0 [Hz] and one-sided power density there, freed of a line and tapered (Hann)."""
     n = len(values)
     ramp = np.arange(n) - (n - 1) / 2

@@ -15,22 +15,8 @@ from palpate.report import style
 from palpate.report.identification.figure import LETTERS, WIDE
 from palpate.report.identification.page import HALF, TONES, split
 from palpate.report.identification.words import CALLED, Source, full_number, interval
-from palpate.report.many.table import (
-    POINT,
-    LogRow,
-    failures,
-    faults,
-    json_of,
-    notes,
-    place,
-    quantities,
-    quantities_with_number,
-    sentence,
-    tables,
-    together,
-)
-from palpate.report.output import as_html, as_text
-from palpate.report.page import Card, PageAnswer, answer_page, data_address, warning_alerts
+from palpate.report.many import table
+from palpate.report.page import Card, PageAnswer, answer_page, as_html, as_text, data_address, warning_alerts
 from palpate.report.style import svg
 from palpate.text import printable
 from palpate.units import NONE, quantity
@@ -40,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-COLOURS = {POINT: style.K, "K": style.K, "B": style.B, "M": style.M}
+COLOURS = {table.POINT: style.K, "K": style.K, "B": style.B, "M": style.M}
 _ROW, _BESIDE = 0.31, 1.25
 """Height of a log's row, and of what is above and below all of them [in]."""
 _LONGEST = 26
@@ -49,52 +35,48 @@ _TICKS = 5
 """Numbers under a panel at most: more run into each other where it is narrow."""
 
 
-def write_figure(rows: Sequence[LogRow], pooled: Pooled, path: Path, dpi: int | None = None) -> Path:
+def write_figure(rows: Sequence[table.LogRow], pooled: Pooled, path: Path, dpi: int | None = None) -> Path:
     """Draw the forest plots and write them, whole or not at all."""
     figure = draw_logs(rows, pooled)
     return style.save(figure, path, dpi)
 
 
-def draw_logs(rows: Sequence[LogRow], pooled: Pooled) -> Figure:
+def draw_logs(rows: Sequence[table.LogRow], pooled: Pooled) -> Figure:
     """The sentence, and a forest plot of each quantity that is pooled, two beside each other."""
-    from matplotlib.figure import Figure
-
-    names = quantities_with_number(rows, pooled) or [POINT]
+    names = table.quantities_with_number(rows, pooled) or [table.POINT]
     high = height(rows) * -(-len(names) // 2)
     with style.ink():
-        figure = Figure(figsize=(WIDE, high + 1.0), dpi=style.DPI, layout="constrained")
+        figure = style.empty(WIDE, high + 1.0)
         parts: Any = figure.subfigures(2, 1, height_ratios=(1.0, high))
         head, body = parts
-        text = fill(f"{sentence(rows, pooled)} {failures(rows)}".strip(), 125)
+        text = fill(f"{table.sentence(rows, pooled)} {table.failures(rows)}".strip(), 125)
         head.text(0.01, 0.95, text, fontsize=13, va="top", parse_math=False)
         grid = body.subplots(-(-len(names) // 2), 2, squeeze=False).ravel()
         for axis in grid[len(names) :]:
             axis.set_axis_off()
         for axis, name in zip(grid, names, strict=False):
-            forest(axis, rows, name, quantities(pooled).get(name))
+            forest(axis, rows, name, table.quantities(pooled).get(name))
     return figure
 
 
-def one(rows: Sequence[LogRow], pooled: Pooled, name: str, width: int) -> Figure:
+def one(rows: Sequence[table.LogRow], pooled: Pooled, name: str, width: int) -> Figure:
     """One forest plot, so many pixels wide on a page."""
-    from matplotlib.figure import Figure
-
     with style.ink(LETTERS):
-        figure = Figure(figsize=(width / 72, height(rows)), dpi=style.DPI, layout="constrained")
-        forest(figure.subplots(), rows, name, quantities(pooled).get(name))
+        figure = style.empty(width / 72, height(rows))
+        forest(figure.subplots(), rows, name, table.quantities(pooled).get(name))
     return figure
 
 
-def height(rows: Sequence[LogRow]) -> float:
+def height(rows: Sequence[table.LogRow]) -> float:
     """Of a forest plot [in]."""
     return _ROW * (len(rows) + 1) + _BESIDE
 
 
-def forest(axis: Axes, rows: Sequence[LogRow], name: str, pooled: PooledParameter | None) -> None:
+def forest(axis: Axes, rows: Sequence[table.LogRow], name: str, pooled: PooledParameter | None) -> None:
     """A row a log, the first at the top; what is pooled at the bottom."""
     unit = pooled.parameter.unit if pooled else "1"
     colour = COLOURS.get(name, style.F)
-    called = "stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
+    called = "stiffness at the working point" if name == table.POINT else f"{name}, {CALLED.get(name, name)}"
     style.panel(axis, called if unit == "1" else f"{called} [{unit}]")
     axis.grid(visible=False, axis="y")
     axis.locator_params(axis="x", nbins=_TICKS)
@@ -130,31 +112,33 @@ def _together(axis: Axes, pooled: PooledParameter | None) -> None:
         axis.plot(pooled.prediction95, (0, 0), ls="", marker="|", ms=12, color=style.INK)
 
 
-def _short(row: LogRow) -> str:
+def _short(row: table.LogRow) -> str:
     name = printable(row.source.title)
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 9]}…{name[-8:]}"
 
 
-_COLOURED = {POINT: "K", "K": "K", "B": "B", "M": "M"}
+_COLOURED = {table.POINT: "K", "K": "K", "B": "B", "M": "M"}
 
 
-def page_of_logs(rows: Sequence[LogRow], pooled: Pooled) -> str:
+def page_of_logs(rows: Sequence[table.LogRow], pooled: Pooled) -> str:
     """The page as HTML."""
     source = rows[0].source if rows else Source("")
     point = pooled.working_point
     options = ", ".join(f"{name} {value}" for name, value in source.options.items())
     digests = [(row.source.title, row.source.sha256 or NONE) for row in rows]
-    logs = replace(tables(rows, pooled, places=True)[0], title="Log by log")
+    logs = replace(table.tables(rows, pooled, places=True)[0], title="Log by log")
     answer = PageAnswer(
         title=f"{len(rows)} logs",
-        sentence=sentence(rows, pooled),
-        about=". ".join(filter(None, [f"Working points {place(rows, point)}" if point else "", options])),
-        alerts=warning_alerts(faults(rows)),
-        cards={"Together": [_card(name, own, pooled) for name, own in quantities(pooled).items()]},
+        sentence=table.sentence(rows, pooled),
+        about=". ".join(
+            filter(None, [f"Working points {table.place(rows, point)}" if point else "", options])
+        ),
+        alerts=warning_alerts(table.faults(rows)),
+        cards={"Together": [_card(name, own, pooled) for name, own in table.quantities(pooled).items()]},
         tables=[logs],
-        pairs=[_figure(rows, pooled, name) for name in quantities_with_number(rows, pooled)],
+        pairs=[_figure(rows, pooled, name) for name in table.quantities_with_number(rows, pooled)],
         folds=[("sha256 of each log", "", digests)],
-        source=("The same as JSON", json.dumps(json_of(rows, pooled), indent=1)),
+        source=("The same as JSON", json.dumps(table.json_of(rows, pooled), indent=1)),
     )
     made = {"made": source.made} if source.made else {}
     return answer_page(answer, room="identify", command=source.command, **made)
@@ -172,16 +156,16 @@ def _card(name: str, own: PooledParameter, pooled: Pooled) -> Card:
         *slopes,
     ]
     return Card(
-        "Stiffness at the working point" if name == POINT else ", ".join(filter(None, [name, CALLED.get(name)])),
+        "Stiffness at the working point" if name == table.POINT else ", ".join(filter(None, [name, CALLED.get(name)])),
         number["text"] if p.value is not None else "", number["unit"], number["half"],
         printable("; ".join(filter(None, [*facts, p.reason]))),
         TONES[p.verdict], str(p.verdict), _COLOURED.get(name, ""),
     )  # fmt: skip
 
 
-def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]:
-    title = "Stiffness at the working point" if name == POINT else f"{name}, {CALLED.get(name, name)}"
-    own = quantities(pooled)[name].parameter
+def _figure(rows: Sequence[table.LogRow], pooled: Pooled, name: str) -> dict[str, str]:
+    title = "Stiffness at the working point" if name == table.POINT else f"{name}, {CALLED.get(name, name)}"
+    own = table.quantities(pooled)[name].parameter
     words = (
         f"Pooled: {full_number(own)}. Each log's value with its 95 % interval; the diamond is the mean of all with its"
         " own, the brackets hold where the next press falls. Pale: not pooled."
@@ -192,21 +176,21 @@ def _figure(rows: Sequence[LogRow], pooled: Pooled, name: str) -> dict[str, str]
 
 def line(pooled: Pooled) -> str:
     """Each quantity with its verdict."""
-    values = [f"{row[0]} {row[1]} {row[-1]}" for row in together(pooled).rows]
+    values = [f"{row[0]} {row[1]} {row[-1]}" for row in table.together(pooled).rows]
     return printable(f"{pooled.count} logs; {', '.join(values) or 'nothing in common'}")
 
 
 def text(pooled: Pooled) -> str:
     """The output of `palpate identify` for many logs."""
     rows = _rows(pooled)
-    shown = [as_text(table.title, [table.head, *table.rows]) for table in tables(rows, pooled)]
-    return printable("\n".join([sentence(rows, pooled), *shown, *notes(rows, pooled)]))
+    shown = [as_text(part.title, [part.head, *part.rows]) for part in table.tables(rows, pooled)]
+    return printable("\n".join([table.sentence(rows, pooled), *shown, *table.notes(rows, pooled)]))
 
 
 def html(pooled: Pooled) -> str:
     """The sentence, and a row a quantity."""
-    rows, table = _rows(pooled), together(pooled)
-    return as_html(sentence(rows, pooled), [table.head, *table.rows], notes(rows, pooled))
+    rows, total = _rows(pooled), table.together(pooled)
+    return as_html(table.sentence(rows, pooled), [total.head, *total.rows], table.notes(rows, pooled))
 
 
 def draw(pooled: Pooled) -> Figure:
@@ -216,7 +200,7 @@ def draw(pooled: Pooled) -> Figure:
         InputError: no log gives anything a number.
     """
     rows = _rows(pooled)
-    if not quantities_with_number(rows, pooled):
+    if not table.quantities_with_number(rows, pooled):
         raise InputError("none of these logs gives a number; there is nothing to draw")
     return draw_logs(rows, pooled)
 
@@ -226,12 +210,12 @@ def page(pooled: Pooled) -> str:
     return page_of_logs(_rows(pooled), pooled)
 
 
-def _rows(pooled: Pooled) -> list[LogRow]:
+def _rows(pooled: Pooled) -> list[table.LogRow]:
     """A row a log, by its name, or by its place."""
     names = pooled.names or [f"log {i + 1}" for i in range(pooled.count)]
     options = next((dict(found.options) for found in pooled.logs if found is not None), {})
     made = "palpate.identification.pool(...).report(...)"
     return [
-        LogRow(Source(name, options, command=made), found, "" if found else "it was not identified")
+        table.LogRow(Source(name, options, command=made), found, "" if found else "it was not identified")
         for name, found in zip(names, pooled.logs, strict=True)
     ]

@@ -13,18 +13,7 @@ from palpate.identification.causes import cause_of
 from palpate.identification.pooling import Pooled, PooledParameter, PooledPoint
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification.words import (
-    Source,
-    as_json,
-    by_the_model,
-    facts_of,
-    full_number,
-    interval,
-    number,
-    unit,
-    unit_warnings,
-    units_of,
-)
+from palpate.report.identification import words
 from palpate.report.page import CommandAnswer, Table
 from palpate.units import NONE, plain, quantity, si_prefix, with_half
 
@@ -41,7 +30,7 @@ class LogRow:
         error: why not, in one line.
     """
 
-    source: Source
+    source: words.Source
     found: Identification | None
     error: str = ""
 
@@ -57,7 +46,7 @@ class LogRow:
         """As of one log; a log that could not be read has an `error` and nothing else."""
         if self.found is None:
             return {"file": self.source.file, "error": self.error}
-        return as_json(self.found, self.source)
+        return words.as_json(self.found, self.source)
 
 
 def json_of(rows: Sequence[LogRow], pooled: Pooled) -> dict[str, Any]:
@@ -94,11 +83,11 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     limit = cause_of(next(iter(own.budget), None))
     after = point.stiffness.prediction95
     changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
-    by = f", it changes by {' and '.join(map(full_number, changes))}" if changes else ""
-    again = f", the next press is predicted at {interval(after, own.unit)} (95 %)" if after else ""
+    by = f", it changes by {' and '.join(map(words.full_number, changes))}" if changes else ""
+    again = f", the next press is predicted at {words.interval(after, own.unit)} (95 %)" if after else ""
     return (
-        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {full_number(own)}{by}{again}, {where};"
-        f" its uncertainty is mostly due to {limit.described}: {limit.remedy}."
+        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {words.full_number(own)}{by}{again},"
+        f" {where}; its uncertainty is mostly due to {limit.described}: {limit.remedy}."
     )
 
 
@@ -114,7 +103,7 @@ def slopes(pooled: Pooled) -> dict[str, Parameter]:
 def place(rows: Sequence[LogRow], point: PooledPoint) -> str:
     """The ranges of force, depth and frequency that it belongs to."""
     found = next((row.found for row in rows if row.found is not None), None)
-    force, position = units_of(found) if found else ("N", "m")
+    force, position = words.units_of(found) if found else ("N", "m")
 
     def spread(ends: tuple[float, float], unit: str) -> str:
         low, high = (f"{plain(x, 2)} Hz" if unit == "Hz" else quantity(x, unit) for x in ends)
@@ -138,7 +127,10 @@ def answer_of(rows: Sequence[LogRow], pooled: Pooled) -> CommandAnswer:
     files = [{"file": row.source.file, "sha256": row.source.sha256} for row in rows]
     json = {"files": files, **json_of(rows, pooled)}
     doubts = [
-        f"! {row.source.title}: {text}" for row in rows if row.found for text in unit_warnings(row.found)
+        f"! {row.source.title}: {text}"
+        for row in rows
+        if row.found
+        for text in words.unit_warnings(row.found)
     ]
     return CommandAnswer(json, sentence(rows, pooled), "", tables(rows, pooled), notes(rows, pooled), doubts)
 
@@ -181,8 +173,8 @@ def _place_and_verdict(row: LogRow) -> tuple[str, str, str]:
     point = row.found.working_point
     if point is None:
         return NONE, row.found.model, "no working point" if row.found.contacts else "no contact"
-    own = row.found.parameters["K"] if by_the_model(row.found) else point.stiffness
-    return ", ".join(facts_of(row.found, point)), row.found.model, str(own.verdict)
+    own = row.found.parameters["K"] if words.by_the_model(row.found) else point.stiffness
+    return ", ".join(words.facts_of(row.found, point)), row.found.model, str(own.verdict)
 
 
 def together(pooled: Pooled) -> Table:
@@ -190,27 +182,33 @@ def together(pooled: Pooled) -> Table:
     rows = []
     for name, own in quantities(pooled).items():
         p = own.parameter
-        mean = NONE if p.value is None else full_number(p)
+        mean = NONE if p.value is None else words.full_number(p)
         between = NONE if own.between is None else quantity(own.between, p.unit, digits=2)
         count = f"{len(own.logs)} of {pooled.count}"
-        rows.append((name, mean, interval(own.prediction95, p.unit) or NONE, between, count, str(p.verdict)))
+        rows.append(
+            (name, mean, words.interval(own.prediction95, p.unit) or NONE, between, count, str(p.verdict))
+        )
     return Table("", ("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict"), rows)
 
 
 def _dependences(pooled: Pooled) -> Table:
     rows = [
-        (name, (interval(p.ci95, p.unit) if p.value is None else full_number(p)) or NONE, str(p.verdict))
+        (
+            name,
+            (words.interval(p.ci95, p.unit) if p.value is None else words.full_number(p)) or NONE,
+            str(p.verdict),
+        )
         for name, p in slopes(pooled).items()
     ]
     return Table("", ("dependence", "± 95 %", "verdict"), rows)
 
 
 def _cell(p: Parameter | None) -> str:
-    return NONE if p is None or p.value is None else number(p)
+    return NONE if p is None or p.value is None else words.number(p)
 
 
 def _unit(p: Parameter) -> str:
-    return f" [{unit(p)}]" if unit(p) else ""
+    return f" [{words.unit(p)}]" if words.unit(p) else ""
 
 
 ENDINGS = (".csv", ".md", ".tex")

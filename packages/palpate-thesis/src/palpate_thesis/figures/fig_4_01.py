@@ -135,8 +135,8 @@ def press(pad: Pad, scheme: str, seed: int, seconds: float = SECONDS) -> TiltedP
     leak = (rng.uniform(-CROSSTALK, CROSSTALK, (6, 6)) + np.eye(6)) * units[:, None] / units
     places = pad.places
     step, reading, before, angles, forces = 1.0 / (RATE * STEPS), np.zeros(6), None, [], []
+    pose = start
     for _ in range(round(seconds * RATE)):
-        pose = arm.forward_kinematics(q)
         turned = np.kron(np.eye(2), pose[:3, :3])
         wanted = np.linalg.solve(arm.jacobian(q), turned @ command(reading, scheme))
         for _ in range(STEPS):
