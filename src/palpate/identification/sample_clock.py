@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.signals.samples import runs
 
+_BLOCKS = 1 << 10
 _EVERY_ROW = 0.9
 _FEWEST = 10
 _AT_FIRST = 1 << 14
@@ -140,10 +141,16 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
 
     middle, reach = float(np.mean(number)), float(np.ptp(number))
     count, left = (number - middle) / reach, changed - period * (number - middle)
-    points = np.column_stack([count, left])
-    both = [ConvexHull(np.vstack([points, [0.0, far]])).vertices for far in (left.min() - 1, left.max() + 1)]
-    own = np.unique(np.concatenate(both))
-    own = own[own < len(left)]
+    last, size = len(left) - 1, -(-len(left) // _BLOCKS)
+    hulls = []
+    for way in (1.0, -1.0):  # no corner lies within a line through the outermost changes of each block
+        outermost = [i + int(np.argmin(way * left[i : i + size])) for i in range(0, last, size)]
+        line = np.unique([0, *outermost, last])
+        outside = np.flatnonzero(way * left <= way * np.interp(count, count[line], left[line]))
+        points = np.column_stack([count, way * left])[outside]
+        corners = ConvexHull(np.vstack([points, [0.0, points[:, 1].max() + 1]])).vertices
+        hulls.append(outside[corners[corners < len(outside)]])
+    own = np.union1d(*hulls)
     ahead = np.column_stack([np.ones(len(own)), count[own], np.ones(len(own))])
     sides, limits = np.vstack([ahead, ahead * [-1, -1, 1]]), np.r_[left[own], 1 - left[own]]
     every = []
