@@ -30,7 +30,7 @@ import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -120,9 +120,13 @@ def files(figure: Figure) -> Iterator[Path]:
 
 def content(path: Path) -> bytes:
     """What can change a number: the syntax of a module without its docstrings, or the bytes of another file."""
-    if path.suffix != ".py":
-        return path.read_bytes()
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return path.read_bytes() if path.suffix != ".py" else syntax(path.read_text(encoding="utf-8"))
+
+
+@cache
+def syntax(source: str) -> bytes:
+    """That of a module without its docstrings; many figures are of one module."""
+    tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             node.body = [line for line in node.body if not is_text(line)]

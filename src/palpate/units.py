@@ -160,6 +160,12 @@ def plain(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
+def cone95(angle: float) -> float | None:
+    """Half-angle of a normal's 95 % cone [rad] in degrees; None above 90, where it holds any normal into a surface."""
+    degrees = math.degrees(angle)
+    return degrees if degrees <= 90.0 else None
+
+
 def with_half(value: float, half: float) -> str:
     """`5192 ± 18`: value and half-width of its interval, to two digits of the latter."""
     if not (half > 0 and math.isfinite(half)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -132,20 +133,11 @@ def many(
     Raises:
         InputError: no log could be read; nothing is printed or written then.
     """
-    from rich.progress import MofNCompleteColumn
-
     from palpate.identification.pooling import pool
     from palpate.report.identification.words import unit_warnings
 
-    rows: list[LogRow] = []
-    interrupted = False
-    try:
-        with bar(console(stderr=True), MofNCompleteColumn()) as progress:
-            for log in progress.track(logs, description=""):
-                progress.update(progress.task_ids[0], description=log.name)
-                rows.append(_row(log, asked))
-    except KeyboardInterrupt:
-        interrupted = True
+    rows = _rows(logs, asked)
+    interrupted = len(rows) < len(logs)
     failed = [row for row in rows if row.found is None]
     if not interrupted and len(failed) == len(rows):
         one = len(rows) == 1
@@ -165,6 +157,18 @@ def many(
     doubtful = any(row.found and unit_warnings(row.found) for row in rows)
     has_any = pooled.found or any(row.found and has_number(row.found) for row in rows)
     return 0 if has_any and not doubtful else 1
+
+
+def _rows(logs: Sequence[Path], asked: OneLog) -> list[LogRow]:
+    """A row of each log, up to an interruption."""
+    from rich.progress import MofNCompleteColumn
+
+    rows: list[LogRow] = []
+    with suppress(KeyboardInterrupt), bar(console(stderr=True), MofNCompleteColumn()) as progress:
+        for log in progress.track(logs, description=""):
+            progress.update(progress.task_ids[0], description=log.name)
+            rows.append(_row(log, asked))
+    return rows
 
 
 def _row(log: Path, asked: OneLog) -> LogRow:

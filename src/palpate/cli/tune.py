@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from palpate.cli._program import command, print_result
 from palpate.cli.options import force
@@ -61,12 +61,28 @@ def tune(
     surface, columns = surface or force.SurfaceOptions(), columns or force.ColumnOptions()
     output, report = output or force.TuningOutputOptions(), (page or ReportOption()).page()
     output.check_new(output.out, ending=".toml")
-    from palpate.force import tune as tune_loop
     from palpate.report.tuning import answer_of
+
+    tuning, loop = _tune(arm, press, surface, columns, found)
+    tuning = replace(tuning, gains=(slide or force.SlideTuningOptions()).tuned_for(tuning.gains))
+    written = _write(tuning, output.out, report)
+    print_result(answer_of(tuning, loop, written, verbose=output.verbose), json=output.json)
+    return 0 if tuning.proved else 1
+
+
+def _tune(
+    arm: force.LoopArmOptions,
+    press: force.PressOptions,
+    surface: force.SurfaceOptions,
+    columns: force.ColumnOptions,
+    found: Path | None,
+) -> tuple[Tuning, dict[str, Any] | None]:
+    """The tuned loop, and the inner loop that a log identifies, as plain JSON values."""
+    from palpate.force import tune as tune_loop
 
     one, inner = arm.load(columns)
     theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
-    told = tune_loop(
+    tuning = tune_loop(
         one,
         press.force.si,
         _surface_of(found, surface, columns),
@@ -75,11 +91,9 @@ def tune(
         surface_speed=surface.surface_speed,
         theta=None if theta is None else theta.high,
     )
-    told = replace(told, gains=(slide or force.SlideTuningOptions()).tuned_for(told.gains))
-    written = _write(told, output.out, report)
-    loop = None if inner is None else inner.to_json() | ({"theta_s": theta.to_json()} if theta else {})
-    print_result(answer_of(told, loop, written, verbose=output.verbose), json=output.json)
-    return 0 if told.proved else 1
+    return tuning, None if inner is None else inner.to_json() | (
+        {"theta_s": theta.to_json()} if theta else {}
+    )
 
 
 def _surface_of(
@@ -103,11 +117,11 @@ def _surface_of(
     return known_from(identified.to_json(), str(found)).with_damping_up_to(highest)
 
 
-def _write(told: Tuning, out: Path | None, page: Path | None) -> list[Path]:
+def _write(tuning: Tuning, out: Path | None, page: Path | None) -> list[Path]:
     if out is not None:
-        write_text(out, told.gains.to_toml())
+        write_text(out, tuning.gains.to_toml())
     if page is not None:
         from palpate.report.tuning import page as page_of
 
-        write_text(page, page_of(told, command()))
+        write_text(page, page_of(tuning, command()))
     return [path for path in (out, page) if path is not None]

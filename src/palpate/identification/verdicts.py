@@ -54,7 +54,7 @@ def verdicts(
     """
     contacts, model = choice.problem.contacts, choice.answer.fit.model
     tangent = None if contacts.press is None or model.nonlinear else point
-    found = against_working_point(choice.answer, point)
+    found = _lacking(against_working_point(choice.answer, point))
     if tangent is not None:
         found = replace(found, budget=_with_presses(found, tangent))
     scales = np.array([0.0 if name in (*_SHAPE, LAG) else options.calibration for name in found.names])
@@ -126,6 +126,18 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     return found.with_cause("dynamic stiffness", along * gap / power if power > 0 else np.zeros(len(slope)))
 
 
+def _lacking(found: Answer) -> Answer:
+    """An answer whose damping may be off by as much force as its mass is certainly below zero.
+
+    Of a force in an unknown phase, as much is in quadrature as in phase.
+    """
+    if "M" not in found.names or found["M"] + found.half_of("M") >= 0:
+        return found
+    speed, acceleration = (np.std(found.problem.motion.moved(k, found.fit.lag)) for k in (1, 2))
+    most = (found["M"] + found.half_of("M")) * acceleration / speed
+    return found.with_cause("missing force", most / NORMAL * np.equal(found.names, "B"))
+
+
 def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     """The budget of a linear answer, its stiffness no more certain than presses at constant speed agree on theirs.
 
@@ -159,12 +171,13 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     """A parameter that is certainly below zero refuses those that the same missing force may be in.
 
     All that is seen in time shares a force that depends on the motion. A stiffness below zero leaves no model at all. A
-    tool's inertia that was found in free motion and removed (`weighed`) is not that force, and K rests on the same fit.
+    mass below zero is in the damping's interval (`_lacking`), and refuses all only where a tool's inertia was found in
+    free motion and removed (`weighed`): it is not that force, and K rests on the same fit.
     """
     negative = [name for name in ("K", "B", "M") if name in parameters and _BELOW in parameters[name].reason]
     if "K" in negative:
         reason, touched = "K is certainly below zero: the model does not hold", (*parameters,)
-    elif len(negative) == 1:
+    elif len(negative) == 1 and (weighed or "B" in negative):
         reason = f"{negative[0]} is certainly below zero: the model lacks a force that depends on the motion"
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import msgspec
 import numpy as np
 
-from palpate._jit import BoundKernel, kernel, law
+from palpate._jit import BoundKernel, kernel, law, part
 from palpate._vector import Mat3, Vec3, Vec6
 from palpate.arrays import Array
 from palpate.controllers.controller import controller
@@ -241,31 +241,44 @@ def half_turn(R):
     return 0.5 * Vec3(R.r3.y - R.r2.z, R.r1.z - R.r3.x, R.r2.x - R.r1.y)
 
 
-@law
-def tip_torque(axes, held, control, state, force, task, damping, q, qd, found, own, torque):
-    """Fills the joints' torques from encoders and force reading: the controller's state.
+@part
+class TaskFrame(NamedTuple):
+    """Axes in which a tip works.
 
     Args:
         axes: of the task, in rows; the first is the surface's normal.
         held: axes of the tip when it stands as it should, in columns.
+        damping: of joints to spare [1/s].
+    """
+
+    axes: Mat3
+    held: Mat3
+    damping: float
+
+
+@law
+def tip_torque(frame, control, state, force, task, q, qd, found, own, torque):
+    """Fills the joints' torques from encoders and force reading: the controller's state.
+
+    Args:
+        frame: a `TaskFrame`.
         control: in six directions.
         state: its own.
         force: reading along the normal [N].
         task: what is asked for, in the task's axes.
-        damping: of joints to spare [1/s].
         q: measured [rad, m], shape (n,).
         qd: measured, shape (n,).
         found: what `described` says of these.
         own: room for the laws.
         torque: where it goes, shape (n,).
     """
-    room, tip = found.room, tip_of(found, qd)
+    axes, room, tip = frame.axes, found.room, tip_of(found, qd)
     model = task_model(axes, room, tip, own)
-    x = into(axes, tip.p, half_turn(tip.R @ held.T))
+    x = into(axes, tip.p, half_turn(tip.R @ frame.held.T))
     wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
     sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
     F, state = control.step(state, sense, task, model)
-    joint_torque(axes, room, model, own, F, damping, qd, torque)
+    joint_torque(axes, room, model, own, F, frame.damping, qd, torque)
     return state
 
 

@@ -13,7 +13,7 @@ from palpate.environments.surface import UNTOUCHED, rest_for
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Body, Reading, TouchState, Workcell
-from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, compiled_tip_torque
+from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, TaskFrame, compiled_tip_torque
 from palpate.press.sequence import TARE, TipSample
 from palpate.press.setting import Place
 from palpate.robots.serial.chain import room_for
@@ -229,7 +229,8 @@ class _TipLoop:
             Vec6(alike(spring), alike(spring * turning)), Vec6(alike(damper), alike(damper * turning))
         )
         self._chain, self._axes = arm.chain, place.axes
-        self._rows, self._held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
+        axes, held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
+        self._frame = TaskFrame(axes, held, _SPARE)
         n = arm.joints
         self._found, self._room = arm_state_for(n), task_room_for(n)
         self._states: dict[type, Any] = {}
@@ -238,7 +239,7 @@ class _TipLoop:
 
     def towards(self, goal: Array) -> Task:
         """The task of standing at a pose."""
-        self._held = Mat3(*map(triple, goal[:3, :3]))
+        self._frame = self._frame._replace(held=Mat3(*map(triple, goal[:3, :3])))
         x: Any = Vec6(triple(self._axes @ goal[:3, 3]), ZERO3)
         nothing = 0.0 * x
         return Task(x, nothing, nothing, nothing, nothing)
@@ -252,7 +253,6 @@ class _TipLoop:
         torque = np.zeros(self._n)
         compiled_description(self._chain, q, qd, self._found)
         self._states[kind] = self._laws[kind](
-            self._rows, self._held, controller, state, float(force), task, _SPARE, q, qd, self._found,
-            self._room, torque,
+            self._frame, controller, state, float(force), task, q, qd, self._found, self._room, torque,
         )  # fmt: skip
         return torque

@@ -199,7 +199,7 @@
     const kind = last("phase"), node = byId("phase");
     const [word, tone] = away ? ["gone", "fail"] : live.state && !live.state.playing && !live.state.ended ? ["paused", "none"]
       : live.state && live.state.ended && !live.state.ended.startsWith("done") ? ["stopped", "fail"] : live.state && live.state.ended ? ["ended", "none"]
-      : view.kind === "replay" ? ["playing", "ok"] : kind === 1 ? ["pressing", "ok"] : kind === 2 ? ["contact lost", "fail"] : ["approaching", "go"];
+      : view.kind === "replay" ? ["playing", "ok"] : live.state && live.state.stage ? [live.state.stage, "go"] : kind === 1 ? ["pressing", "ok"] : kind === 2 ? ["contact lost", "fail"] : ["approaching", "go"];
     if (node.textContent !== word) { node.textContent = word; node.className = `v ${tone}`; }
   };
 

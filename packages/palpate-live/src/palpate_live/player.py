@@ -239,6 +239,7 @@ class Player:
             "seed": state.seed,
             "ended": state.ended,
             "warning": state.warning,
+            "stage": state.stage,
             "happened": [asdict(one) for one in state.happened],
             "said": self._said,
             "stability": self._stability(),
@@ -266,9 +267,9 @@ class Player:
 
     def _advance(self, seconds: float) -> None:
         state = self.source.state
-        before = state.ended, state.happened, state.warning
+        before = state.ended, state.happened, state.warning, state.stage
         self.feed.put(self.source.advance(seconds))
-        if (state.ended, state.happened, state.warning) != before:
+        if (state.ended, state.happened, state.warning, state.stage) != before:
             if state.ended:
                 self._playing = False
             self.news()

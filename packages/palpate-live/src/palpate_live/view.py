@@ -179,6 +179,7 @@ class SourceState:
         ended: why it goes no further; empty while it does.
         happened: the last few moments worth a mark.
         warning: about the running simulation; empty if there is none.
+        stage: of what comes before the press, for the header; empty if there is none.
     """
 
     values: dict[str, float] = field(default_factory=dict)
@@ -186,6 +187,7 @@ class SourceState:
     ended: str = ""
     happened: list[Happened] = field(default_factory=list)
     warning: str = ""
+    stage: str = ""
 
     _MOST = 12
 
@@ -199,7 +201,7 @@ class SourceState:
             if seed < 0:
                 raise InputError(f"the seed must be 0 or above, got {seed}")
             self.seed = seed
-        self.ended, self.happened, self.warning = "", [], ""
+        self.ended, self.happened, self.warning, self.stage = "", [], "", ""
 
     def note(self, happened: Happened) -> None:
         """Keeps a moment, and forgets those long ago."""

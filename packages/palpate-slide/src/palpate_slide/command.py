@@ -91,8 +91,8 @@ class SlideOptions(SlideLimits):
         names = dict(_SURFACE)
         try:
             for part in self.surface.split(","):
-                key, _, text = (word.strip() for word in part.partition("="))
-                numbers[names.pop(key)] = float(text)
+                key, _, text = part.partition("=")
+                numbers[names.pop(key.strip())] = float(text)
         except (KeyError, ValueError):
             numbers.clear()
         if not {"stiffness", "friction"} <= numbers.keys():
@@ -113,9 +113,9 @@ class SlideOptions(SlideLimits):
             heights = heights_of(
                 Path(file), values.quantity("--shape", f"1:{unit}", "length"), float(abs(way).max())
             )
-        height = {"height": self.radius, "period": 0.02} if name == "step" else {}
-        radius = 0.2 if name == "step" else self.radius
-        return ground_of(name, radius, heights=heights, **numbers, **height)
+        if name == "step":
+            return ground_of(name, 0.2, heights=None, **numbers, height=self.radius, period=0.02)
+        return ground_of(name, self.radius, heights=heights, **numbers)
 
     @property
     def extent(self) -> float:
@@ -195,7 +195,7 @@ class SlideOptions(SlideLimits):
 
     def tuned_gains(self) -> Gains:
         """Gains for the slide; for an arm with joints with the mass of its tip."""
-        from msgspec.structs import replace as msgspec_replace
+        from msgspec.structs import replace as changed
 
         from palpate.force import load_arm, load_gains
         from palpate.force.gains import gains_for
@@ -210,7 +210,7 @@ class SlideOptions(SlideLimits):
                 raise InputError(
                     f"--{name} is of the gains, and {self.gains} has its own; leave it out, or tune again"
                 )
-            return gains if self.force is None else msgspec_replace(gains, force=wanted)
+            return gains if self.force is None else changed(gains, force=wanted)
         if not wanted > 0.0:
             raise InputError(f"--force must be above 0 N (pressing is positive), got {wanted:g} N")
         gains = gains_for(load_arm(self.arm) if self.has_no_joints else self.joints.inner, wanted)

@@ -93,9 +93,9 @@ def stiffness_along(rows: Array, arm: Arm, frequency: float) -> PathStiffness:
     goes_on = np.isin(c["trouble"], (FINE, AWAY, JERKS))
     parts = [slice(start, start + size) for start in starts if goes_on[start : start + size].all()]
     found = [_window(c, part, sensor) for part in parts]
-    own = [(place, *_own(arm, K, half)) for place, K, half in found if half < 0.5 * K < np.inf]
-    places = np.array([one[0] for one in own]).reshape(-1, 3)
-    return PathStiffness(places, np.array([one[1] for one in own]), np.array([one[2] for one in own]))
+    own = [[*place, *_own(arm, K, half)] for place, K, half in found if half < 0.5 * K < np.inf]
+    table = np.array(own).reshape(-1, 5)
+    return PathStiffness(table[:, :3], table[:, 3], table[:, 4])
 
 
 def _window(c: dict[str, Array], part: slice, sensor: complex) -> tuple[Array, float, float]:
@@ -103,9 +103,8 @@ def _window(c: dict[str, Array], part: slice, sensor: complex) -> tuple[Array, f
     p, n, f = (np.stack([c[f"{of}{axis}"][part] for axis in "xyz"], 1) for of in ("", "n", "f"))
     size = len(p)
     trend = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, size), TREND)
-    n = (
-        trend @ np.linalg.lstsq(trend, n, rcond=None)[0]
-    )  # one that follows the dither would add friction to it
+    # A normal that follows the dither would add friction to it.
+    n = trend @ np.linalg.lstsq(trend, n, rcond=None)[0]
     n /= np.linalg.norm(n, axis=1)[:, None]
     depth = np.append(0.0, np.cumsum(np.einsum("ij,ij->i", np.diff(p, axis=0), n[1:])))
     force = np.einsum("ij,ij->i", f, n)

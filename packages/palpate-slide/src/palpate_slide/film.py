@@ -47,9 +47,7 @@ def slide_film(rows: Array, tick: float, ground: Ground, half: str = "") -> str:
         half: `surface` or `force` for that half alone, which is legible on a telephone; both if empty.
     """
     c = dict(zip(COLUMNS, rows.T, strict=True))
-    began = (
-        np.flatnonzero(c["sliding"] > 0.0) if c["sliding"].any() else np.flatnonzero(c["normal_force"] > 0.0)
-    )
+    began = np.flatnonzero(c["sliding" if c["sliding"].any() else "normal_force"] > 0.0)
     first = max(int(began[0]) - round(BEFORE / tick), 0) if len(began) else 0
     shown = np.linspace(first, len(rows) - 1, FRAMES).astype(int)
     c, t = {name: np.nan_to_num(column[shown]) for name, column in c.items()}, tick * shown
@@ -77,14 +75,13 @@ _STYLE = (
 
 
 def _surface_panel(c: dict[str, Array], seconds: float, ground: Ground) -> list[str]:
-    tip, n = (np.stack([c[name] for name in names], 1) for names in (("x", "y", "z"), ("nx", "ny", "nz")))
+    tip, n, tool = (np.stack([c[f"{of}{axis}"] for axis in "xyz"], 1) for of in ("", "n", "a"))
     net = _net(tip, ground)
     view = view_of(
         np.vstack([line for line in net if len(line)]), SURFACE, np.radians(-65.0), np.radians(28.0)
     )
     seen, size = view(tip), ROD / view.scale
-    axis = np.stack([c[name] for name in ("ax", "ay", "az")], 1)
-    ends, on = view(tip - size * (axis if axis.any() else n)), c["sliding"] > 0.0
+    ends, on = view(tip - size * (tool if tool.any() else n)), c["sliding"] > 0.0
     cones = [coordinates(_cone(view, *one, size)) for one in zip(tip, n, c["cone"], strict=True)]
     way = np.linalg.norm(np.diff(tip, axis=0), axis=1) * on[1:]
     gone = np.append(0.0, np.cumsum(way)) / max(float(way.sum()), 1e-9)

@@ -16,6 +16,7 @@ from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD
 from palpate.identification.result import LagFound, SlideFound
 from palpate.identification.uncertainty import student
 from palpate.records import Record
+from palpate.units import cone95
 from palpate_slide.from_log import (
     ALONG,
     BLOCKS,
@@ -473,7 +474,7 @@ def _answer(
     mean = normal.mean(axis=0)
     mean /= np.linalg.norm(mean)
     turns = float(np.degrees(np.arccos(np.clip(normal @ mean, -1.0, 1.0)).max()))
-    wide = float(np.degrees(np.median(cone)))
+    wide = cone95(float(np.median(cone)))
     if own.value is None and own.ci95 is not None:
         first = f"The tip slides: mu is at most {own.ci95[1]:.3g}."
     elif own.value is None:
@@ -487,10 +488,10 @@ def _answer(
     if own.verdict is Verdict.REJECTED:
         return SlideFound(first, (), {"friction": None, "path_m": course.path})
     towards = ", ".join(f"{x + 0.0:.3f}" for x in mean)
-    facts = [
-        f"Normal into the surface ({towards}) in the base, 95 % cone {wide:.2g} deg, turns by {turns:.2g} deg.",
-        f"Path {1e3 * course.path:.3g} mm.",
-    ]
+    normals = (
+        f"({towards}) in the base, 95 % cone {wide:.2g} deg, turns by {turns:.2g} deg" if wide else "unknown"
+    )
+    facts = [f"Normal into the surface {normals}.", f"Path {1e3 * course.path:.3g} mm."]
     if len(parts):
         ends = f"{parts[:, 3].min():.4g} to {parts[:, 3].max():.4g}"
         facts.append(f"Stiffness along the path at {len(parts)} places: {ends} N/m.")

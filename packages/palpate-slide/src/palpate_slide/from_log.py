@@ -17,9 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 from palpate.contact_frame.free_motion import FEWEST
 from palpate.contact_frame.load import known_load, load_of, no_load, robust_load
 from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded
@@ -120,7 +119,7 @@ def smooth(signals: BaseSignals, freed: Unloaded) -> Smooth | None:
     return Smooth(step, rows, longer, grid, of(place, 0), of(place, 1), level, rate, grain, noise, edge)
 
 
-def nearest(time: Array, at: Array) -> NDArray[np.intp]:
+def nearest(time: Array, at: Array) -> Indices:
     """Rows that are nearest to some times, shape (n,)."""
     later = np.searchsorted(time, at).clip(1, len(time) - 1)
     return later - (at - time[later - 1] < time[later] - at)
@@ -231,7 +230,7 @@ class SlideWindows:
     force: Array
     rate: Array
     turned: Array
-    rows: NDArray[np.intp]
+    rows: Indices
     smooth: Smooth
     moves: Mask
     slides: Mask
@@ -443,7 +442,7 @@ class Fit:
         return float(np.sum(np.minimum(r**2, 9.0)) + far @ far)
 
 
-def _jackknife(J: Array, w: Array, r: Array, A: Array, inverse: Array, order: NDArray[np.intp]) -> Array:
+def _jackknife(J: Array, w: Array, r: Array, A: Array, inverse: Array, order: Indices) -> Array:
     """Covariance by leaving out blocks of rows of an order in turn, and the prior, shape (p, p)."""
     inner = np.linalg.inv(A)
     blocks = np.array_split(order, min(BLOCKS, max(len(r) // 4, 2)))

@@ -18,15 +18,16 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, figure_of, panels
 from palpate.report.page import Card, PageAnswer, answer_page, data_address
-from palpate.units import plain, quantity, quantity_between
+from palpate.units import cone95, plain, quantity, quantity_between
 from palpate_slide.film import slide_film
 from palpate_slide.ground import Ground
 from palpate_slide.world import COLUMNS, LONGEST, SETTLED, figures_of
 
-_UNITS = dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N") | dict.fromkeys(
-    ("x", "y", "z"), "m"
+_UNITS = (
+    dict.fromkeys(("normal_force", "desired", "fx", "fy", "fz"), "N")
+    | dict.fromkeys("xyz", "m")
+    | {"tool": "rad", "normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 )
-_UNITS |= {"tool": "rad", "normal_error": "rad", "cone": "rad", "stiffness": "N/m", "speed": "m/s", "t": "s"}
 
 
 _DITHERED = (
@@ -53,8 +54,7 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
         "arm": gains.arm.title, "mode": gains.arm.kind, "slide": slide_json(gains), "troubles": said,
         "end": "held" if found.obeys else "not held" if found.touched else never,
         "truth": {"friction": ground.friction, "stiffness": seen},
-        "force": None, "normal": None, "friction": None, "stiffness": None, "path_m": 0.0,
-        "tool": None,
+        **dict.fromkeys(("force", "normal", "friction", "stiffness", "tool")), "path_m": 0.0,
     }  # fmt: skip
     if not found.touched:
         return summary
@@ -68,7 +68,7 @@ def summarise(rows: Array, gains: Gains, ground: Ground, turned: bool = False) -
         },
         "normal": {
             "median_error_deg": float(np.degrees(found.normal)), "coverage": found.cone,
-            "cone95_deg": float(np.degrees(CHI2_95 * np.median(c["cone"][judged]))),
+            "cone95_deg": cone95(float(CHI2_95 * np.median(c["cone"][judged]))),
         },
         "friction": {"value": float(mu), "ci95": list(mu.ci95)},
         "stiffness": {"value": float(K), "ci95": list(K.ci95)},
@@ -88,14 +88,19 @@ def sentence(summary: dict[str, Any]) -> str:
         if summary["end"] == "no slide":
             return f"The force was not held within {LONGEST:g} s: the tip did not slide."
         return f"The surface was never touched in {LONGEST:g} s: does --normal point into it?"
-    n, held, (mu, half) = summary["normal"], summary["end"] == "held", _friction(summary)
+    held, (mu, half) = summary["end"] == "held", _friction(summary)
     angle = (summary["tool"] or {}).get("angle95_deg")
     within = f"; tool within {angle:.2g}\N{DEGREE SIGN} of the normal for 95 % of the time" if angle else ""
     return (
         f"{plain(f['desired_N'], 3)} N {'held' if held else 'not held:'} within {100 * f['rms_share']:.2g} % rms over "
-        f"{1e3 * summary['path_m']:.3g} mm; normal known to {plain(n['cone95_deg'], 2)}\N{DEGREE SIGN}; friction {mu} "
+        f"{1e3 * summary['path_m']:.3g} mm; normal {_normal(summary['normal'])}; friction {mu} "
         f"\N{PLUS-MINUS SIGN} {half}{within}."
     )
+
+
+def _normal(normal: dict[str, Any]) -> str:
+    cone = normal["cone95_deg"]
+    return "unknown" if cone is None else f"\N{PLUS-MINUS SIGN} {plain(cone, 2)}\N{DEGREE SIGN}"
 
 
 def _friction(summary: dict[str, Any]) -> tuple[str, str]:
@@ -123,13 +128,11 @@ def write_report(rows: Array, gains: Gains, ground: Ground, summary: dict[str, A
     if summary["end"] != "held":
         alerts.insert(0, {"tone": "fail", "title": "", "text": f"The force: {summary['end']}."})
     caption = "Along the path. Grey: 95 % interval; dashed: desired, or the truth of the simulation."
-    films = {half: slide_film(rows, gains.arm.tick, ground, half) for half in ("", "surface", "force")}
-    write_text(folder / "film.svg", films[""])
-    told = {"surface": "The path over the surface, in real time.", "force": "Force and friction."}
-    pairs = [
-        {"source": data_address(films[half].encode(), "image/svg+xml"), "caption": words}
-        for half, words in told.items()
-    ]
+    write_text(folder / "film.svg", slide_film(rows, gains.arm.tick, ground))
+    words = {"surface": "The path over the surface, in real time.", "force": "Force and friction."}
+    films = [slide_film(rows, gains.arm.tick, ground, half).encode() for half in words]
+    sources = (data_address(film, "image/svg+xml") for film in films)
+    pairs = [{"source": a, "caption": b} for a, b in zip(sources, words.values(), strict=True)]
     answer = PageAnswer(
         title=f"A slide of {1e3 * summary['path_m']:.0f} mm with {plain(gains.force, 3)} N",
         sentence=sentence(summary),
@@ -159,7 +162,7 @@ def _cards(summary: dict[str, Any]) -> list[Card]:
     return [
         Card("Contact", "lost" if lost else "kept", tone="fail" if lost else "ok"),
         Card("Force error", error, "% rms", why=most),
-        Card("Normal", f"± {plain(n['cone95_deg'], 2)}", "\N{DEGREE SIGN}", why=off),
+        Card("Normal", _normal(n), why=off),
         *tool,
         Card("Friction", mu, half=half, why=f"truth {truth['friction']:g}"),
         Card(
@@ -217,10 +220,8 @@ def _limits(values: Array, least: float | None) -> tuple[float, float] | None:
 def _slower(way: Array, speed: Array, asked: float) -> list[tuple[float, float]]:
     """Stretches of the path on which the slide was slower than asked by a tenth, but for its beginning [mm]."""
     slow = np.flatnonzero((speed < 0.9 * asked) & (way > 0.02 * way[-1]))
-    if not len(slow):
-        return []
-    cuts = np.flatnonzero(np.diff(slow) > 1)
-    return [(float(way[part[0]]), float(way[part[-1]])) for part in np.split(slow, cuts + 1)]
+    parts = np.split(slow, np.flatnonzero(np.diff(slow) > 1) + 1)
+    return [(float(way[part[0]]), float(way[part[-1]])) for part in parts if len(part)]
 
 
 def _interval(c: dict[str, Array], name: str) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from palpate.bench.summary import CONTACT
 from palpate.errors import InputError
 from palpate.force.gains import Gains
 from palpate.force.sliding.slide_domain import numbers_of
+from palpate.force.sliding.slide_state import ALL, TOUCHES
 from palpate.force.sliding.sliding_loop import Z_95
 from palpate_live.pressing import WatchedArm
 from palpate_live.stability import OfArm
@@ -58,7 +59,8 @@ class WatchedSlide(WatchedArm):
             Slider("stiffness", "surface K", "N/m", K / 20, 20 * K, K, True, "K"),
             Slider("friction", "friction", "", 0.0, FRICTION, ground.friction),
         )  # fmt: skip
-        first = "three touches for the normal, then " if numbers_of(gains).touches else ""
+        self._touches = numbers_of(gains).touches > 0.0
+        first = "three touches for the normal, then " if self._touches else ""
         super().__init__(
             at.arm, at.place, gains, sliders,
             f"{first}the law of palpate tune --slide around a circle, MuJoCo", seed,
@@ -121,6 +123,8 @@ class WatchedSlide(WatchedArm):
         now, trouble = self._k * self._tick, self._run.loop.trouble
         if self._run.sequence.touch and not before:
             self.state.note(Happened(now, "slides"))
+        known = int(self._run.loop.state[TOUCHES])
+        self.state.stage = f"touching, {known + 1} of {ALL:g}" if self._touches and known < ALL else ""
         self._angle += self._own[PLACE["speed"]] * self._tick / self._radius
         if trouble and trouble != self.state.warning:
             self.state.note(Happened(now, trouble.partition(":")[0], "fail"))

@@ -283,24 +283,24 @@ class SlideFigures:
 
 def figures_of(out: Array, gains: Gains, ground: Ground) -> SlideFigures:
     """How a slide went, from its rows."""
-    c = {name: out[:, i] for i, name in enumerate(COLUMNS)}
-    on = np.flatnonzero(c["sliding"])
+    on = np.flatnonzero(out[:, COLUMNS.index("sliding")])
     judged = on[round(SETTLED * gains.arm.rate) :]
+    c = dict(zip(COLUMNS, out[judged].T, strict=True))
     if not len(judged):
         nan = float("nan")
         return SlideFigures(False, nan, nan, nan, True, nan, 0.0, 0.0, 0.0, False)
-    error = (c["normal_force"][judged] - c["desired"][judged]) / gains.force
-    dither = c["desired"][judged] / gains.force - 1.0
+    error = (c["normal_force"] - c["desired"]) / gains.force
+    dither = c["desired"] / gains.force - 1.0
     if dither.any():  # it is followed late: what it is of the error itself, and its rate, is none
         both = np.column_stack([dither, np.gradient(dither)])
         error = error - both @ np.linalg.lstsq(both, error, rcond=None)[0]
     true = gains.arm.seen(ground.stiffness) if gains.arm.kind == "position" else ground.stiffness
     return SlideFigures(
         True, float(np.sqrt(np.mean(error**2))), float(np.abs(error).max()),
-        float(c["normal_force"].max() / gains.force), bool((c["normal_force"][on] <= 0.0).any()),
-        float(np.median(c["normal_error"][judged])),
-        float(np.mean(c["normal_error"][judged] < CHI2_95 * c["cone"][judged])),
-        float(np.mean(np.abs(c["mu"][judged] - ground.friction) < Z_95 * c["mu_std"][judged])),
-        float(np.mean(np.abs(c["stiffness"][judged] - true) < Z_95 * c["stiffness_std"][judged])),
-        bool(c["trouble"][judged].any()),
+        float(out[:, 0].max() / gains.force), bool((out[on, 0] <= 0.0).any()),
+        float(np.median(c["normal_error"])),
+        float(np.mean(c["normal_error"] < CHI2_95 * c["cone"])),
+        float(np.mean(np.abs(c["mu"] - ground.friction) < Z_95 * c["mu_std"])),
+        float(np.mean(np.abs(c["stiffness"] - true) < Z_95 * c["stiffness_std"])),
+        bool(c["trouble"].any()),
     )  # fmt: skip

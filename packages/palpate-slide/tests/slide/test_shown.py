@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -40,6 +41,17 @@ def test_the_height_of_a_surface_is_on_it(shape: str) -> None:
     for x, y in ((0.0, 0.0), (0.03, -0.02), (-0.05, 0.05)):
         assert abs(outside(ground, Vec3(x, y, surface_height(ground, x, y)))[0]) < 1e-6
     assert np.isnan(surface_height(ground_of("sphere", 0.1, 2e4), 0.2, 0.0))
+
+
+def test_a_cone_that_holds_any_normal_is_no_number(slid) -> None:
+    rows, gains, ground = slid
+    wide = rows.copy()
+    wide[:, COLUMNS.index("cone")] = 2.0
+    assert summarise(wide, gains, ground)["normal"]["cone95_deg"] is None
+    assert "normal unknown; friction" in sentence(summarise(wide, gains, ground))
+    assert re.search(
+        "normal \\S? ?[0-9.]+\N{DEGREE SIGN}; friction", sentence(summarise(rows, gains, ground))
+    )
 
 
 def test_a_film_moves_along_the_path(slid) -> None:
@@ -130,6 +142,8 @@ def test_a_watched_slide_shows_what_it_does_and_takes_sliders() -> None:
     touching = replace(gains, slide=Slide(speed=0.03, mu_max=0.9, touches=0.01))
     watching = WatchedSlide(arm, touching, ground_of("plane", 0.2, 2e4), 0.03, (0.0, 0.0, -1.0))
     assert "three touches for the normal, then the law" in watching.view.about
+    watching.advance(0.2)
+    assert (watching.state.stage, watched.state.stage) == ("touching, 1 of 3", "")
     assert np.diff(rows[:, AT["t"]]) == pytest.approx(0.005)
     assert np.isfinite(rows[:, AT["q1"] : AT["q7"] + 1]).all()
     watched.set("friction", 0.5)

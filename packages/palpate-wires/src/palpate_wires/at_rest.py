@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,12 @@ class AtRest:
     rate: float
     last: ArmReading
     offset: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Bias, noise, drift and rate as plain JSON values."""
+        return {
+            "bias_N": self.bias.tolist(), "noise_N": self.noise, "drift_N_per_s": self.drift, "rate_Hz": self.rate,
+        }  # fmt: skip
 
 
 def look(wire: Wire, order: Order) -> AtRest:

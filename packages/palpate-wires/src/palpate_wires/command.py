@@ -225,15 +225,7 @@ def _look(air: AtRest, plan: list[str], notes: list[str], json: bool) -> int:
     drift = f"drift {air.drift:.2g} ± {air.drift_std:.2g} N/s"
     found = f"in free motion: bias {bias} N, noise {air.noise:.2g} N, {drift}, {air.rate:.4g} Hz"
     if json:
-        print_answer(
-            {
-                "plan": plan,
-                "bias_N": air.bias.tolist(),
-                "noise_N": air.noise,
-                "drift_N_per_s": air.drift,
-                "rate_Hz": air.rate,
-            }
-        )
+        print_answer({"plan": plan, **air.to_json()})
     else:
         print_lines(found, *notes, "dry run: nothing was moved")
     return 0
@@ -256,12 +248,10 @@ def _print(outcome: Outcome, words: str, where: Path | None, json: bool) -> int:
         value, std = outcome.stiffness
         lines.append(f"stiffness as the arm feels it {value:.4g} N/m (std {std:.2g})")
     if outcome.surface:
-        n, mu = outcome.surface["normal"], outcome.surface["friction"]
+        n, cone, mu = outcome.surface.values()
         friction = "unknown" if mu is None else " to ".join(f"{end:.2f}" for end in mu["ci95"])
-        lines.append(
-            f"normal {n[0]:.3f}, {n[1]:.3f}, {n[2]:.3f} within {outcome.surface['cone95_deg']:.2g} deg, friction"
-            f" {friction}"
-        )
+        normal = "unknown" if cone is None else "{:.3f}, {:.3f}, {:.3f} within {:.2g} deg".format(*n, cone)
+        lines.append(f"normal {normal}, friction {friction}")
     lines += [*outcome.lateness.sentences(), words]
     if where:
         lines.append(f"written: {where}; palpate identify {where} reads it")

@@ -20,6 +20,7 @@ from palpate.force import SlidingLoop
 from palpate.logs import write_record
 from palpate.press.sequence import mean_over
 from palpate.records import Record
+from palpate.units import cone95
 from palpate_wires.at_rest import AtRest
 from palpate_wires.order import Order
 from palpate_wires.realtime import Lateness
@@ -67,11 +68,8 @@ class Outcome:
             "stiffness_N_per_m": self.stiffness and list(self.stiffness),
             **({"surface": self.surface} if self.surface else {}),
             "lateness": self.lateness.to_json(),
-            "bias_N": self.rest.bias.tolist(),
-            "noise_N": self.rest.noise,
-            "drift_N_per_s": self.rest.drift,
+            **self.rest.to_json(),
             "troubles": dict(self.troubles),
-            "rate_Hz": self.rest.rate,
         }
 
 
@@ -80,7 +78,7 @@ def surface_of(loop: SlidingLoop) -> dict[str, Any]:
     mu = loop.friction
     return {
         "normal": loop.normal.tolist(),
-        "cone95_deg": float(np.degrees(loop.normal_cone95)),
+        "cone95_deg": cone95(loop.normal_cone95),
         "friction": None if mu is None else {"value": float(mu), "ci95": list(mu.ci95)},
     }
 

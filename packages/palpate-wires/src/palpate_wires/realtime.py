@@ -108,11 +108,8 @@ class Lateness:
     def sentences(self) -> list[str]:
         """Warnings about lateness, as sentences."""
         a, b, c, most = (1e3 * v for v in self.late)
-        late = (
-            f"late by {a:.3g} ms (50 %), {b:.3g} (99 %), {c:.3g} (99.9 %), {most:.3g} at most, in {self.ticks} ticks;"
-            f" {self.missed} readings missed"
-        )
-        lines = [late]
+        late = f"late by {a:.3g} ms (50 %), {b:.3g} (99 %), {c:.3g} (99.9 %), {most:.3g} at most"
+        lines = [f"{late}, in {self.ticks} ticks; {self.missed} readings missed"]
         if self.allowed is None:
             lines.append(
                 "no certificate was given (palpate certify makes one): nothing is proved of this loop"

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.wires import LostError, Quaternion, Triple
+from palpate.wires import LostError, Quaternion, Triple, triple
 from palpate_wires.orientation import from_matrix_by_columns
 
 _NEARLY = 0.02
@@ -67,8 +67,7 @@ class JointTool:
     def place(self) -> tuple[Triple, Quaternion]:
         """Position and orientation by forward kinematics."""
         pose = self._arm.forward_kinematics(self._q)
-        x, y, z = (float(v) for v in pose[:3, 3])
-        return (x, y, z), from_matrix_by_columns(pose.T.ravel().tolist())
+        return triple(pose[:3, 3]), from_matrix_by_columns(pose.T.ravel().tolist())
 
     def speeds(self, velocity: Triple) -> list[float]:
         """The smallest joint speeds that do it, J^+ (v, 0); none is needed for rest."""
@@ -81,7 +80,7 @@ class JointTool:
                 f" {_NEARLY:g}; press elsewhere"
             )
         found = np.linalg.lstsq(J, np.array([*velocity, 0.0, 0.0, 0.0]), rcond=None)[0]
-        return [float(v) for v in found]
+        return found.tolist()
 
 
 def order_of(wanted: tuple[str, ...], there: list[str]) -> list[int]:

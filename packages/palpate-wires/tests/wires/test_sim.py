@@ -72,11 +72,13 @@ def test_it_presses_with_the_force_asked_for_and_identify_reads_the_record(folde
     assert told["lateness"]["p99.9_s"] > 2 * 0.01 or 0.5 < ratio < 2.0
 
 
+@pytest.mark.long
 def test_a_servo_that_yields_presses_over_a_wire_and_its_record_shows_the_surface_alone(here, capsys):
+    """For thirty of the loop's lags, so that its rise is a small part of the mean force."""
     servo_cell(here)
     with arm(here, "--stiffness", "4000") as (_, address):
         code, told = press(
-            capsys, here, address, "--yes", "--record", "rec", "--probe", "0.2", "--seconds", "3"
+            capsys, here, address, "--yes", "--record", "rec", "--probe", "0.2", "--seconds", "6"
         )
     assert code == 0, told["ended"]
     assert told["force_N"] == pytest.approx(10.0, rel=0.05)

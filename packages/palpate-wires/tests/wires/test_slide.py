@@ -64,6 +64,7 @@ def sliding(folder, lie=lambda sense, first: sense, since=4.0):
     return outcome, wire, rows.record()
 
 
+@pytest.mark.long
 def test_a_servo_that_yields_slides_within_the_same_limits(servo):
     outcome, wire, record = sliding(servo, since=math.inf)
     assert outcome.ok, outcome.ended
@@ -187,6 +188,7 @@ def test_it_slides_over_the_protocol_of_a_simulated_arm(folder, here, capsys):
     assert mu["ci95"][0] < FRICTION < mu["ci95"][1]
 
 
+@pytest.mark.long
 def test_it_slides_over_the_protocol_of_a_ur(folder, here, capsys):
     pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
     address = next(ADDRESSES)
@@ -212,7 +214,9 @@ def test_a_direction_off_the_surface_meets_none_and_tells_no_normal(folder, here
     assert "friction" not in printed
 
 
-@pytest.mark.parametrize("at", [1, 7])  # y of the force, and of the position
+@pytest.mark.parametrize(
+    "at", [1, pytest.param(7, marks=pytest.mark.long)]
+)  # y of the force, and of the position
 def test_a_slide_ends_where_one_axis_is_no_number(folder, here, capsys, at):
     def spoil(since, _):
         return (lambda values: (*values[:at], math.nan, *values[at + 1 :])) if since > 3.0 else None
@@ -228,6 +232,7 @@ def test_a_slide_ends_where_one_axis_is_no_number(folder, here, capsys, at):
     assert record["phase"].max() == 3.0  # it was sliding
 
 
+@pytest.mark.long
 def test_a_signal_tells_the_arm_to_rest_and_loses_nothing(folder, tmp_path):
     with arm(folder, "--gap", "0.001") as (_, address), relayed(address, lambda *_: None) as relay:
         words = words_of(folder, relay.address, "--yes", "--record", "rec")
