@@ -157,6 +157,20 @@ def test_a_lag_that_was_told_is_said_again_with_the_filter_in_it():
     assert (found.lag.value, found.lag.kind) == (pytest.approx(4e-3), "told")
 
 
+def test_a_low_pass_that_only_its_lag_was_told_of_is_no_mass():
+    """A spring behind 16 Hz of first order follows like one with a mass of K lag^2/2, a delay like none."""
+    fine = np.arange(0, 10, 1e-4)
+    x = 1e-3 * np.sin(2 * np.pi * (0.5 + 0.3 * fine) * fine)
+    read = K * sosfilt(butter(1, 16, fs=1e4, output="sos"), x)[::10]
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(read))
+    told = {"lag": 1 / (2 * np.pi * 16), "bonded": True, "model": "kelvin-voigt-mass"}
+    alone = identified(fine[::10], x[::10], read + noise, **told).parameters["M"]
+    assert in_range(alone, 0, 0)
+    assert (*alone.budget,)[0] == "low-pass"
+    both = identified(fine[::10], x[::10], read + noise, **told, force_filter="butterworth1:16")
+    assert "low-pass" not in both.parameters["M"].budget
+
+
 def presses(*stiffness, back=2.0, soft=0.0):
     """One press of 4 mm after another, each on a surface of its own, with 2 mm of free motion before."""
     ends = np.cumsum([0.5, *(s for _ in stiffness for s in (3.0, back, 0.5))])

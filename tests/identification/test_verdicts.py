@@ -51,6 +51,19 @@ def test_one_frequency_tells_the_dynamic_stiffness_and_not_stiffness_and_mass(fr
     assert found.working_point.frequency_Hz == pytest.approx(frequency, rel=0.1)
 
 
+@pytest.mark.parametrize("twisted", [0.0, 0.8])
+def test_a_mass_below_zero_leaves_a_damping_that_is_as_wide_as_that_force(twisted):
+    """An inertia that was compensated twice, or some other force, of which as much may be in the damping."""
+    x = 1e-3 * (np.sin(2 * np.pi * 1.3 * TIME) + 0.2 * np.sin(2 * np.pi * 5 * TIME))
+    v, a = np.gradient(x, 1e-3), np.gradient(np.gradient(x, 1e-3), 1e-3)
+    force = 5000 * x + (80 + twisted * 0.5 * np.std(a) / np.std(v)) * v - 0.5 * a + noise(0.005)
+    found = identify(record(TIME, x, force), lag=0.0, bonded=True).parameters
+    assert found["M"].verdict is Verdict.REJECTED
+    assert found["B"].verdict is Verdict.IDENTIFIED
+    assert found["B"].ci95[0] < 80 < found["B"].ci95[1]
+    assert next(iter(found["B"].budget)) == "missing force"
+
+
 def test_a_falling_branch_is_not_turned_into_a_stiffness():
     """Cut out of a bistable structure's log: one axis has no way to pin a sign."""
     x = 1e-3 * np.sin(2 * np.pi * 1.3 * TIME) + 2e-4 * np.sin(2 * np.pi * 9 * TIME)

@@ -26,6 +26,7 @@ NOISE = Cause("noise", "press deeper, longer or more often; try palpate excite",
 _CAUSES = {
     "noise": NOISE,
     "lag": Cause("the uncalibrated lag of the force", "calibrate the lag and give it with --lag"),
+    "low-pass": Cause("a low-pass of the force that may be its lag", "give it with --force-filter"),
     "other forces": Cause(
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",
@@ -41,6 +42,9 @@ _CAUSES = {
         "keep the motion near one frequency and depth",
     ),
     "unexplained": Cause("a force that the model does not explain", "keep the motion near one depth"),
+    "missing force": Cause(
+        "a mass below zero", "compensate the tool's inertia, or measure nearer to the surface"
+    ),
     "curvature": Cause("the change of the slope over the press", "press about the force that you need"),
     "within the octave": Cause(
         "the change of the stiffness with the frequency", "move at one frequency, the one that you need"

@@ -39,10 +39,12 @@ from palpate.identification.estimators.octaves import (
     octaves_of,
     system_of,
 )
+from palpate.identification.filters.state_variable import FASTEST
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.options import LAG, mass_std
 from palpate.identification.problem import Problem
+from palpate.signals.types import NORMAL
 
 
 def lag_open(problem: Problem) -> bool:
@@ -126,6 +128,7 @@ class Linearisation:
         noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
         if use is None:
             use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
+            use &= (octaves.frequency <= FASTEST * problem.rate) | bool(model.nonlinear)
         names = (*free, *effects, *bending)
         friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
@@ -177,6 +180,8 @@ class Linearisation:
         if "M" in self.names and "M" not in self.prior:
             place = self.names.index("M")
             budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
+            if not (self.problem.filtered or self.problem.motion.matched):
+                budget["low-pass"] = self._by_low_pass(solution)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
@@ -219,6 +224,14 @@ class Linearisation:
         if lag_open(self.problem) and LAG in self.names:
             budget["lag"] = self._by_prior_of_lag(member, budget["lag"])
         return budget
+
+    def _by_low_pass(self, solution: Solution) -> Spread:
+        """The mass by a low-pass that nobody gave: a lag T may be a delay, a low-pass of first order, or both.
+
+        The log of its response is -T s + C s^2/2 - ... with a second cumulant C from 0 to T^2, and K C s^2/2 is a mass.
+        """
+        most = solution.theta[self.names.index("K")] / 2 * (self.lag**2 + self.problem.lag.std**2)
+        return Spread((most / NORMAL * np.equal(self.names, "M")) ** 2)
 
     def _with_position(self, solution: Solution, sensor: Array) -> Array:
         """Variance of a line by the noise of both channels, shape (octaves,)."""

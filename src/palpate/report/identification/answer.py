@@ -30,6 +30,7 @@ _BOUND_OF_SURFACE = Text("! lower bound of the surface", style="yellow")
 _IN_DOUBT = Text("? in doubt, see above", style="yellow")
 _REMEDIES = {
     "lag": "--lag SECONDS",
+    "low-pass": "--force-filter",
     "noise": "press deeper or more often",
     "other forces": "begin and end in free motion",
     "touch": "approach more slowly",
