@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import comb, factorial, pi
+from math import factorial, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,21 +132,18 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
 
 def _integrate(w: float, derivative: int, time: Array) -> Array:
     """The impulse response integrated twice and then differentiated `derivative` times, 0 to 4."""
-    from scipy.special import gammainc
-
     tau = w * np.maximum(time, 0.0)
     if derivative == 0:
-        return np.asarray((tau * gammainc(ORDER, tau) - ORDER * gammainc(ORDER + 1, tau)) / w)
+        return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
     if derivative == 1:
-        return np.asarray(gammainc(ORDER, tau))
-    low, parts = (
-        ORDER + 2 - derivative,
-        range(derivative - 1),
-    )  # of d/dtau of an Erlang density: the next lower one less it
-    return np.asarray(
-        w ** (derivative - 1)
-        * sum((-1) ** i * comb(derivative - 2, i) * _erlang(low + i, tau) for i in parts)
-    )
+        return _erlang_cdf(ORDER, tau)
+    if derivative == 2:
+        return w * _erlang(ORDER, tau)
+    if derivative == 3:
+        return w**2 * (_erlang(ORDER - 1, tau) - _erlang(ORDER, tau))
+    if derivative == 4:
+        return w**3 * (_erlang(ORDER - 2, tau) - 2 * _erlang(ORDER - 1, tau) + _erlang(ORDER, tau))
+    raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
 
 
 def _erlang(order: int, tau: Array) -> Array:
@@ -154,13 +151,23 @@ def _erlang(order: int, tau: Array) -> Array:
     return tau ** (order - 1) * np.exp(-tau) / factorial(order - 1)
 
 
+def _erlang_cdf(order: int, tau: Array) -> Array:
+    """Step response of `order` unit lags in a row."""
+    total, term = np.ones_like(tau), np.ones_like(tau)
+    for k in range(1, order):
+        term = term * tau / k
+        total += term
+    return 1.0 - total * np.exp(-tau)
+
+
 def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
     """One lag 1/(1 + s T), exact for straight lines between the samples, starting from rest at 0. Shape (n,)."""
-    from scipy.signal import lfilter
+    from scipy.linalg import solve_banded
 
     decay = np.exp(-dt / time_constant)
-    rise = time_constant / dt * (1 - decay)
-    return np.asarray(lfilter([1 - rise, rise - decay], [1.0, -decay], signal))
+    b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
+    driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
+    return np.asarray(solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven))
 
 
 def white_noise(signal: Array) -> float:
