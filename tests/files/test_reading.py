@@ -10,8 +10,9 @@ import pytest
 
 from palpate.cli import main
 from palpate.errors import LONGEST, InputError, PalpateError, unknown
-from palpate.files import open_file, read_text, read_toml
-from palpate.force.arm import load_arm
+from palpate.files import open_file, read_table, read_text, read_toml
+from palpate.force import Gains, load_arm
+from palpate.force.gains import gains_for
 
 DEEP = "x = " + "[" * 2000 + "]" * 2000
 DIGITS = "x = " + "1" * 5000
@@ -110,3 +111,33 @@ def test_the_output_of_identify_may_be_no_pipe(tmp_path, capsys):
     os.mkfifo(path)
     assert main(["tune", str(path), "--arm", "ur5e", "--force", "20"]) == 2
     assert "pipe or a device" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "says"),
+    [
+        (
+            "force =",
+            "forc = 1\nforce =",
+            "unknown field `forc`; there are: alpha, approach, arm, cap, force",
+        ),
+        (
+            "[arm.sensor]",
+            "[arm.sensor]\nnois = 1",
+            "at `$.arm.sensor`; there are: accuracy, drift, full_scale",
+        ),
+        (
+            "[arm.limits]",
+            "[slide]\nmu = 1\n[arm.limits]",
+            "at `$.slide`; there are: acceleration, mu_max, radius",
+        ),
+        ("force = 15.0", "force = 'a'", "Expected `float`, got `str` - at `$.force`"),
+    ],
+)
+def test_an_unknown_field_names_those_that_there_are(before, after, says):
+    text = gains_for(load_arm("ur5e"), 15.0).to_toml()
+    assert before in text
+    with pytest.raises(InputError) as error:
+        read_table(text.replace(before, after, 1), "gains.toml", Gains)
+    assert says in str(error.value)
+    assert ("there are" in says) == ("there are" in str(error.value))

@@ -288,3 +288,17 @@ def test_rare_taps_are_a_force_that_follows(tmp_path):
     x = -5 + 6 * np.exp(-(((t % 1.5 - 0.7) / 0.08) ** 2))
     f = 8 * np.maximum(x, 0) + 0.01 * np.random.default_rng(0).standard_normal(len(t))
     assert proposed(tmp_path, "time_s,z_mm,fz_N", t, x, f).options["force"] == "fz_N:N"
+
+
+@pytest.mark.parametrize("friction", [True, False])
+def test_of_columns_without_names_the_one_whose_motion_two_others_follow_is_the_position(tmp_path, friction):
+    """A friction and the pressure beside it move together more than either does with the stroke that causes both."""
+    rng, t = np.random.default_rng(0), np.arange(4000) / 100
+    x = 20.0 * np.sin(4.0 * t)
+    follows = np.sign(np.cos(4.0 * t)) if friction else x / 20.0
+    pressure, force = (size * (follows + 0.1 * rng.standard_normal(len(t))) for size in (0.05, 7.0))
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack([t, 3.0 + pressure, x.round(3), 150.0 + force]), "%.4f", ",")
+    proposal = list_log(path).proposal
+    assert proposal.options["position"] == "2:mm"
+    assert ("both follow the motion of '2'" in " ".join(proposal.guesses)) == friction

@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_motion import (
-    CHANCE,
-    FEWEST,
-    free_inertia,
-    read_rows,
-    wrong_sign,
-    wrong_sign_of,
-)
+from palpate.contact_frame import free_motion
 from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
 from palpate.contact_frame.signals_in_base import (
     BaseSignals,
@@ -47,9 +40,13 @@ def line_misses_tcp(signals: BaseSignals, free: Mask, inside: Mask, frame: Conta
     """
     if signals.torque is None:
         return None
-    there = read_rows(signals.force) & read_rows(signals.torque)
+    there = free_motion.read_rows(signals.force) & free_motion.read_rows(signals.torque)
     free, inside = free & there, inside & there
-    if free.sum() < FEWEST or inside.sum() < FEWEST or not np.ptp(signals.torque[there]):
+    if (
+        free.sum() < free_motion.FEWEST
+        or inside.sum() < free_motion.FEWEST
+        or not np.ptp(signals.torque[there])
+    ):
         return None
     force = signals.force[inside] - signals.force[free].mean(axis=0)
     torque = signals.torque[inside] - signals.torque[free].mean(axis=0)
@@ -87,7 +84,7 @@ def project(record: Record, frame: ContactFrame) -> Record:
     signals, freed, notes = in_range(signals, frame)
     normal = _normal(signals, freed, frame)
     sign, normal, turned = _orient(signals, freed, normal, frame)
-    position = (signals.place - signals.place[read_rows(signals.place)][0]) @ normal.direction
+    position = (signals.place - signals.place[free_motion.read_rows(signals.place)][0]) @ normal.direction
     spread = scale_std(normal, *_in_contact(signals, freed))
     inertia = _inertia_in_air(signals, freed, sign, frame)
     notes += turned + _warnings(signals, freed, normal, spread) + _doubts(freed, signals, frame, inertia)
@@ -112,7 +109,7 @@ def _normal(signals: BaseSignals, freed: Unloaded, frame: ContactFrame) -> Norma
 def _in_contact(signals: BaseSignals, freed: Unloaded) -> tuple[Array, Array]:
     """Forces and places in contact; of the whole log where there is none."""
     rows = freed.inside if (freed.inside & freed.there).sum() > 1 else np.ones(len(freed.inside), bool)
-    placed = read_rows(signals.place)
+    placed = free_motion.read_rows(signals.place)
     return freed.force[rows & freed.there], signals.place[rows & placed]
 
 
@@ -141,7 +138,7 @@ def _orient(
 def _correlation(signals: BaseSignals, freed: Unloaded, direction: Array) -> float:
     """Of the force with the position along a direction, in contact; the same for the direction turned round."""
     rows = (freed.inside if freed.inside.any() else freed.there) & freed.there
-    placed = read_rows(signals.place)
+    placed = free_motion.read_rows(signals.place)
     position = np.interp(signals.time[rows], signals.time[placed], signals.place[placed] @ direction)
     force = freed.force[rows] @ direction
     if len(force) < 2 or not (np.ptp(position) and np.ptp(force)):
@@ -189,7 +186,7 @@ def _inertia_in_air(
     payload = frame.payload
     centre = payload.centre if payload is not None and payload.centre is not None else (0.0, 0.0, 0.0)
     off = np.array(frame.wrench_at) + np.array(centre) - np.array(frame.tcp)
-    return free_inertia(
+    return free_motion.free_inertia(
         signals.time, -sign * freed.force, signals.place + signals.rotations @ off, freed.free
     )
 
@@ -201,15 +198,15 @@ def _doubts(
     from scipy.special import chdtri
 
     notes = []
-    if wrong_sign(inertia):
+    if free_motion.wrong_sign(inertia):
         assert inertia is not None
-        notes.append({"code": "tool-inertia", "text": wrong_sign_of(inertia)})
+        notes.append({"code": "tool-inertia", "text": free_motion.wrong_sign_of(inertia)})
     free = freed.free
     if frame.payload is None or not free.any() or not turns(signals.rotations[free]):
         return notes
     own = load_of(signals.force[free], signals.rotations[free], weighs=True)
     off = float(np.linalg.norm(own.weight - np.array(frame.payload.weight)))
-    if own.separable and off > float(chdtri(3, CHANCE)) ** 0.5 * float(
+    if own.separable and off > float(chdtri(3, free_motion.CHANCE)) ** 0.5 * float(
         np.hypot(own.weight_std, frame.payload.weight_std)
     ):
         text = (

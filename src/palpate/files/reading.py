@@ -152,9 +152,25 @@ def read_table(
             _check_finite(tables, "")
         return msgspec.convert(tables, kind)
     except msgspec.ValidationError as error:
-        raise InputError(f"{where}: {error}{remedy(str(error))}") from None
+        raise InputError(f"{where}: {error}{_known_fields(str(error), kind)}{remedy(str(error))}") from None
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _known_fields(error: str, kind: Any) -> str:
+    """The fields of the table in which msgspec found an unknown one, as a remedy; empty of another error."""
+    from msgspec.inspect import type_info
+
+    what, _, path = error.partition(" - at `$")
+    tables: list[Any] = [type_info(kind)] if "unknown field" in what else []
+    for step in re.findall(r"[^.\[\]`]+", path):
+        own = [field.type for table in tables for field in table.fields if field.encode_name == step]
+        own = [one for each in own for one in getattr(each, "types", (getattr(each, "item_type", each),))]
+        tables = [
+            table for table in own if hasattr(table, "fields")
+        ] or tables  # an item has the fields of its list
+    names = sorted({field.encode_name for table in tables for field in table.fields})
+    return f"; there are: {', '.join(names)}" if names else ""
 
 
 def _check_finite(value: object, path: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.causes import BRIEF, Code, Warn
 from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
@@ -83,18 +83,26 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
             f"the cut-off must be at most {2 * highest:.4g} Hz, a quarter of the readings per second, got {cutoff:g}"
         )
     chain = Chain(cutoff or highest, channels.dt)
+    strokes, drift, press = strokes_of(channels), None, None
     air = None if options.bonded else _air(channels, chain, options.assumed_lag)
-    strokes, drift = strokes_of(channels), None
     if air is not None and strokes and not _crossed(channels, air, strokes):
         air = None
     if air is not None and air.drifts:
-        drift = Drift(air.stays * channels.dt, air.levels)
-        channels = _without_drift(channels, air)
-    contacts = replace(_find_contacts(channels, chain, air, options, strokes), drift=drift)
+        drift, channels = Drift(air.stays * channels.dt, air.levels), _without_drift(channels, air)
+    contacts = _find_contacts(channels, chain, air, options, strokes)
     if strokes:
-        contacts = _with_press(channels, contacts, strokes, options)
-    if strokes and contacts.press is None:
-        strokes, contacts = (), replace(_find_contacts(channels, chain, air, options, ()), drift=drift)
+        seen = contacts  # a press whose contact no threshold shows is in contact from end to end
+        if not contacts.spans:
+            seen = _never_left(channels, channels.force, channels.position, options, strokes)
+        lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
+        signs = seen.position_sign, seen.force_sign
+        press = steady_press(channels, strokes, signs, seen.resting, lag, drift)
+        if press is None or press.headline.stiffness.value <= 0:
+            strokes, press = (), None
+            contacts = _find_contacts(channels, chain, air, options, strokes)
+        else:
+            contacts = seen
+    contacts = replace(contacts, drift=drift, press=press)
     if not contacts.spans:
         return channels, chain, contacts
     begin, end = max(contacts.spans, key=lambda span: span[1] - span[0])
@@ -106,7 +114,7 @@ def contacts_of(channels: Channels, options: Options = NOTHING_SAID) -> tuple[Ch
     size = int(1 / (_OVERSAMPLED * chosen * channels.dt))
     fewer = thinned(channels, min(size, len(channels.force) // _FEWEST))
     narrow = Chain(chosen, fewer.dt)
-    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=contacts.press)
+    again = replace(_find_contacts(fewer, narrow, air, options, strokes), drift=drift, press=press)
     return (fewer, narrow, again) if again.spans else (channels, chain, contacts)
 
 
@@ -125,18 +133,6 @@ def _crossed(channels: Channels, air: FreeMotion, strokes: tuple[Stroke, ...]) -
         if np.count_nonzero(inside) >= _SEVERAL and rise(x[inside], f[inside]) < FLAT * rise(x, f):
             return True
     return False
-
-
-def _with_press(
-    channels: Channels, contacts: Contacts, strokes: tuple[Stroke, ...], options: Options
-) -> Contacts:
-    """The contacts with the press that the strokes are, whose contact is the whole log where no other is seen."""
-    whole = channels, channels.force, channels.position, options, strokes
-    seen = contacts if contacts.spans else _never_left(*whole)
-    lag = lag_prior(options.lag, options.lag_std, 1 / channels.rate, 0.0, None)
-    signs = seen.position_sign, seen.force_sign
-    press = steady_press(channels, strokes, signs, seen.resting, lag, contacts.drift)
-    return contacts if press is None or press.headline.stiffness.value <= 0 else replace(seen, press=press)
 
 
 def _find_contacts(
@@ -160,40 +156,63 @@ def _find_contacts(
     rest = air.rest if air else low if abs(low) <= abs(high) else high
     peak = max(low, high, key=lambda end: abs(end - rest))
     sign = 1.0 if peak > rest else -1.0
-    top = sign * peak
-    level = _resting(sign * force, sign * rest, top)
-    onset = ONSET * (
-        top - level
-    )  # the threshold is clear of this share of the peak, and of the noise at rest
-    low_force = np.abs(sign * force[sign * force < level + onset] - level)
-    noise = GAUSSIAN * float(np.median(low_force)) if len(low_force) else 0.0
-    threshold = level + max(onset, 5 * noise)
-    touches = _touches(sign * force, level, top, threshold)
+    levels = rest, top, threshold = _levels(sign * force, sign * rest, sign * peak)
+    touches = _touches(sign * force, *levels)
     least = max(_FEWEST, int(2 * chain.settling / chain.dt))  # longer than the filter needs to settle
     spans = [(b, e) for b, e in touches if e - b >= least]
     text, rows = "press longer, or log faster", ""
     if air is not None and payload is None and spans:
-        touches = _between_losses(channels, sign, (level, top), air, spans, chain)
+        touches = _between_losses(channels, sign, (rest, top), air, spans, chain)
         spans = [(b, e) for b, e in touches if e - b >= least]
         text, rows = "press deeper, move slower or log faster", " until the probe leaves the surface again"
-    longest = max((e - b for b, e in touches), default=0)
-    text = f"{BRIEF} {longest} rows{rows}, and {least} are needed: {text}"
-    if not touches:
-        text = f"the force stays between {force.min():.4g} and {force.max():.4g}: there is no contact"
     if not spans:
-        return Contacts((), False, sign, 1.0, level, threshold, (Warn(Code.NO_CONTACT, text),))
-    found = _orient(force, position, spans, (sign, air.way if air else 0.0, level, threshold), options)
-    free = sign * force[_outside(len(force), spans, int(chain.settling / chain.dt))]
+        longest = max((e - b for b, e in touches), default=0)
+        text = f"{BRIEF} {longest} rows{rows}, and {least} are needed: {text}"
+        if not touches:
+            text = f"the force stays between {force.min():.4g} and {force.max():.4g}: there is no contact"
+        return Contacts((), False, sign, 1.0, rest, threshold, (Warn(Code.NO_CONTACT, text),))
+    way = air.way if air else 1.0 if float(np.cov(sign * force, position)[0, 1]) >= 0 else -1.0
+    told, signed = _reversed_signs(sign < 0, way < 0), options.force_sign in (None, int(sign))
+    if not signed:
+        side = "in contact it goes to the other side of its rest"
+        told.append(Warn(Code.NEGATIVE_STIFFNESS, f"the sign of the force contradicts --force-sign: {side}"))
+    if spans[0][0] == 0:
+        text = "the log begins in contact: the depth of that contact is not known"
+        told.append(Warn(Code.CONTACT_AT_START, text))
+    if payload is not None:
+        payload = replace(payload, mass=sign * way * payload.mass)
+        told.append(Warn(Code.TOOL_INERTIA, payload.text))
+    clear = _clear(sign * force, spans, int(chain.settling / chain.dt), threshold)
+    return Contacts(tuple(spans), False, sign, way, rest, threshold, tuple(told), clear, signed, payload)
+
+
+def _levels(force: Array, rest: float, peak: float) -> tuple[float, float, float]:
+    """Force at rest, at its peak and of the threshold of a contact [N], after the sign.
+
+    Rest is the middle of the force near its resting end: the least of many medians is below it by their noise. The
+    threshold is clear of a share of the peak, and of the noise at rest.
+    """
+    for _ in range(_ROUNDS):
+        free = force[force < rest + ONSET * (peak - rest)]
+        if not len(free):
+            break
+        rest = float(np.median(free))
+    onset = ONSET * (peak - rest)
+    low = np.abs(force[force < rest + onset] - rest)
+    noise = GAUSSIAN * float(np.median(low)) if len(low) else 0.0
+    return rest, peak, rest + max(onset, 5 * noise)
+
+
+def _clear(force: Array, spans: list[tuple[int, int]], begin: int, threshold: float) -> bool:
+    """Whether the force out of contact, from a row on, keeps well below the threshold [N]."""
+    out = np.arange(len(force)) >= begin
+    for first, last in spans:
+        out[first:last] = False
+    free = force[out]
     if len(free) < _FEWEST:
-        found = replace(found, clear=False)
-    else:
-        middle = float(np.median(free))
-        noise = GAUSSIAN * float(np.median(np.abs(free - middle)))
-        found = replace(found, clear=threshold - middle > _CLEAR * noise)
-    if payload is None:
-        return found
-    own = replace(payload, mass=found.force_sign * found.position_sign * payload.mass)
-    return replace(found, payload=own, warnings=(*found.warnings, Warn(Code.TOOL_INERTIA, own.text)))
+        return False
+    middle = float(np.median(free))
+    return threshold - middle > _CLEAR * GAUSSIAN * float(np.median(np.abs(free - middle)))
 
 
 def _air(channels: Channels, chain: Chain, lag: float) -> FreeMotion | None:
@@ -232,7 +251,7 @@ def _never_left(
     rows = [stroke.rows(channels) for stroke in strokes]
     rises = sum(float(np.cov(sign * channels.force[own], channels.position[own])[0, 1]) for own in rows)
     way = -1.0 if rises < 0 else 1.0
-    told = _reversed_signs(sign < 0 and options.force_sign is None, way < 0)
+    told = tuple(_reversed_signs(sign < 0 and options.force_sign is None, way < 0))
     found = Contacts(((0, len(force)),), True, sign, way, 0.0, -np.inf, told, clear=False)
     if options.bonded:
         return found
@@ -244,49 +263,12 @@ def _never_left(
     return replace(found, warnings=told, signed=bool(strokes) or along > _SIGNED)
 
 
-def _reversed_signs(force: bool, position: bool) -> tuple[Warn, ...]:
+def _reversed_signs(force: bool, position: bool) -> list[Warn]:
     """Channels whose signs were reversed."""
     text = "the force goes to negative values in contact; its sign was reversed"
-    warnings = (Warn(Code.FORCE_SIGN_REVERSED, text),) if force else ()
+    warnings = [Warn(Code.FORCE_SIGN_REVERSED, text)] if force else []
     text = "the position falls as the force grows; its sign was reversed"
-    return (*warnings, Warn(Code.POSITION_SIGN_REVERSED, text)) if position else warnings
-
-
-def _outside(count: int, spans: list[tuple[int, int]], begin: int) -> Mask:
-    out = np.arange(count) >= begin
-    for first, last in spans:
-        out[first:last] = False
-    return out
-
-
-def _orient(
-    force: Array,
-    position: Array,
-    spans: list[tuple[int, int]],
-    levels: tuple[float, float, float, float],
-    options: Options,
-) -> Contacts:
-    """Which way the channels count: into the surface is where the probe is in contact and not out of it."""
-    sign, way, level, threshold = levels
-    signed = options.force_sign in (None, int(sign))
-    if not way:
-        out = _outside(len(position), spans, 0)
-        inside = ~out
-        reach = float(np.ptp(position[inside])) or 1.0
-        deep = inside & (sign * force > np.median(sign * force[inside]))
-        apart = float(np.median(position[deep]) - np.median(position[out])) if out.sum() >= _FEWEST else 0.0
-        if abs(apart) < ONSET * reach:
-            apart = float(np.corrcoef(position[inside], sign * force[inside])[0, 1])
-        way = 1.0 if apart >= 0 else -1.0
-    told = _reversed_signs(sign < 0, way < 0)
-    if not signed:
-        side = "in contact it goes to the other side of its rest"
-        text = f"the sign of the force contradicts --force-sign: {side}"
-        told = (*told, Warn(Code.NEGATIVE_STIFFNESS, text))
-    if spans[0][0] == 0:
-        text = "the log begins in contact: the depth of that contact is not known"
-        told = (*told, Warn(Code.CONTACT_AT_START, text))
-    return Contacts(tuple(spans), False, sign, way, level, threshold, told, signed=signed)
+    return [*warnings, Warn(Code.POSITION_SIGN_REVERSED, text)] if position else warnings
 
 
 def _calm(force: Array, dt: float) -> Array:
@@ -304,16 +286,6 @@ def _ends(force: Array) -> tuple[float, float]:
     """The two ends of the force's range."""
     low, high = np.percentile(force, [0.1, 99.9])
     return float(low), float(high)
-
-
-def _resting(force: Array, rest: float, peak: float) -> float:
-    """The middle of the force near its resting end: the least of many medians is below it by their noise."""
-    for _ in range(_ROUNDS):
-        free = force[force < rest + ONSET * (peak - rest)]
-        if not len(free):
-            break
-        rest = float(np.median(free))
-    return rest
 
 
 def _touches(force: Array, rest: float, peak: float, threshold: float) -> list[tuple[int, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -118,24 +117,39 @@ def free_motion_of(
 
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
-    slope = _in_contact(force, position, ends)
+    slope, white = _in_contact(force, position, ends), white_noise(position)
 
     @cache
-    def steep() -> float:
-        """The largest slope at either end of the position's range that its interval leaves, of any share [N/m]."""
-        found = [abs(slope)]
-        for x in (position, -position):
-            white = white_noise(x)
-            stays = [own for share in _SHARES if (own := _stays_in(x < _limit(x, share)))]
-            slopes = [_slope(force, x, stay, white, np.inf) for stay in stays]
-            found.append(max((abs(own[0]) - own[1] for own in slopes if own is not None), default=0.0))
-        return max(found)
+    def slope_at(way: float, share: float, bound: float) -> tuple[float, float] | None:
+        """Slope over a share of the position's range from its lower (1) or upper (-1) end, and its half-width."""
+        stays = _stays_in(way * position < _limit(way * position, share))
+        return _slope(force, position, stays, white, bound) if stays else None
+
+    def share_of(way: float, bound: float) -> float:
+        """The largest share over which the force stays: its slope is clearly below that of the contact there.
+
+        Or over the next larger share, which may hold a touch.
+        That of an inertia is held against the steepest that an interval leaves at either end: it is in the force over
+        the whole range, and takes from the contact's.
+        """
+        clear = False
+        for share in _SHARES:
+            if (found := slope_at(way, share, bound)) is None:
+                continue
+            own, half = float(np.sign(slope)) * found[0], found[1]
+            before, clear = clear, own + half < FLAT * abs(slope)
+            if not (clear or before) or (none and own > half):
+                continue
+            least = abs(own - half if none else own)
+            every = (slope_at(end, other, np.inf) for end in (1.0, -1.0) for other in _SHARES)
+            if least < FLAT * abs(slope) or any(least < FLAT * (abs(k) - h) for k, h in filter(None, every)):
+                return float(share) * _quiet(force, way * position, share)
+        return 0.0
 
     found = [0.0, 0.0]
     for bound in (np.inf, _OUTLYING):
-        for i, way in enumerate((1.0, -1.0)) if slope and not any(found) else ():
-            own = _share(force, way * position, (way * slope, steep), bound, none)
-            found[i] = own * _quiet(force, way * position, own)
+        if slope and not any(found):
+            found = [share_of(way, bound) for way in (1.0, -1.0)]
     way = 1.0 if found[0] >= found[1] else -1.0
     if max(found) == 0 or max(found) < _TWICE * min(found):
         return None
@@ -168,39 +182,11 @@ def _limit(position: Array, share: float) -> float:
     return float(bottom + share * (top - bottom))
 
 
-def _share(
-    force: Array, position: Array, slopes: tuple[float, Callable[[], float]], bound: float, none: bool
-) -> float:
-    """The largest share of the position's range, from its lower end, over which the force stays; 0 if over none.
-
-    Its slope is clearly below that of the contact there, or over the next larger share, which may hold a touch. That of
-    an inertia is held against the steepest: it is in the force over the whole range, and takes from the contact's.
-    `bound` is as `_slope` has it, `none` as `free_motion_of` has it.
-    """
-    slope, steep = slopes
-    clear, white = False, white_noise(position)
-    for share in _SHARES:
-        stays = _stays_in(position < _limit(position, share))
-        found = _slope(force, position, stays, white, bound) if stays else None
-        if found is None:
-            continue
-        own, doubt = found[0] / slope, found[1] / abs(slope)
-        before, clear = clear, own + doubt < FLAT
-        if not (clear or before) or (none and own > doubt):
-            continue
-        least = (own - doubt if none else abs(own)) * abs(slope)
-        if abs(least) < FLAT * abs(slope) or abs(least) < FLAT * steep():
-            return float(share)
-    return 0.0
-
-
 def _quiet(force: Array, position: Array, share: float) -> bool:
     """Whether the force has no clearly larger range at the lower end of the position's than at the upper one.
 
     Steps that a damper ends leave no slope of force over position at the deep end either.
     """
-    if not share:
-        return False
     low, high = (force[way * position <= _limit(way * position, share)] for way in (1.0, -1.0))
     own, other = (float(np.ptp(np.percentile(end, [0.1, 99.9]))) for end in (low, high))
     return FLAT * own <= other

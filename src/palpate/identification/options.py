@@ -58,11 +58,9 @@ class Prior:
 
     def rows(self, names: tuple[str, ...]) -> tuple[Array, Array]:
         """The regression's rows and targets for parameters of these names, shapes (r, p) and (r,)."""
-        own = [name for name in names if name in self.known]
-        matrix = np.zeros((len(own), len(names)))
-        for i, name in enumerate(own):
-            matrix[i, names.index(name)] = self.known[name][1]
-        return matrix, np.array([value * weight for value, weight in (self.known[name] for name in own)])
+        values, weights = np.array([self.known.get(name, (0.0, 0.0)) for name in names]).reshape(-1, 2).T
+        own = weights > 0
+        return np.diag(weights)[own], (values * weights)[own]
 
     def std(self, names: tuple[str, ...], noise: float) -> Array | None:
         """Standard deviation of each parameter, infinite where nothing is known; None if nothing is at all."""
@@ -135,8 +133,7 @@ class Options:
         told = said.get("force_filter")
         low_pass = LowPass.parse(told) if isinstance(told, str) else told
         options = cls(**(said | {"force_filter": low_pass if low_pass and low_pass.sections else None}))
-        _check_words(options)
-        _check_numbers(options)
+        _check(options)
         return options
 
     @property
@@ -161,32 +158,31 @@ class Options:
             )
 
 
-def _check_words(o: Options) -> None:
+def _check(o: Options) -> None:
     if o.model is not None and o.model not in NAMES:
         raise unknown("model", o.model, NAMES)
-    if o.force_sign not in (None, 1, -1):
-        raise InputError(f"the force sign must be +1 or -1, got {o.force_sign}")
+    for wrong, text in (
+        (o.force_sign not in (None, 1, -1), f"the force sign must be +1 or -1, got {o.force_sign}"),
+        (
+            o.series_mass and o.series_stiffness is None,
+            "a mass in series swings on a stiffness in series: give that too",
+        ),
+        (not 0 < o.tolerance <= 1, f"the tolerance must be in (0, 1], got {o.tolerance:g}; 0.25 means 25 %"),
+        (o.calibration >= 1, f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %"),
+        (not isfinite(o.lag or 0.0), f"the lag must be a number of seconds, got {o.lag}"),
+    ):
+        if wrong:
+            raise InputError(text)
     for name, mass in (("mass", o.mass), ("mass in series", o.series_mass)):
         if mass is not None and not all(isfinite(number) and number >= 0 for number in mass):
             raise InputError(f"the {name} and its std must be 0 or more, got {mass[0]:g} and {mass[1]:g}")
-    if o.series_mass is not None and o.series_stiffness is None:
-        raise InputError("a mass in series swings on a stiffness in series: give that too")
-
-
-def _check_numbers(o: Options) -> None:
-    if not 0 < o.tolerance <= 1:
-        raise InputError(f"the tolerance must be in (0, 1], got {o.tolerance:g}; 0.25 means 25 %")
-    if o.calibration >= 1:
-        raise InputError(f"the calibration must be below 1, got {o.calibration:g}; 0.01 means 1 %")
-    if o.lag is not None and not isfinite(o.lag):
-        raise InputError(f"the lag must be a number of seconds, got {o.lag:g}")
     deviations = {"calibration": o.calibration, "lag's std": o.lag_std, "series stiffness' std": o.series_std}
-    for name, value in deviations.items():
-        if not (isfinite(value) and value >= 0):
-            raise InputError(f"the {name} must be 0 or more, got {value:g}")
-    for name, positive in (("series stiffness", o.series_stiffness), ("cut-off", o.cutoff)):
-        if positive is not None and not (isfinite(positive) and positive > 0):
-            raise InputError(f"the {name} must be above 0, got {positive:g}")
+    positive = {"series stiffness": o.series_stiffness, "cut-off": o.cutoff}
+    for name, value in (deviations | positive).items():
+        if value is not None and not (isfinite(value) and (value > 0 or (value == 0 and name in deviations))):
+            raise InputError(
+                f"the {name} must be {'above 0' if name in positive else '0 or more'}, got {value:g}"
+            )
 
 
 NOTHING_SAID = Options()

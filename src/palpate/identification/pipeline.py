@@ -17,7 +17,6 @@ from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem, problem_of, with_fewer_rows
 from palpate.identification.result import (
-    DynamicStiffness,
     Identification,
     LagFound,
     Press,
@@ -27,7 +26,7 @@ from palpate.identification.result import (
 from palpate.identification.sampling import Channels, channels_of, thinned
 from palpate.identification.selection import Choice, choose
 from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
-from palpate.identification.verdicts import Terms, verdicts
+from palpate.identification.verdicts import Units, verdicts
 from palpate.records import Record
 from palpate.signals import Estimate
 from palpate.signals.types import NORMAL
@@ -51,17 +50,14 @@ def identify(record: Record, **given: Any) -> Identification:
     Raises:
         InputError: the record or an option is wrong, in one line.
     """
-    options = Options.of(**given)
-    channels = channels_of(record)
+    options, units, channels = Options.of(**given), record.units, channels_of(record)
     options.check_lag(len(channels.position) * channels.dt)
     channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
     warnings = (*channels.warnings, *contacts.warnings)
-    terms = Terms(options.tolerance, options.calibration, record.units["force"], record.units["position"])
     if not contacts.spans:
-        return _nothing(channels, chain, options, terms, warnings)
+        return _nothing(channels, chain, options, units, warnings)
     problem = with_fewer_rows(problem_of(channels, chain, contacts, options))
-    terms = replace(terms, band=problem.band)
     choice = choose(problem, options)
     problem, fitted = choice.problem, choice.answer.fit
     holds = fit(fitted.model, problem.motion, problem.force, problem.lag, fitted.lag)
@@ -69,17 +65,8 @@ def identify(record: Record, **given: Any) -> Identification:
     if not (contacts.clear or options.bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
-        return _nothing(channels, chain, options, terms, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    evidence = evidence_of(problem, options, terms.stiffness_unit, choice.answer)
-    series = SeriesSpring.of(options)
-    if series is not None:
-        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
-        holds = series.parameters(holds, problem.band)
-    if contacts.payload is not None:
-        weighed = np.where(np.array(choice.answer.names) == "M", contacts.payload.std, 0.0)
-        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
-    parameters, told = verdicts(choice, holds, evidence[2], terms)
-    return _outcome(channels, chain, choice, holds, evidence, parameters, (*warnings, *told), options, terms)
+        return _nothing(channels, chain, options, units, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
+    return _outcome(channels, chain, choice, holds, warnings, options, units)
 
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
@@ -91,21 +78,27 @@ _NARROWER = 0.5
 """Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
-# More than seven arguments: it gathers what every stage has found.
 def _outcome(
     channels: Channels,
     chain: Chain,
     choice: Choice,
     holds: Fit,
-    evidence: tuple[tuple[DynamicStiffness, ...], Press | None, WorkingPoint | None],
-    parameters: dict[str, Parameter],
     warnings: tuple[Warn, ...],
     options: Options,
-    terms: Terms,
+    units: Units,
 ) -> Identification:
-    """Identification from the fit, its verdicts and its evidence."""
-    problem, found = choice.problem, choice.answer
-    spectrum, press, point = evidence
+    """Identification from the fit: its evidence, and the verdicts that rest on both."""
+    problem, unit = choice.problem, impedance_units(units["force"], units["position"])["K"]
+    spectrum, press, point = evidence_of(problem, options, unit, choice.answer)
+    series, payload = SeriesSpring.of(options), problem.contacts.payload
+    if series is not None:
+        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
+        holds = series.parameters(holds, problem.band)
+    if payload is not None:
+        weighed = np.where(np.array(choice.answer.names) == "M", payload.std, 0.0)
+        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
+    parameters, told = verdicts(choice, holds, point, options, units)
+    warnings, found = (*warnings, *told), choice.answer
     mass, name = parameters.get("M"), found.fit.model.name
     massless = options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
     delay = 0.0 if problem.contacts.bonded else chain.delay
@@ -118,10 +111,10 @@ def _outcome(
         r2=max(found.fit.r2, 0.0),
         rmse=found.fit.rmse,
         n=len(problem.force),
-        warnings=(*warnings, *_doubts(parameters, press, problem, warnings, options, terms)),
+        warnings=(*warnings, *_doubts(parameters, press, problem, warnings, options, units)),
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
-        traces=_traces(channels, chain, choice, terms),
+        traces=_traces(channels, chain, choice, units),
         estimate=Estimate(holds.names, holds.theta, holds.cov, holds.noise.effective),
         working_point=point,
         dynamic_stiffness=spectrum,
@@ -134,17 +127,17 @@ def _outcome(
 
 
 def _nothing(
-    channels: Channels, chain: Chain, options: Options, terms: Terms, warnings: tuple[Warn, ...]
+    channels: Channels, chain: Chain, options: Options, units: Units, warnings: tuple[Warn, ...]
 ) -> Identification:
     """There is no contact: every parameter without a number, and the force, which says why."""
     reason, nan = "there is no contact in this log", float("nan")
-    units = impedance_units(terms.force_unit, terms.position_unit).items()
+    every = impedance_units(units["force"], units["position"]).items()
     return Identification(
         options.model or "kelvin-voigt",
-        {name: Parameter.unknown(unit, reason) for name, unit in units},
+        {name: Parameter.unknown(unit, reason) for name, unit in every},
         (), None, nan, nan, 0, warnings,
         cutoff=chain.cutoff,
-        traces=_traces(channels, chain, None, terms),
+        traces=_traces(channels, chain, None, units),
         options=_plain_options(options),
     )  # fmt: skip
 
@@ -200,7 +193,7 @@ def _doubts(
     problem: Problem,
     warnings: tuple[Warn, ...],
     options: Options,
-    terms: Terms,
+    units: Units,
 ) -> list[Warn]:
     """The lag that the work of the presses tells, where it is beyond an assumed prior's bound; unlikely numbers."""
     found, prior, late = [], problem.lag, press.late if press else None
@@ -221,22 +214,20 @@ def _doubts(
         beside = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it"
         text = f"{beside}: K depends on that calibration"
         found.append(Warn(Code.SERIES_COMPLIANCE, text))
-    position = problem.motion.position
-    at = np.clip(np.round(problem.motion.instants).astype(np.intp), 0, len(position) - 1)
-    deep = float(np.ptp(position[at]))
-    if terms.position_unit == "m" and deep > _DEEPEST:
+    deep = float(np.ptp(problem.motion.position[problem.in_contact]))
+    if units["position"] == "m" and deep > _DEEPEST:
         text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
         found.append(Warn(Code.UNIT_DOUBTFUL, text))
     return found
 
 
-def _traces(channels: Channels, chain: Chain, choice: Choice | None, terms: Terms) -> Traces:
+def _traces(channels: Channels, chain: Chain, choice: Choice | None, units: Units) -> Traces:
     """Signals and fit to be drawn; of a log in which nothing is touched, the force alone."""
-    step, units = max(len(channels.position) // _SHOWN, 1), (terms.position_unit, terms.force_unit)
+    step, both = max(len(channels.position) // _SHOWN, 1), (units["position"], units["force"])
     time = (channels.time - chain.delay)[::step]
     if choice is None:
         none = np.empty(0)
-        return Traces(time, chain(channels.force)[::step], *(none,) * 4, {}, {}, {}, False, *units)
+        return Traces(time, chain(channels.force)[::step], *(none,) * 4, {}, {}, {}, False, *both)
     problem, fitted = choice.answer.problem, choice.answer.fit
     size, linear, mass = max(len(problem.force) // _SHOWN, 1), fitted.model.linear, problem.lag.mass
     columns = fitted.model.columns(problem.motion, fitted.theta, fitted.lag)
@@ -251,5 +242,5 @@ def _traces(channels: Channels, chain: Chain, choice: Choice | None, terms: Term
         {name: fitted[name] for name in linear},
         {"M": mass[1]} if mass and "M" in linear else {},
         problem.motion.matched,
-        *units,
+        *both,
     )

@@ -287,10 +287,7 @@ def _pool(
     own: Sequence[tuple[Parameter, str] | None], tolerance: float, beside: _Covariates
 ) -> PooledParameter:
     """Pool the numbers of one meaning that most logs give: one unit, one model; what is rejected is left out."""
-    kinds, numbers_of = (
-        {},
-        {},
-    )  # of each log: unit and model; value, half-widths of its own and common to all logs
+    kinds, numbers_of = {}, {}  # of a log: unit and model; value, half-widths of its own and common to all
     for i, (p, meaning) in ((i, pair) for i, pair in enumerate(own) if pair is not None):
         if p.value is not None and p.ci95 is not None and p.verdict is not Verdict.REJECTED:
             half = (p.ci95[1] - p.ci95[0]) / 2

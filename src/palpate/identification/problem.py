@@ -290,11 +290,9 @@ def _behind_filter(
         inside.append(own[usable[own]])
     rows, spans = number_rows(inside, channels)
     whole = chain(position, 0, lag.value)
-    onsets = [whole[begin] for begin, _ in contacts.spans if begin > 0]
-    if contacts.bonded:
-        origin = float(whole[rows].mean())
-    else:  # the position at the onset; the least in contact, if no onset is in the log
-        origin = float(np.mean(onsets)) if onsets else float(whole[rows].min())
+    # The position at the onset; the least in contact, if no onset is in the log.
+    onsets = [whole[begin] for begin, _ in contacts.spans if begin > 0] or [whole[rows].min()]
+    origin = float(np.mean(whole[rows] if contacts.bonded else onsets))
     position = position - origin
     guard, out = int(chain.settling / chain.dt), channels.valid.copy()
     for begin, end in contacts.spans:
@@ -337,10 +335,8 @@ def _noise(position: Array, rows: Rows, spans: Rows, rounding: float) -> Positio
     seen to hide in contact, which is all of them where each reading is counts away from the one before.
     """
     found = noise_within(position, rows, spans)
-    if found.count:
-        counts = min(found.white, found.count / 12**0.5)
-        return PositionNoise(max(white_noise(position), counts), found.jump, found.count)
-    return PositionNoise(max(white_noise(position), rounding), 0.0, 0.0)
+    least = min(found.white, found.count / 12**0.5) if found.count else rounding
+    return PositionNoise(max(white_noise(position), least), found.jump if found.count else 0.0, found.count)
 
 
 def _behind_sensor(
@@ -352,10 +348,8 @@ def _behind_sensor(
     path = SensorPath(low_pass, raw.start, raw.dt, clock.instants, clock.period * raw.dt)
     time = raw.start + clock.instants * raw.dt
     before, after = path.reach
-    usable: Mask = (
-        clock.instants > low_pass.lag / path.dt + before
-    )  # the way through the sensor is in the log
-    usable = usable & (clock.instants < len(raw.position) - after) & raw.valid[clock.rows]
+    known = clock.instants > low_pass.lag / path.dt + before  # the way through the sensor is in the log
+    usable: Mask = known & (clock.instants < len(raw.position) - after) & raw.valid[clock.rows]
     inside, begins, free = [], [], np.full(len(time), not contacts.bonded)
     for (begin, end), last in zip(contacts.spans, ends(channels, contacts), strict=True):
         first, past = (channels.start + i * channels.dt for i in (begin, end))
@@ -372,8 +366,8 @@ def _behind_sensor(
     origin = float(position[whole].mean() if contacts.bonded else position[whole].min())
     position = position - origin
     force = contacts.force_sign * raw.held_force[clock.rows]
-    known = float(np.hypot(options.lag_std, clock.spread * raw.dt))
-    lag = lag_prior(options.lag, known, path.period, low_pass.lag, options.mass)
+    spread = float(np.hypot(options.lag_std, clock.spread * raw.dt))
+    lag = lag_prior(options.lag, spread, path.period, low_pass.lag, options.mass)
     if contacts.payload is not None:
         force = force - contacts.payload.mass * path.read(position, 2, lag.value, np.arange(len(time)))
     problem = Problem(

@@ -117,9 +117,8 @@ class Press(Compared):
         return {
             "tangent": [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent],
             "hysteresis_loss": self.hysteresis_loss,
-            "relaxation": own
-            and {"share": own.share, "half_time_s": own.half_time, "duration_s": own.duration},
-        }
+            "relaxation": own and {"share": own.share, "half_time_s": own.half_time, "duration_s": own.duration},
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -307,13 +306,12 @@ class Identification(Result):
 
     def to_json(self) -> dict[str, Any]:
         """The plain values that `palpate identify --json` prints."""
-        models = []
-        for (
-            own
-        ) in self.comparison:  # the chosen one is called as the parameters' model, whose mass may be left out
-            chosen = isclose(own.rmse, self.rmse, rel_tol=1e-9)
-            name = self.model if chosen else own.model
-            models.append({"model": name, "r2": _plain(own.r2), "note": own.note, "chosen": chosen})
+        # The chosen one is called as the parameters' model, whose mass may be left out.
+        chosen = [isclose(own.rmse, self.rmse, rel_tol=1e-9) for own in self.comparison]
+        models = [
+            {"model": self.model if own else m.model, "r2": _plain(m.r2), "note": m.note, "chosen": own}
+            for m, own in zip(self.comparison, chosen, strict=True)
+        ]
         return {
             "model": self.model,
             "depth_m": self.depth,

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from palpate.arrays import Array, Mask
 from palpate.signals.samples import runs
 
-_BLOCKS = 32
-_ROUNDS = 12
+_BLOCKS = 1 << 10
 _EVERY_ROW = 0.9
 _FEWEST = 10
 _AT_FIRST = 1 << 14
@@ -65,9 +64,8 @@ def sample_clock_of(values: Array) -> SampleClock:
     if not even:  # each refresh is somewhere in the row before it shows
         own = changed.astype(np.float64) - 0.5
         return SampleClock(own, changed, float(np.sqrt(1 / 12 / len(changed))), counted[0][1])
-    period, phase, room, spread = max(
-        even, key=lambda grid: grid[0]
-    )  # with the fewest samples that no change shows
+    # That with the fewest samples that no change shows.
+    period, phase, room, spread = max(even, key=lambda grid: grid[0])
     first = int(np.ceil((-0.5 - phase) / period))
     last = int(np.floor((len(values) - 1 - phase) / period))
     instants = phase + np.arange(first, last + 1) * period
@@ -135,52 +133,36 @@ def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) ->
 
     Its instants stand farthest from the ends of their rows, by the room at least; None if no grid has one in each.
 
-    Phase and period of all that have form a polygon. What is not known of the phase is how far the polygon reaches,
-    where the phase is that in the middle of the log.
-    """
-    middle = float(np.mean(number))
-    count = number.astype(np.float64) - middle
-    best, room = _farthest((0.0, 0.0, -1.0), count, changed, (0.0, period))
-    if room <= _ROOM:
-        return None
-    reach = [_farthest((way, 0.0, 0.0), count, changed, best)[0][0] for way in (1.0, -1.0)]
-    return best[1], best[0] - best[1] * middle, room, (reach[1] - reach[0]) / np.sqrt(12)
-
-
-def _farthest(
-    goal: tuple[float, float, float], count: Array, changed: NDArray[np.intp], begin: tuple[float, float]
-) -> tuple[tuple[float, float], float]:
-    """Phase and period, and how far all instants are from the ends of their rows, by a linear programme.
-
-    Of its constraints, two a change, only those are taken that were violated most in their part of the log.
-
-    `goal` is what of phase, period and room is made smallest; the room is at least 0 where it is no part of it. `count`
-    is the number of each sample from the middle of the log, `changed` the row that shows it, both of shape (m,).
+    Phase and period of all that have form a polygon, whose edges are of changes on the convex hull. What is not known
+    of the phase is how far the polygon reaches, where the phase is that in the middle of the log.
     """
     from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull
 
-    own = np.array([0, len(count) - 1])
-    widest = goal[2] != 0
-    bounds = [(None, None), (None, None), (None if widest else 0.0, None)]
-    (phase, period), room = begin, np.inf
-    for _ in range(_ROUNDS):
-        left = changed - period * count
-        size = -(-len(left) // _BLOCKS)
-        blocks = [(first, left[first : first + size]) for first in range(0, len(left), size)]
-        extremes = [first + int(at) for first, block in blocks for at in (block.argmin(), block.argmax())]
-        grown = np.union1d(own, extremes)
-        if len(grown) == len(own) or (widest and room <= _ROOM):
-            break
-        own, n = grown, count[grown]
-        above = np.column_stack([np.ones_like(n), n, np.ones_like(n)])
-        below = above * [-1, -1, 1]
-        limits = np.r_[left[own], 1 - left[own]]
-        found = linprog(goal, np.vstack([above, below]), limits, bounds=bounds)
-        if not found.success:
-            return begin, -np.inf
-        phase, room = float(found.x[0]), float(found.x[2])
-        period += float(found.x[1])
-    return (phase, period), room
+    middle, reach = float(np.mean(number)), float(np.ptp(number))
+    count, left = (number - middle) / reach, changed - period * (number - middle)
+    last, size = len(left) - 1, -(-len(left) // _BLOCKS)
+    hulls = []
+    for way in (1.0, -1.0):  # no corner lies within a line through the outermost changes of each block
+        outermost = [i + int(np.argmin(way * left[i : i + size])) for i in range(0, last, size)]
+        line = np.unique([0, *outermost, last])
+        outside = np.flatnonzero(way * left <= way * np.interp(count, count[line], left[line]))
+        points = np.column_stack([count, way * left])[outside]
+        corners = ConvexHull(np.vstack([points, [0.0, points[:, 1].max() + 1]])).vertices
+        hulls.append(outside[corners[corners < len(outside)]])
+    own = np.union1d(*hulls)
+    ahead = np.column_stack([np.ones(len(own)), count[own], np.ones(len(own))])
+    sides, limits = np.vstack([ahead, ahead * [-1, -1, 1]]), np.r_[left[own], 1 - left[own]]
+    every = []
+    # Largest room; least and largest phase.
+    for goal, least in (((0, 0, -1), None), ((1, 0, 0), 0.0), ((-1, 0, 0), 0.0)):
+        found = linprog(goal, sides, limits, bounds=[(None, None), (None, None), (least, None)])
+        if not found.success or (least is None and found.x[2] <= _ROOM):
+            return None
+        every.append(found.x)
+    (phase, more, room), (low, *_), (high, *_) = every
+    period += more / reach
+    return period, phase - period * middle, room, (high - low) / np.sqrt(12)
 
 
 _FEWEST_AT_LIMIT = 8

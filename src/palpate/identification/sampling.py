@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,17 +94,14 @@ def channels_of(record: Record) -> Channels:
     _check(time, position, force)
     rounding = last_digit(position) / 12**0.5, last_digit(force) / 12**0.5
     force = _without_spikes(force, rounding[1], warnings)
-    step = np.diff(time)
-    twice = int((step == 0).sum())
-    if twice:
-        first = f"first in row {int(np.flatnonzero(step == 0)[0]) + 2}"
-        text = f"{twice} rows repeat the time of the row before ({first}); the first of each is kept"
+    twice = np.flatnonzero(np.diff(time) == 0)
+    if len(twice):
+        first = f"first in row {twice[0] + 2}"
+        text = f"{len(twice)} rows repeat the time of the row before ({first}); the first of each is kept"
         warnings.append(Warn(Code.IRREGULAR_TIME, text))
-        keep = np.r_[True, step > 0]
-        time, position, force = time[keep], position[keep], force[keep]
-        step = np.diff(time)
+        time, position, force = (np.delete(own, twice + 1) for own in (time, position, force))
         _check(time, position, force)
-    dt, even = _period(time, step, warnings)
+    dt, even = _period(time, warnings)
     use_x = _usable("position", position, dt, warnings)
     use_f = _usable("force", force, dt, warnings)
     _leave_saturated(use_x, use_f, position, force, warnings)
@@ -168,12 +165,14 @@ def thinned(channels: Channels, size: int) -> Channels:
     """Average `size` neighbouring samples, in the same way on both channels."""
     if size < 2:
         return channels
-    position, force = block_means(channels.position, size), block_means(channels.force, size)
+    position, force = (block_means(own, size) for own in (channels.position, channels.force))
     valid = block_means(channels.valid.astype(float), size) == 1
     start, dt = channels.start + (size - 1) / 2 * channels.dt, channels.dt * size
-    rate, (own, other) = min(channels.rate, 1 / dt), channels.rounding
-    rounding = own / size**0.5, other / size**0.5
-    return Channels(start, dt, position, force, valid, rate, channels.raw, channels.warnings, rounding)
+    own, other = (rounding / size**0.5 for rounding in channels.rounding)
+    return replace(
+        channels, start=start, dt=dt, position=position, force=force, valid=valid, rate=min(channels.rate, 1 / dt),
+        rounding=(own, other),
+    )  # fmt: skip
 
 
 def _common(
@@ -187,53 +186,52 @@ def _common(
     (x, use_x), (f, use_f) = position, force
     if even and use_x.all() and use_f.all():
         return x, f, np.ones(len(grid), bool)
-    slow, fast = (use_f, use_x) if use_f.sum() < use_x.sum() else (use_x, use_f)
-    instants = time[slow]
-    bridged, near = _bridge(grid, instants, (f if slow is use_f else x)[slow])
-    other, near_other = _bridge(instants, time[fast], (x if slow is use_f else f)[fast])
-    own, near_own = _bridge(grid, instants[near_other], other[near_other])
-    valid = near & near_own
-    return (own, bridged, valid) if slow is use_f else (bridged, own, valid)
+    of_force = use_f.sum() < use_x.sum()
+    (slow, use_slow), (fast, use_fast) = (force, position) if of_force else (position, force)
+    instants = time[use_slow]
+    own, near = _bridge(grid, instants, slow[use_slow])
+    other, near_other = _bridge(instants, time[use_fast], fast[use_fast])
+    other, near_fast = _bridge(grid, instants[near_other], other[near_other])
+    return *((other, own) if of_force else (own, other)), near & near_fast
 
 
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
-        several, whose = ("", "its") if len(time) == 1 else ("s", "their")
-        count = f"{len(time)} row{several} with a time of {whose} own"
-        raise InputError(
-            f"the log has {count}; at least {_FEWEST} are needed: log longer, or check --time, --start and --end"
+        count = (
+            "1 row with a time of its own" if len(time) == 1 else f"{len(time)} rows with a time of their own"
         )
+        advice = "log longer, or check --time, --start and --end"
+        raise InputError(f"the log has {count}; at least {_FEWEST} are needed: {advice}")
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
     if (rate := _rate(time)) > _FASTEST:
-        fast = f"there are {rate:.3g} rows a second, faster than any sensor"
-        raise InputError(f"{fast}; is the unit of time right?")
+        raise InputError(
+            f"there are {rate:.3g} rows a second, faster than any sensor; is the unit of time right?"
+        )
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
-            large = f"the {name} reaches {reach:.3g}, beyond any sensor"
-            raise InputError(f"{large}; is it the right column and unit?")
+            raise InputError(
+                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
+            )
         if np.ptp(seen) == 0:
-            still = f"the {name} is {seen[0]:.6g} in every row"
-            raise InputError(f"{still}; is it the right column, and did anything move?")
+            always = f"the {name} is {seen[0]:.6g} in every row"
+            raise InputError(f"{always}; is it the right column, and did anything move?")
 
 
-def _period(time: Array, step: Array, warnings: list[Warn]) -> tuple[float, bool]:
+def _period(time: Array, warnings: list[Warn]) -> tuple[float, bool]:
     """The grid's period, and whether the rows lie on it."""
-    middle = float(np.median(step))
-    gaps = step > 3 * middle
+    step = np.diff(time)
+    gaps = step > 3 * np.median(step)
     dt = float(step[~gaps].mean())
-    samples = (time[-1] - time[0]) / dt
-    if samples > max(
-        _BRIDGED * len(time), _FEW
-    ):  # little else than gaps: its even grid would fill the memory
-        widest = int(np.argmax(step))
+    samples, widest = (time[-1] - time[0]) / dt, int(np.argmax(step))
+    if samples > max(_BRIDGED * len(time), _FEW):  # its even grid would fill the memory
         raise InputError(
             f"the time jumps by {step[widest]:.6g} s at row {widest + 2}, and {len(time)} rows would become"
             f" {samples:.3g} samples; cut the log there with --start and --end"

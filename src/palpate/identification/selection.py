@@ -170,49 +170,37 @@ class Choice:
 
 
 def choose(problem: Problem, options: Options) -> Choice:
-    """The model; of a press at constant speed the force by a plain one is that of least squares in time."""
-    choice = _choose(problem, options)
-    found = choice.answer
-    if problem.contacts.press is None or found.fit.model.nonlinear:
-        return choice
-    fitted = found.fit.in_time(found.problem.motion, found.problem.force)
-    tried = [
-        replace(own, r2=fitted.r2, rmse=fitted.rmse) if own.model == fitted.model.name else own
-        for own in choice.tried
-    ]
-    return replace(choice, answer=replace(found, fit=fitted), tried=tuple(tried))
-
-
-def _choose(problem: Problem, options: Options) -> Choice:
     """Answer the plain model, and a richer one if it is asked for or earns its place.
 
     A richer model earns it by explaining at least half of what any plainer one leaves, with everything that it has more
-    of identified: what a log cannot tell of it never hides what the plain model shows.
+    of identified: what a log cannot tell of it never hides what the plain model shows. Of a press at constant speed the
+    force by a plain one is that of least squares in time.
     """
-    name, tolerance = options.model, options.tolerance
-    if name in (None, KELVIN_VOIGT.name, KELVIN_VOIGT_MASS.name):
-        plain = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS)
-        best, at, told = plain, problem, plain.explained
-        tried = [_comparison_of(plain, "")]
-        if (
-            name is None
-            and options.series_stiffness is None
-            and plain.unexplained > float(np.sqrt(max(plain.noise, 0.0))) + _between_readings(problem)
-        ):
-            # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
-            one_sided = problem.with_touches is not None and not lag_open(problem)
-            for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
-                rich, own = _one_sided(make, problem)
-                why = _against(rich, told, tolerance)
-                told = max(told, rich.explained)
-                tried.append(_comparison_of(rich, why))
-                if not why:
-                    best, at = rich, own
-        return Choice(best, at, tuple(tried))
-    if options.series_stiffness is not None:
-        raise InputError(f"{name} is not available with a series stiffness: use --model kelvin-voigt-mass")
-    rich, own = _one_sided(_MAKERS[name], problem)
-    return Choice(rich, own, (_comparison_of(rich, "asked for"),))
+    name, series = options.model, options.series_stiffness
+    if name in _MAKERS:
+        if series is not None:
+            raise InputError(
+                f"{name} is not available with a series stiffness: use --model kelvin-voigt-mass"
+            )
+        rich, own = _one_sided(_MAKERS[name], problem)
+        return Choice(rich, own, (_comparison_of(rich, "asked for"),))
+    best, at = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS), problem
+    told, left = best.explained, best.unexplained
+    if problem.contacts.press is not None:
+        best = replace(best, fit=best.fit.in_time(best.problem.motion, best.problem.force))
+    tried = [_comparison_of(best, "")]
+    noise = float(np.sqrt(max(best.noise, 0.0))) + _between_readings(problem)
+    if name is None and series is None and left > noise:
+        # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
+        one_sided = problem.with_touches is not None and not lag_open(problem)
+        for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
+            rich, own = _one_sided(make, problem)
+            why = _against(rich, told, options.tolerance)
+            told = max(told, rich.explained)
+            tried.append(_comparison_of(rich, why))
+            if not why:
+                best, at = rich, own
+    return Choice(best, at, tuple(tried))
 
 
 def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Problem]:

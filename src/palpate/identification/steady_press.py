@@ -1,14 +1,16 @@
 """Presses at constant speed, as testing machines and arms make them: strokes of the position, and their tangents.
 
 A position that is a straight line in time has no power in any octave, so what a press shows is read from position and
-force themselves. A stroke is an advance or a retreat at about one speed. Where force and position are both smooth
-curves of one variable, the tangent is the quotient of their derivatives: at constant speed a lag of the force moves it
-along the curve, and does not change it.
+force themselves: strokes of the position, advances or retreats at about one speed (`strokes_of`); the force of each
+over its depth (`curves_of`); its tangents (`slopes_at`); and of these the press (`steady_press`). Where force and
+position are both smooth curves of one variable, the tangent is the quotient of their derivatives: at constant speed a
+lag of the force moves it along the curve, and does not change it; where the speed changes, it changes the slope by that
+change.
 
 In a window about one force the force is a smooth curve of the position. How bent it is, the log tells: curves of
 several degrees are averaged by Akaike's weights, with the variance between them (Burnham and Anderson, Model selection
 and multimodel inference, 2002, sec. 4.3). So curvature is in the curve, and of an error only what the noise leaves
-open. A lag of the force moves it along the curve: where the speed changes, it changes the slope by that change.
+open.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -56,16 +59,10 @@ _SEEN = 8.0
 
 @dataclass(frozen=True)
 class Stroke:
-    """An advance or a retreat at about constant speed.
-
-    Args:
-        begin, end: on the log's clock [s].
-        way: 1 if the position grows as it is logged, -1 if it falls.
-    """
+    """An advance or a retreat at about constant speed, from its begin to its end on the log's clock [s]."""
 
     begin: float
     end: float
-    way: int
 
     def rows(self, channels: Channels) -> slice:
         """Its samples in the channels, thinned or not."""
@@ -74,33 +71,34 @@ class Stroke:
 
 
 def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
-    """The strokes of an evenly sampled log whose motion is little else; none of another log."""
+    """The strokes of an evenly sampled log that goes one way in strokes, comes back at any speed, and does little else.
+
+    None of another log.
+    """
     size = -(-len(channels.position) // _BLOCKS)
     x = block_means(channels.position, size)
     noise = noise_within(x, np.arange(len(x)), np.zeros(len(x), np.intp))
     least, reach = max(_SEEN * white_noise(x), noise.count), float(np.ptp(x))
     if reach <= _FINE * least:
         return ()
-    steady = [_steady(x, a, b, least) for a, b in pairwise(_turns(x, _STROKE * reach))]
-    ends = [own for own in steady if own is not None]
-    legs, whole = np.diff(x[_turns(x, _STROKE * reach)]), np.diff(x[_turns(x, least)])
-    made = np.array([x[b] - x[a] for a, b in ends])
-    if not any(_goes_in_strokes(sign * made, sign * legs, sign * whole) for sign in (1, -1)):
+    turns = _turns(x, _STROKE * reach)
+    ends = [own for a, b in pairwise(turns) if (own := _steady(x, a, b, least)) is not None]
+    # Ways [m] of the strokes, of the legs between large turns at any speed, and of all between turns above the noise.
+    strokes, legs, whole = (
+        np.array([x[b] - x[a] for a, b in ends]),
+        np.diff(x[turns]),
+        np.diff(x[_turns(x, least)]),
+    )
+    for sign in (1, -1):
+        there, advance, back = (
+            np.maximum(way, 0).sum() for way in (sign * whole, sign * strokes, -sign * legs)
+        )
+        if 0 < _SHARE * there <= advance and advance + back >= _SHARE * np.abs(whole).sum():
+            break
+    else:
         return ()
-    dt = size * channels.dt
-    start = channels.start + (size - 1) / 2 * channels.dt
-    return tuple(Stroke(start + a * dt, start + b * dt, 1 if x[b] > x[a] else -1) for a, b in ends)
-
-
-def _goes_in_strokes(made: Array, legs: Array, whole: Array) -> bool:
-    """Whether a motion goes one way in strokes, comes back at any speed, and does little else.
-
-    By the ways [m] of the strokes, of the legs between large turns at any speed, and of those between all turns above
-    the noise.
-    """
-    strokes = float(made[made > 0].sum())
-    there, back = float(whole[whole > 0].sum()), float(-legs[legs < 0].sum())
-    return 0 < _SHARE * there <= strokes and strokes + back >= _SHARE * float(np.abs(whole).sum())
+    dt, start = size * channels.dt, channels.start + (size - 1) / 2 * channels.dt
+    return tuple(Stroke(start + a * dt, start + b * dt) for a, b in ends)
 
 
 def _turns(x: Array, least: float) -> list[int]:
@@ -126,17 +124,17 @@ def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
 
     Where it rests on the way, those of the part without a rest that goes farthest.
     """
-    way = x[a : b + 1] - x[a]
-    whole = float(way[-1])
+    whole = float(x[b] - x[a])
     if abs(whole) <= _FINE * least:
         return None
-    share = way / whole
-    first = int(np.flatnonzero(share <= _ENDS)[-1])
-    last = int(np.argmax(share >= 1 - _ENDS))
+    share = (x[a : b + 1] - x[a]) / whole
+    first, last = int(np.flatnonzero(share <= _ENDS)[-1]), int(np.argmax(share >= 1 - _ENDS))
     if last - first < _FINE:
         return None
-    speed = np.diff(np.interp(np.linspace(first, last, _PARTS + 1), np.arange(len(share)), share))
-    fine = np.diff(np.interp(np.linspace(first, last, _FINE + 1), np.arange(len(share)), share))
+    speed, fine = (
+        np.diff(np.interp(np.linspace(first, last, parts + 1), np.arange(len(share)), share))
+        for parts in (_PARTS, _FINE)
+    )
     moves = fine >= _STILL / _FINE
     if not moves.all():
         edges = np.linspace(first, last, _FINE + 1).astype(np.intp)
@@ -155,17 +153,32 @@ NEAR = 0.2
 """Half of the share of the force about a level in which its tangent is taken: the levels beside it lie so far off."""
 _MOST, _FEWEST = 96, 12
 """Blocks in a window."""
-_FOLLOWED = 0.5
-"""Share of a stroke's force that a smooth curve of the position follows, of a contact."""
 _SHOWN = 400
 """Points of a curve that are kept at most, to be drawn."""
 _DEGREES = (2, 4, 6, 8)
 """Of the curves that are averaged: an odd degree moves the slope in the middle as the even one above it does."""
 
 
+class _Tangent(NamedTuple):
+    """Slope of a window at a force.
+
+    Args:
+        slope, variance: [N/m], [N^2/m^2].
+        change: of the speed, relative [1/s].
+        drift: part of the slope that a removed drift would be [N/m].
+        depth: where it is [m].
+    """
+
+    slope: float
+    variance: float
+    change: float
+    drift: float
+    depth: float
+
+
 @dataclass(frozen=True)
 class Curve:
-    """Depth and force of one stroke, in the order of the depth, both counted into the surface.
+    """Depth and force of one stroke or a window of it in the order of time, both counted into the surface.
 
     Args:
         time, depth, force: shape (n,) [s], [m], [N].
@@ -192,6 +205,90 @@ class Curve:
         """Range of the force [N]."""
         return self.reach[1] - self.reach[0]
 
+    @property
+    def scaled(self) -> tuple[Array, float, float]:
+        """Depth from -1 to 1, shape (n,), about its middle [m], over half of its range [m]."""
+        low, high = float(self.depth.min()), float(self.depth.max())
+        return (self.depth - (low + high) / 2) / ((high - low) / 2), (low + high) / 2, (high - low) / 2
+
+    def between(self, low: float, high: float) -> Curve | None:
+        """Block means of the unbroken part between the first and last crossing of two forces; None of too few."""
+        force = self.force if self.loads else self.force[::-1]
+        first = int(np.argmax(force > low))
+        above = np.flatnonzero(force > high)
+        last = int(above[0]) if len(above) else len(force)
+        count = min(_MOST, int((last - first) * self.readings))  # rows between two readings tell nothing more
+        if count < _FEWEST:
+            return None
+        rows = slice(first, last) if self.loads else slice(len(force) - last, len(force) - first)
+        edges = np.linspace(0, last - first, count + 1).astype(np.intp)
+        every = np.stack([self.time, self.depth, self.force, self.drift])[:, rows]
+        time, x, f, drift = np.add.reduceat(every, edges[:-1], axis=1) / np.diff(edges)
+        return Curve(time, x, f, drift, self.loads, 1.0) if len(np.unique(x)) > _DEGREES[0] else None
+
+    def about(self, depth: float) -> Curve:
+        """The half of it about a depth [m]; the whole where that has blocks at too few depths."""
+        near = np.abs(self.depth - depth) <= self.scaled[2] / 2
+        if len(np.unique(self.depth[near])) < _FEWEST:
+            return self
+        time, x, force, drift = (own[near] for own in (self.time, self.depth, self.force, self.drift))
+        return Curve(time, x, force, drift, self.loads, 1.0)
+
+    def fit(self, degree: int) -> Array:
+        """Chebyshev coefficients of the force over the scaled depth, shape (degree + 1,)."""
+        return np.asarray(chebyshev.chebfit(self.scaled[0], self.force, degree), np.float64)
+
+    def tangent(self, level: float) -> _Tangent:
+        """The slope of a window at a force [N]."""
+        (u, middle, reach), force = self.scaled, self.force
+        degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < len(np.unique(u))]
+        fine = np.linspace(-1, 1, 201)
+        curve = chebyshev.chebval(fine, self.fit(degrees[:2][-1]))
+        at = float(fine[int(np.argmin(np.abs(curve - level)))])
+        left = force - chebyshev.chebval(u, self.fit(degrees[-1]))
+        noise, free = noise_of(left, np.arange(len(left)), degrees[-1] + 1), len(left) - degrees[-1] - 1
+        rounding = (1e-9 * float(np.ptp(force))) ** 2
+        variance = max(float(left @ left) / free * max(len(left) / noise.effective, 1.0), rounding)
+        every = []
+        for degree in degrees:
+            inverse = np.linalg.pinv(chebyshev.chebvander(u, degree))
+            weights = np.asarray(
+                chebyshev.chebval(at, chebyshev.chebder(inverse))
+            )  # of each block on the slope
+            misfit = force - chebyshev.chebval(u, inverse @ force)
+            criterion = float(misfit @ misfit) / variance + 2 * (degree + 1)
+            every.append((float(weights @ force), variance * float(weights @ weights), criterion))
+        values, own, criteria = np.array(every).T
+        share = np.exp(-(criteria - criteria.min()) / 2)
+        share /= share.sum()
+        mean = float(share @ values)
+        spread = float(share @ (own + (values - mean) ** 2))
+        acceleration, speed, _ = np.polyfit(self.time - self.time.mean(), u, 2)
+        drift = float(self.drift[-1] - self.drift[0]) / float(self.depth[-1] - self.depth[0])
+        change = float(2 * acceleration / (speed or 1e-300))
+        return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * at)
+
+
+def curves_of(
+    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
+) -> list[Curve]:
+    """The force of each stroke over its depth."""
+    curves = []
+    for rows in (stroke.rows(channels) for stroke in strokes):
+        there = np.flatnonzero(channels.valid[rows]) + rows.start
+        if len(there) < 2 * _FEWEST:
+            continue
+        time, force = channels.time[there], signs[1] * channels.force[there]
+        begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
+        gone = (
+            np.zeros(len(time))
+            if drift is None
+            else np.interp(time - channels.start, drift.times, drift.levels)
+        )
+        readings = min(channels.rate * channels.dt, 1.0)
+        curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
+    return curves
+
 
 @dataclass(frozen=True)
 class Slopes:
@@ -203,7 +300,6 @@ class Slopes:
         each: slope of each [N/m].
         again: 95 % half-width for one more; None for fewer than three [N/m].
         rise: mean duration of one [s]; of an octave, a quarter of a period.
-        explained: least share of a stroke's force that its curve follows.
     """
 
     force: float
@@ -212,7 +308,6 @@ class Slopes:
     each: tuple[float, ...]
     again: float | None
     rise: float
-    explained: float = 1.0
 
     def spread_as(self, wider: Slopes | None) -> Slopes:
         """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
@@ -222,8 +317,55 @@ class Slopes:
         spread = wider.stiffness.contributions["repetition"].times(gain)
         if spread.half <= self.stiffness.contributions["repetition"].half:
             return self
-        parts = {**self.stiffness.contributions, "repetition": spread}
-        return replace(self, stiffness=Measurement(self.stiffness.value, parts), each=wider.each, again=None)
+        stiffness = self.stiffness.with_cause("repetition", spread)
+        return replace(self, stiffness=stiffness, each=wider.each, again=None)
+
+
+def slopes_at(
+    curves: Sequence[Curve], shares: tuple[float, float], lag: Lag, rest: float = 0.0
+) -> Slopes | None:
+    """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
+
+    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
+    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
+    contact [N].
+    """
+    low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
+    ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
+    windows = [own for curve in curves if (own := curve.between(*ends)) is not None]
+    if not windows or high <= low:
+        return None
+    level = float(np.mean([chebyshev.chebval(0.0, own.fit(2)) for own in windows]))
+    every = [own.tangent(level) for own in windows]
+    values, variances, bends, drifts, depths = np.array(every).T
+    # A bend that no smooth curve follows, as a second layer, biases the slope, in half of the window less. The slopes
+    # differ by that bias and the noise of the narrower: it is known as well as its excess over the noise (James and
+    # Stein's shrinkage).
+    nearer = [own.about(depth).tangent(level) for own, depth in zip(windows, depths, strict=True)]
+    apart = np.array([own.slope for own in nearer]) - values
+    noises = np.array([own.variance for own in nearer])
+    share = np.maximum(1 - noises / np.maximum(apart**2, 1e-300), 0.0)
+    values, bent = values + share * apart, share * noises
+    mean = random_effects(values, variances + bent)
+    n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
+    weight /= weight.sum()
+    noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
+    # Satterthwaite: the noise is known, the differences by n - 1.
+    part = differ**2 / max(noise**2 + differ**2, 1e-300)
+    freedom = (n - 1) / part**2 if part else np.inf
+    bend = float(weight @ bends)
+    value = float(weight @ values) * (1 + lag.value * bend)
+    parts = {
+        "repetition": Contribution(differ, freedom),
+        "noise": Contribution(noise, freedom),
+        "lag": Contribution(lag.std * abs(value * bend)),
+        "curvature": Contribution(float(np.sqrt(weight**2 @ bent))),
+        # Known where the probe is free, not in between.
+        "other forces": Contribution.within(float(weight @ np.abs(drifts))),
+    }
+    rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
+    at, stiffness = (level - rest, float(weight @ depths)), Measurement(value, parts)
+    return Slopes(*at, stiffness, tuple(values.tolist()), mean.next_half, rise)
 
 
 @dataclass(frozen=True)
@@ -265,7 +407,7 @@ def steady_press(
         return None
     named = named or curves
     headline = slopes_at(named, WINDOW, lag, rest)
-    if headline is None or headline.explained < _FOLLOWED:
+    if headline is None:
         return None
     beside = [own for own in every if own.loads is named[0].loads and own.span > _STROKE * deepest]
     if len(beside) > len(named):  # at a force that all reach
@@ -285,159 +427,3 @@ def steady_press(
 def few_points(curve: Array) -> Array:
     """A curve, shape (2, n), with so few points that it is drawn."""
     return curve[:, :: max(curve.shape[1] // _SHOWN, 1)]
-
-
-def curves_of(
-    channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
-) -> list[Curve]:
-    """The force of each stroke over its depth."""
-    curves = []
-    for stroke in strokes:
-        rows = stroke.rows(channels)
-        there = np.flatnonzero(channels.valid[rows]) + rows.start
-        if len(there) >= 2 * _FEWEST:
-            position, force = signs[0] * channels.position[there], signs[1] * channels.force[there]
-            ends = [float(np.median(own)) for own in np.array_split(force, 5)]
-            time = channels.time[there]
-            gone = np.zeros(len(time)) if drift is None else np.interp(time, drift.times, drift.levels)
-            readings = min(channels.rate * channels.dt, 1.0)
-            curves.append(Curve(time, position, force, gone, ends[-1] > ends[0], readings))
-    return curves
-
-
-def slopes_at(
-    curves: Sequence[Curve], shares: tuple[float, float], lag: Lag, rest: float = 0.0
-) -> Slopes | None:
-    """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
-
-    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
-    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
-    contact [N].
-    """
-    low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
-    ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
-    windows = [own for curve in curves if (own := _within(curve, *ends)) is not None]
-    if not windows or high <= low:
-        return None
-    level = float(np.mean([chebyshev.chebval(0.0, _fit(own, 2)) for own in windows]))
-    every = [_tangent(own, level) for own in windows]
-    values, variances, bends, drifts, depths, follows = (np.array(part) for part in zip(*every, strict=True))
-    bent = zip(windows, values, depths, strict=True)
-    pulls, open_ = np.array([_bend(own, level, slope, depth) for own, slope, depth in bent]).T
-    values = values + pulls
-    mean = random_effects(values, variances + open_)
-    n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
-    weight /= weight.sum()
-    noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
-    # Satterthwaite: the noise is known, the differences by n - 1.
-    share = differ**2 / max(noise**2 + differ**2, 1e-300)
-    freedom = (n - 1) / share**2 if share else np.inf
-    bend = float(weight @ bends)
-    value = float(weight @ values) * (1 + lag.value * bend)
-    drift = float(weight @ np.abs(drifts))  # known where the probe is free, not in between
-    parts = {
-        "repetition": Contribution(differ, freedom),
-        "noise": Contribution(noise, freedom),
-        "lag": Contribution(lag.std * abs(value * bend)),
-        "curvature": Contribution(float(np.sqrt(weight**2 @ open_))),
-        "other forces": Contribution.within(drift),
-    }
-    rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
-    return Slopes(
-        level - rest, float(weight @ depths), Measurement(value, parts), tuple(values.tolist()), mean.next_half,
-        rise, float(follows.min()),
-    )  # fmt: skip
-
-
-def _bend(window: _Window, level: float, slope: float, depth: float) -> tuple[float, float]:
-    """Bias [N/m] of a window's slope by a bend that no smooth curve follows, as a second layer; its variance.
-
-    In half of the window it is smaller. The slopes' difference is that bias and the noise of the narrower one, so that
-    the bias is known as well as its excess over the noise (James and Stein's shrinkage).
-    """
-    near, variance, *_ = _tangent(window.about(depth), level)
-    share = max(1 - variance / max((near - slope) ** 2, 1e-300), 0.0)
-    return share * (near - slope), share * variance
-
-
-@dataclass(frozen=True)
-class _Window:
-    """Block means of a stroke about a force, the depth scaled to -1 to 1."""
-
-    time: Array
-    scaled: Array
-    force: Array
-    drift: Array
-    middle: float
-    reach: float
-
-    def about(self, depth: float) -> _Window:
-        """The half of it about a depth; the whole where that has blocks at too few depths."""
-        near = np.abs(self.scaled - (depth - self.middle) / self.reach) <= 0.5
-        if len(np.unique(self.scaled[near])) < _FEWEST:
-            return self
-        x = self.middle + self.reach * self.scaled[near]
-        middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
-        time, force, drift = self.time[near], self.force[near], self.drift[near]
-        return _Window(time, (x - middle) / reach, force, drift, middle, reach)
-
-
-def _within(curve: Curve, low: float, high: float) -> _Window | None:
-    """The unbroken part of a stroke between its first and last crossing of two forces, as block means."""
-    force = curve.force if curve.loads else curve.force[::-1]
-    first = int(np.argmax(force > low))
-    above = np.flatnonzero(force > high)
-    last = int(above[0]) if len(above) else len(force)
-    count = min(_MOST, int((last - first) * curve.readings))  # rows between two readings tell nothing more
-    if count < _FEWEST:
-        return None
-    rows = slice(first, last) if curve.loads else slice(len(force) - last, len(force) - first)
-    edges = np.linspace(0, last - first, count + 1).astype(np.intp)
-    parts = curve.time, curve.depth, curve.force, curve.drift
-    time, x, f, gone = (np.add.reduceat(part[rows], edges[:-1]) / np.diff(edges) for part in parts)
-    middle, reach = float(x.max() + x.min()) / 2, float(np.ptp(x)) / 2
-    few = len(np.unique(x)) <= _DEGREES[0]
-    return None if few else _Window(time, (x - middle) / reach, f, gone, middle, reach)
-
-
-def _fit(window: _Window, degree: int) -> Array:
-    return np.asarray(chebyshev.chebfit(window.scaled, window.force, degree), np.float64)
-
-
-def _tangent(window: _Window, level: float) -> tuple[float, ...]:
-    """The slope of a window at a force.
-
-    Returns:
-        Slope [N/m] and its variance; relative change of the speed [1/s]; part of the slope that a removed drift would
-        be [N/m]; depth [m]; share of the force that the curve follows.
-    """
-    depths = len(np.unique(window.scaled))
-    degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < depths]
-    fine = np.linspace(-1, 1, 201)
-    curve = chebyshev.chebval(fine, _fit(window, degrees[min(1, len(degrees) - 1)]))
-    at = float(fine[int(np.argmin(np.abs(curve - level)))])
-    left = window.force - chebyshev.chebval(window.scaled, _fit(window, degrees[-1]))
-    noise = noise_of(left, np.arange(len(left)), degrees[-1] + 1)
-    free = len(left) - degrees[-1] - 1
-    rounding = (1e-9 * float(np.ptp(window.force))) ** 2
-    variance = max(float(left @ left) / free * max(len(left) / noise.effective, 1.0), rounding)
-    values, own, weights = [], [], []
-    for degree in degrees:
-        columns = chebyshev.chebvander(window.scaled, degree)
-        theta, *_ = np.linalg.lstsq(columns, window.force, rcond=None)
-        slope = np.array([chebyshev.chebval(at, chebyshev.chebder(unit)) for unit in np.eye(degree + 1)])
-        misfit = window.force - columns @ theta
-        values.append(float(slope @ theta))
-        own.append(variance * float(slope @ np.linalg.pinv(columns.T @ columns) @ slope))
-        weights.append(float(misfit @ misfit) / variance + 2 * (degree + 1))
-    share = np.exp(-(np.array(weights) - min(weights)) / 2)
-    share /= share.sum()
-    mean = float(share @ values)
-    spread = float(share @ (np.array(own) + (np.array(values) - mean) ** 2))
-    path = chebyshev.chebfit(window.time - window.time.mean(), window.scaled, 2)
-    change = 4 * path[2] / (path[1] or 1e-300)  # of T2, whose second derivative is 4
-    depth = window.middle + window.reach * at
-    explained = 1 - float(left @ left) / max(float(np.var(window.force)) * len(left), 1e-300)
-    drift = float(window.drift[-1] - window.drift[0]) / float(window.scaled[-1] - window.scaled[0])
-    reach = window.reach
-    return mean / reach, spread / reach**2, change, drift / reach, depth, explained

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from palpate.arrays import Array
 from palpate.identification.causes import NOISE, Code, Warn, cause_of
 from palpate.identification.estimators.budget import Answer, Budget, Prediction, Spread
 from palpate.identification.estimators.fit import Fit
 from palpate.identification.evidence import stiffness_of
-from palpate.identification.options import LAG, Lag
+from palpate.identification.options import LAG, Options
+from palpate.identification.problem import Problem
 from palpate.identification.result import WorkingPoint
 from palpate.identification.selection import Choice
 from palpate.identification.uncertainty import Parameter, Verdict, half_width
@@ -39,31 +40,12 @@ _UNTOUCHED = (
 )
 
 
-@dataclass(frozen=True)
-class Terms:
-    """Inputs of a verdict besides the answer.
-
-    Args:
-        tolerance: largest half-width of an identified parameter's interval, as a share of its value.
-        calibration: relative standard deviation of the force's and position's scales together.
-        force_unit, position_unit: of the record.
-        band: frequency below which the probe moved [Hz].
-    """
-
-    tolerance: float
-    calibration: float
-    force_unit: str
-    position_unit: str
-    band: float = np.inf
-
-    @property
-    def stiffness_unit(self) -> str:
-        """Of force over position."""
-        return impedance_units(self.force_unit, self.position_unit)["K"]
+Units = Mapping[str, str]
+"""Of a record's columns; here of its force and its position."""
 
 
 def verdicts(
-    choice: Choice, holds: Fit, point: WorkingPoint | None, terms: Terms
+    choice: Choice, holds: Fit, point: WorkingPoint | None, options: Options, units: Units
 ) -> tuple[dict[str, Parameter], tuple[Warn, ...]]:
     """Pass a verdict on each parameter.
 
@@ -75,25 +57,22 @@ def verdicts(
     found = _lacking(against_working_point(choice.answer, point))
     if tangent is not None:
         found = replace(found, budget=_with_presses(found, tangent))
-    scales = np.array([0.0 if name in (*_SHAPE, LAG) else terms.calibration for name in found.names])
+    scales = np.array([0.0 if name in (*_SHAPE, LAG) else options.calibration for name in found.names])
     found = found.with_cause("calibration", scales * found.theta)
     names = [n for n in found.names if n not in (LAG, *_NUISANCE)]
-    parameters = {name: _parameter(name, found, holds, terms) for name in names}
+    parameters = {name: _parameter(name, found, holds, options.tolerance, units) for name in names}
     parameters = _passive(parameters, contacts.payload is not None)
-    for refused, reason in (
-        (not contacts.signed, _UNSIGNED),
-        (model.of_power and contacts.bonded, _UNTOUCHED),
-    ):
-        for name, p in parameters.items() if refused else ():
-            if p.verdict is Verdict.IDENTIFIED:
-                parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
+    refused = _UNSIGNED if not contacts.signed else _UNTOUCHED if model.of_power and contacts.bonded else ""
+    for name, p in parameters.items() if refused else ():
+        if p.verdict is Verdict.IDENTIFIED:
+            parameters[name] = replace(p, verdict=Verdict.NOT_IDENTIFIABLE, reason=refused)
     if tangent is not None:
         parameters = _of_press(parameters, tangent)
-    return parameters, _warnings(parameters, found, choice.problem.lag, terms)
+    return parameters, _warnings(parameters, found, choice.problem, options.tolerance)
 
 
-def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
-    value, unit = found[name], unit_of(name, found.fit, terms)
+def _parameter(name: str, found: Answer, holds: Fit, tolerance: float, units: Units) -> Parameter:
+    value, unit = found[name], unit_of(name, found.fit, units)
     half, parts = found.half_of(name), found.contributions(name)
     whole = Parameter.of(value, unit, Verdict.NOT_IDENTIFIABLE, "", parts)
     low, high = interval = (value - half, value + half)
@@ -106,13 +85,13 @@ def _parameter(name: str, found: Answer, holds: Fit, terms: Terms) -> Parameter:
     if half > _NOTHING * max(abs(value), 1e-300):
         return whole.without_number(f"the log does not show it: {NOISE.remedy}")
     clear = low > 0 or high < 0
-    if half <= terms.tolerance * abs(value) and clear:
+    if half <= tolerance * abs(value) and clear:
         reason, depth = f"known to {100 * half / abs(value):.2g} % (95 %)", found.fit.model.depth
         if depth is not None and name not in _SHAPE:  # it grows with the depth
-            reason += f", at a penetration of {_digits(depth)} {terms.position_unit}"
+            reason += f", at a penetration of {_digits(depth)} {units['position']}"
         return replace(whole, verdict=Verdict.IDENTIFIED, reason=reason)
     bounds = f"95 %: {_digits(low)} to {_digits(high)} {_show(unit)}".rstrip()
-    limit = f"wider than {terms.tolerance:.0%}" if clear else "zero is within it"
+    limit = f"wider than {tolerance:.0%}" if clear else "zero is within it"
     main = cause_of(next(iter(whole.budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
     return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
@@ -128,17 +107,23 @@ def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
     """
     if point is None or point.stiffness.ci95 is None or point.stiffness.value is None:
         return found
-    shown = stiffness_of(found.problem, found.problem.force, point)
-    own, slope = _model_stiffness(found, point)
+    problem, fitted = found.problem, found.fit
+    shown, own = (stiffness_of(problem, force, point) for force in (problem.force, fitted.force))
     if shown is None or own is None:
         return found
+    slope = np.zeros(len(found.names))
+    for i, name in enumerate(found.names):
+        if name in fitted.theta:
+            step = 1e-4 * (abs(fitted.theta[name]) or 1.0)
+            theta = fitted.theta | {name: fitted.theta[name] + step}
+            moved = Prediction.of(fitted.model, problem.motion, problem.force, theta, fitted.lag)
+            slope[i] = ((stiffness_of(problem, moved.force, point) or own) - own) / step
     common = "calibration", "friction", "loadings"  # of the answer, too
     parts = {cause: part for cause, part in point.stiffness.contributions.items() if cause not in common}
     along = found.cov @ slope
     power = float(slope @ along)
     gap = max(abs(own - shown) - float(np.hypot(NORMAL * np.sqrt(max(power, 0.0)), half_width(parts))), 0.0)
-    moved = along * gap / power if power > 0 else np.zeros(len(slope))
-    return found.with_cause("dynamic stiffness", moved)
+    return found.with_cause("dynamic stiffness", along * gap / power if power > 0 else np.zeros(len(slope)))
 
 
 def _lacking(found: Answer) -> Answer:
@@ -166,21 +151,6 @@ def _with_presses(found: Answer, point: WorkingPoint) -> Budget:
     return found.budget | {"repetition": Spread(variance, freedom)}
 
 
-def _model_stiffness(found: Answer, point: WorkingPoint) -> tuple[float | None, Array]:
-    """Stiffness of a model's force, read as the log's own is, and its derivatives by the parameters, shape (p,)."""
-    own, problem = stiffness_of(found.problem, found.fit.force, point), found.problem
-    slope = np.zeros(len(found.names))
-    for i, name in enumerate(found.names):
-        if own is None or name not in found.fit.theta:
-            continue
-        step = 1e-4 * (abs(found.fit.theta[name]) or 1.0)
-        theta = found.fit.theta | {name: found.fit.theta[name] + step}
-        moved = Prediction.of(found.fit.model, problem.motion, problem.force, theta, found.fit.lag)
-        other = stiffness_of(problem, moved.force, point)
-        slope[i] = 0.0 if other is None else (other - own) / step
-    return own, slope
-
-
 def _of_press(parameters: dict[str, Parameter], point: WorkingPoint) -> dict[str, Parameter]:
     """K of presses at constant speed is their tangent, unless a model among them knows it better; no more is shown."""
     shown = {
@@ -204,24 +174,27 @@ def _passive(parameters: dict[str, Parameter], weighed: bool) -> dict[str, Param
     mass below zero is in the damping's interval (`_lacking`), and refuses all only where a tool's inertia was found in
     free motion and removed (`weighed`): it is not that force, and K rests on the same fit.
     """
-    negative = [name for name, p in parameters.items() if _BELOW in p.reason]
+    negative = [name for name in ("K", "B", "M") if name in parameters and _BELOW in parameters[name].reason]
     if "K" in negative:
         reason, touched = "K is certainly below zero: the model does not hold", (*parameters,)
-    elif len({"B", "M"} & {*negative}) == 1 and (weighed or "B" in negative):
-        name = next(name for name in ("B", "M") if name in negative)
-        reason = f"{name} is certainly below zero: the model lacks a force that depends on the motion"
+    elif len(negative) == 1 and (weighed or "B" in negative):
+        reason = f"{negative[0]} is certainly below zero: the model lacks a force that depends on the motion"
         touched = ("K", *_IN_TIME) if weighed else _IN_TIME
     else:
         return parameters
-    return parameters | {  # a number that a model gives which does not hold stands nowhere
+    return {  # a number that a model gives which does not hold stands nowhere
         name: p.without_number(reason, Verdict.REJECTED)
-        for name, p in parameters.items()
         if name in touched and p.verdict is Verdict.IDENTIFIED
+        else p
+        for name, p in parameters.items()
     }
 
 
-def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: Terms) -> tuple[Warn, ...]:
-    warnings = []
+def _warnings(
+    parameters: dict[str, Parameter], found: Answer, problem: Problem, tolerance: float
+) -> tuple[Warn, ...]:
+    lag = problem.lag
+    told: list[tuple[Code, str]] = []
     if LAG in found.names and not lag.known:
         at, reach = found[LAG], _FAR * lag.std
         if abs(at - lag.value) > reach or at + found.half_of(LAG) < lag.value - reach:
@@ -229,53 +202,49 @@ def _warnings(parameters: dict[str, Parameter], found: Answer, lag: Lag, terms: 
                 f"the fit estimates a lag of {_digits(1e3 * at)} ms of the force, longer than sensors have:"
                 " something else delays the force; parameters that such a delay changes are rejected"
             )
-            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
-    damping = parameters.get("B")
-    if damping is not None and damping.verdict is not Verdict.IDENTIFIED:
-        if "below zero" in damping.reason:
+            told.append((Code.FORCE_LAGS_POSITION, text))
+    damping, stiffness = parameters.get("B"), parameters.get("K")
+    if damping is not None and "below zero" in damping.reason and damping.verdict is not Verdict.IDENTIFIED:
+        text = f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
+        told.append((Code.FORCE_LAGS_POSITION, text))
+    elif damping is not None and damping.verdict is not Verdict.IDENTIFIED and not lag.known:
+        reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
+        if damping.budget.get("lag", 0.0) > tolerance * abs(found["B"]):
             text = (
-                f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
-            )
-            warnings.append(Warn(Code.FORCE_LAGS_POSITION, text))
-        elif not lag.known and damping.budget.get("lag", 0.0) > terms.tolerance * abs(found["B"]):
-            reach = NORMAL * lag.std * abs(found["K"]) if "K" in found.names else 0.0
-            text = (
-                f"a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
+                "a lag of the force lowers B by K times the lag, and the lag is not calibrated: B is uncertain by"
                 f" {_digits(reach, 2)} {_show(damping.unit)}; give --lag"
             )
-            warnings.append(Warn(Code.LAG_DAMPING_CONFOUNDED, text))
-    stiffness = parameters.get("K")
+            told.append((Code.LAG_DAMPING_CONFOUNDED, text))
     if stiffness is not None and _BELOW in stiffness.reason:
         text = f"K: {stiffness.reason}; a channel's sign or column may be wrong (--force-sign)"
-        warnings.append(Warn(Code.NEGATIVE_STIFFNESS, text))
-    low_names = [
+        told.append((Code.NEGATIVE_STIFFNESS, text))
+    low = [
         n for n, p in parameters.items()
         if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") != "lag"
     ]  # fmt: skip
-    if low_names:
-        remedy = NOISE.remedy
-        if low_names[-1] in ("B", "M") and np.isfinite(terms.band):
-            more, fastest = "mass needs" if low_names[-1] == "M" else "damping needs", _digits(terms.band, 2)
+    if low:
+        remedy, more = NOISE.remedy, {"B": "damping needs", "M": "mass needs"}.get(low[-1])
+        if more and np.isfinite(problem.band):
+            fastest = _digits(problem.band, 2)
             remedy = f"the position moved only below {fastest} Hz, {more} faster motion; try palpate excite"
-        text = f"the log does not show {', '.join(low_names)}: {remedy}"
-        warnings.append(Warn(Code.LOW_EXCITATION, text))
-    return tuple(warnings)
+        told.append((Code.LOW_EXCITATION, f"the log does not show {', '.join(low)}: {remedy}"))
+    return tuple(Warn(*own) for own in told)
 
 
-def unit_of(name: str, fitted: Prediction, terms: Terms) -> str:
+def unit_of(name: str, fitted: Prediction, units: Units) -> str:
     """The unit of one parameter of a model."""
-    units = impedance_units(terms.force_unit, terms.position_unit)
-    plain = units["K"] == "1"
+    force, position = units["force"], units["position"]
+    own = impedance_units(force, position)
     if name == "tau":
         return "s"
     if name == "Fc":
-        return terms.force_unit
-    if name == "n" or plain:
+        return force
+    if name == "n" or own["K"] == "1":
         return "1"
     if fitted.model.of_power and fitted.model.depth is None:
         n = fitted["n"] + (name == "B")
-        return f"{terms.force_unit}{' s' if name == 'B' else ''}/{terms.position_unit}^{n:.3g}"
-    return units["K" if name == "K1" else name]
+        return f"{force}{' s' if name == 'B' else ''}/{position}^{n:.3g}"
+    return own["K" if name == "K1" else name]
 
 
 def _digits(value: float, count: int = 3) -> str:

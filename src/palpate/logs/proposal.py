@@ -253,12 +253,27 @@ def _pair(
         known, other = (position, force) if places else (force, position)
         guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
     elif not by_name:
-        position, force = sorted((position, force), key=roughness)
+        smooth, rough = sorted((position, force), key=roughness)
+        cause = _cause(moving, smooth, rough)
+        position, force = (smooth, rough) if cause is None else (cause, smooth)
+        why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
         guesses.append(
-            f"the columns have no names: {position.name!r} and {force.name!r} move together most,"
-            " and the smoother is taken for the position"
+            f"the columns have no names: {smooth.name!r} and {rough.name!r} move together most, and {why} taken for"
+            " the position"
         )
     return position, force
+
+
+def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> ColumnStatistics | None:
+    """The finest of the smoother columns whose motion both of a pair follow, as friction does, and not its place."""
+    found = [
+        column
+        for column in moving[:40]
+        if roughness(column) < min(map(roughness, pair))
+        and all(rank_correlation(column, own) <= _FOLLOWS for own in pair)
+        and all(explained_power(column, own) > _COHERENT for own in pair)
+    ]
+    return max(found, key=lambda column: column.counts, default=None)
 
 
 def _best(

@@ -296,11 +296,9 @@ def slide(
         print_answer(summary)
     else:
         screen = console()
-        for line in (
-            f"{gains.arm.title}: {sentence(summary)}",
-            *(f"! {note}" for note in summary["troubles"]),
-        ):
-            screen.print(line, soft_wrap=True)
+        screen.print(f"{gains.arm.title}: {sentence(summary)}", soft_wrap=True)
+        for note in summary["troubles"]:
+            screen.print(f"! {note}", soft_wrap=True)
         place(screen, "report:", folder / "report.html")
     return 0 if summary["end"] == "held" else 1
 
