@@ -7,10 +7,11 @@ from math import inf
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from cli import asked
 from cli.asked import refused
-from force.gained import gains_of
+from force.gained import gains_of, servo_gains
 from force.test_inner_loop import TRUE
 from force.test_inner_loop import log as loop_log
 from force.test_servo import pushed_log
@@ -106,6 +107,14 @@ def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
         main(["certify", "gains.toml", "--held-only", "--stiffness", "1e4:2e5", "--out", "proof.json"]) == 1
     )
     assert [c.kind for c in Certificate.load(elsewhere / "proof.json").claims] == ["one-sided"]
+
+
+@pytest.mark.long
+def test_a_certificate_that_does_not_hold_is_exit_code_1(capsys, elsewhere):
+    """Of a servo, on surfaces that its cap leaves out: the claim of its gain is of an empty interval."""
+    (elsewhere / "gains.toml").write_text(replace(servo_gains(), cap=1e4).to_toml())
+    assert main(["certify", "gains.toml", "--stiffness", "9e4:1e5", "--damping-time", "0:0"]) == 1
+    assert "✕ The certificate does not hold: " in capsys.readouterr().out
 
 
 def test_from_what_identify_printed(capsys, elsewhere):

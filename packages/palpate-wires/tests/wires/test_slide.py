@@ -21,10 +21,10 @@ from palpate.force.simulated_press import surface
 from palpate.force.slide_table import Slide
 from palpate.logs import read_record
 from palpate_rehearsal.rehearsal import FRICTION, ToolAxisArm
-from palpate_wires import PressLimits, PressTask, Rows, check_order, press
+from palpate_wires import PressLimits, PressTask, Rows, check_order
 from palpate_wires.order import Path as SlidePath
 from wires.slow_cell import ADDRESSES, PATIENCE, WORDS, arm, cell, child, relayed, servo_cell, wait_for_rows
-from wires.test_press import FakeWire
+from wires.test_press import FakeWire, press_in_its_time
 
 PATH = SlidePath("back", 0.01, 6.0)
 ALONG = ("--path", "back", "--length", "10:mm", "--seconds", "4")
@@ -59,7 +59,7 @@ def sliding(folder, lie=lambda sense, first: sense, since=4.0):
     tip = ToolAxisArm(load_arm(str(folder / "arm.toml")), surface(4000.0, 20.0), 0.002, (1.0, -0.5, 2.0), 0)
     wire, order = FakeWire(tip, lie, since), order_of(folder)
     rows = Rows(None, order.most, {})
-    outcome = press(wire, order, rows, lambda: None)
+    outcome = press_in_its_time(wire, order, rows, lambda: None)
     assert wire.did[-1] == "stop"
     return outcome, wire, rows.record()
 
