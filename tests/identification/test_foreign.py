@@ -241,7 +241,7 @@ def test_a_lag_that_nobody_gave_is_found_in_a_narrow_valley_of_the_likelihood(na
         ("mass/spikes", 971, "M"),  # the answer in contact was charged with the approach's error
         ("mass/ms-stamps", 971, "M"),  # the slope of a tap has inertia in it
         ("mass/never-leaves", 970, "K"),  # a dither, of which the lowest octaves hold nothing
-        ("mass/held-position", 1205, "M"),  # readings too rare for the highest octaves
+        ("kelvin-voigt/payload", 1206, "B"),  # a mass below zero had refused it
     ],
 )
 def test_a_parameter_that_the_log_shows_is_given(name, seed, parameter):

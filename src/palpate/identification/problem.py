@@ -85,7 +85,6 @@ class Problem:
         free: the force out of contact behind the same front end, in stretches of rows.
         origin: position of the surface on the log's own scale [m].
         contacts: as found.
-        rate: readings of the slower channel [1/s].
         counted: the force is counted from where it rests out of contact, and the rows begin before the touches.
         read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
         rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
@@ -103,7 +102,6 @@ class Problem:
     free: tuple[Array, ...]
     origin: float
     contacts: Contacts
-    rate: float = np.inf
     counted: bool = False
     read: Array | None = None
     rounding: float = 0.0
@@ -310,7 +308,6 @@ def _behind_filter(
         free=tuple(force[a + guard : b : step] for a, b in stretches if b - a - guard >= FREE_ROWS * step),
         origin=origin,
         contacts=contacts,
-        rate=channels.rate,
         read=read if contacts.payload is None else None,
         rounding=channels.rounding[1],
         filtered=filtered,

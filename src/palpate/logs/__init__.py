@@ -3,10 +3,10 @@
 Its names are looked up when they are first used: what reads one file in a process of its own waits for no other reader.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from palpate.files import whole
+from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate.logs.arm_logs import read_wrench_and_pose
@@ -16,17 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = ["columns_of", "read_log", "read_record", "read_wrench_and_pose", "whole", "write_record"]
 
-_HOME = {
-    "columns_of": "read",
-    "read_log": "signals",
-    "read_record": "tables.parquet",
-    "read_wrench_and_pose": "arm_logs",
-    "write_record": "tables.parquet",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
-    return value
+__getattr__ = importer(
+    __name__,
+    {
+        "arm_logs": ("read_wrench_and_pose",),
+        "read": ("columns_of",),
+        "signals": ("read_log",),
+        "tables.parquet": ("read_record", "write_record"),
+    },
+)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from unittest.mock import patch
 
 import numpy as np
@@ -60,8 +61,9 @@ class FakeWire:
 
 
 def press_in_its_time(wire, *words):
-    """A press whose clock is the arm's own, so that no machine halts it."""
-    with patch("palpate_wires.guard._now", lambda: wire.arm.time):
+    """A press whose clocks are the arm's own, so that no machine halts it or is late."""
+    clock = SimpleNamespace(monotonic=lambda: wire.arm.time)
+    with patch("palpate_wires.guard._now", clock.monotonic), patch("palpate_wires.press.time", clock):
         return press(wire, *words)
 
 

@@ -39,7 +39,6 @@ from palpate.identification.estimators.octaves import (
     octaves_of,
     system_of,
 )
-from palpate.identification.filters.state_variable import FASTEST
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.options import LAG, mass_std
@@ -128,7 +127,6 @@ class Linearisation:
         noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
         if use is None:
             use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
-            use &= (octaves.frequency <= FASTEST * problem.rate) | bool(model.nonlinear)
         names = (*free, *effects, *bending)
         friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
         system = system_of(octaves.only(use), names, prior)
