@@ -6,6 +6,7 @@ import os
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from palpate.cli import main
@@ -141,3 +142,30 @@ def test_an_unknown_field_names_those_that_there_are(before, after, says):
         read_table(text.replace(before, after, 1), "gains.toml", Gains)
     assert says in str(error.value)
     assert ("there are" in says) == ("there are" in str(error.value))
+
+
+class Sphere(msgspec.Struct, tag="sphere", forbid_unknown_fields=True):
+    radius: float
+
+
+class Plane(msgspec.Struct, tag="plane", forbid_unknown_fields=True):
+    slope: float
+
+
+class World(msgspec.Struct, forbid_unknown_fields=True):
+    by_name: dict[str, Sphere]
+    either: Sphere | Plane
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[by_name.ball]\ntype = 'sphere'\nradius = 1\nmass = 2", "; there are: radius"),
+        ("[by_name]\n[either]\ntype = 'plane'\nradius = 1", "; there are: radius (sphere); slope (plane)"),
+    ],
+)
+def test_the_fields_of_a_table_under_any_key_are_told_and_no_others(text, says):
+    with pytest.raises(InputError) as error:
+        read_table(text, "world.toml", World)
+    assert "unknown field" in str(error.value)
+    assert str(error.value).partition("; there are")[1:] == tuple(says.partition("; there are")[1:])

@@ -171,6 +171,31 @@ def test_a_low_pass_that_only_its_lag_was_told_of_is_no_mass():
     assert "low-pass" not in both.parameters["M"].budget
 
 
+@pytest.mark.parametrize("mass", [-0.1, -0.3])
+def test_a_low_pass_that_nobody_gave_excuses_no_mass_below_zero(mass):
+    """It adds up to K lag^2/2 = 0.2 kg to what is seen of a mass, and takes nothing from it."""
+    fine = np.arange(0, 10, 1e-4)
+    x = 1e-3 * np.sin(2 * np.pi * (0.5 + 0.3 * fine) * fine)
+    v = np.gradient(x, fine)
+    read = np.roll(1000 * x + 5 * v + mass * np.gradient(v, fine), 200)[::10]
+    noise = 0.001 * np.random.default_rng(0).standard_normal(len(read))
+    found = identified(fine[::10], x[::10], read + noise, lag=0.02, lag_std=1e-4, bonded=True)
+    assert found.parameters["M"].verdict is Verdict.REJECTED
+    assert found.parameters["B"].verdict is not Verdict.IDENTIFIED
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "least"), [("standard-linear-solid", "tau", 1e-9), ("hunt-crossley", "n", 0.5)]
+)
+@pytest.mark.parametrize("seed", [1, 2, 7])
+def test_an_estimate_is_within_the_limits_of_its_model(model, name, least, seed):
+    t = np.arange(0, 1.5, 4e-3)
+    x = 1e-3 * np.sin(2 * np.pi * t) - 2e-4
+    noise = 0.5 * np.random.default_rng(seed).standard_normal(len(t))
+    estimate = identified(t, x, 2000 * np.maximum(x, 0) + noise, lag=0.0, model=model).estimate
+    assert dict(zip(estimate.names, estimate.theta, strict=True))[name] >= least
+
+
 def presses(*stiffness, back=2.0, soft=0.0):
     """One press of 4 mm after another, each on a surface of its own, with 2 mm of free motion before."""
     ends = np.cumsum([0.5, *(s for _ in stiffness for s in (3.0, back, 0.5))])

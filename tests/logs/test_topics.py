@@ -302,3 +302,15 @@ def test_of_columns_without_names_the_one_whose_motion_two_others_follow_is_the_
     proposal = list_log(path).proposal
     assert proposal.options["position"] == "2:mm"
     assert ("both follow the motion of '2'" in " ".join(proposal.guesses)) == friction
+
+
+def test_of_columns_without_names_a_slow_drift_is_no_position(tmp_path):
+    """A temperature has a value of its own at each time, and so has each push: neither is the cause of the other."""
+    t = np.arange(0, 60, 0.005)
+    temperature = 20 + 3 * (1 - np.exp(-t / 40))
+    x = 2e-3 * (1 - np.cos(2 * np.pi * t / 15)) - 1.5e-3
+    f = 3000 * np.maximum(x, 0) + 0.02 * np.random.default_rng(0).standard_normal(len(t))
+    path = tmp_path / "log.csv"
+    np.savetxt(path, np.column_stack([t, temperature, 1e3 * x, f]), delimiter=",")
+    options = list_log(path).proposal.options
+    assert (options["position"], options["force"].partition(":")[0]) == ("2:mm", "3")

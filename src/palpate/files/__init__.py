@@ -115,7 +115,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as JSON, atomically; an object has to be `signed`."""
+    """Write a value as JSON, atomically; an object has to come from `with_author`."""
     import msgspec
 
     with whole(path) as draft:

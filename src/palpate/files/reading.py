@@ -158,19 +158,33 @@ def read_table(
 
 
 def _known_fields(error: str, kind: Any) -> str:
-    """The fields of the table in which msgspec found an unknown one, as a remedy; empty of another error."""
+    """The fields of the table in which msgspec found an unknown one, as a remedy; empty of another error.
+
+    Of a table of several kinds they are told by kind.
+    """
     from msgspec.inspect import type_info
 
     what, _, path = error.partition(" - at `$")
     tables: list[Any] = [type_info(kind)] if "unknown field" in what else []
     for step in re.findall(r"[^.\[\]`]+", path):
-        own = [field.type for table in tables for field in table.fields if field.encode_name == step]
-        own = [one for each in own for one in getattr(each, "types", (getattr(each, "item_type", each),))]
-        tables = [
-            table for table in own if hasattr(table, "fields")
-        ] or tables  # an item has the fields of its list
-    names = sorted({field.encode_name for table in tables for field in table.fields})
-    return f"; there are: {', '.join(names)}" if names else ""
+        inside = [field.type for table in tables for field in table.fields if field.encode_name == step]
+        tables = [table for each in inside for table in _tables_in(each)]
+    each = {table.tag: ", ".join(sorted(field.encode_name for field in table.fields)) for table in tables}
+    told = (
+        [*each.values()]
+        if len(tables) == 1
+        else [f"{names} ({kind})" for kind, names in each.items() if kind]
+    )
+    return f"; there are: {'; '.join(told)}" if told else ""
+
+
+def _tables_in(kind: Any) -> list[Any]:
+    """The kinds of tables that values of a kind of msgspec are, or hold as a list or under keys."""
+    if hasattr(kind, "fields"):
+        return [kind]
+    several = [*getattr(kind, "types", ()), *getattr(kind, "item_types", ())]
+    one = [getattr(kind, name) for name in ("item_type", "value_type") if hasattr(kind, name)]
+    return [table for each in several + one for table in _tables_in(each)]
 
 
 def _check_finite(value: object, path: str) -> None:

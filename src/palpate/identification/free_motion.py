@@ -126,9 +126,9 @@ def free_motion_of(
         return _slope(force, position, stays, white, bound) if stays else None
 
     def share_of(way: float, bound: float) -> float:
-        """The largest share over which the force stays: its slope is clearly below that of the contact there.
+        """The largest share over which the force stays: its slope is clearly below that of the contact.
 
-        Or over the next larger share, which may hold a touch.
+        It is so over that share or over the next larger one, which may hold a touch.
         That of an inertia is held against the steepest that an interval leaves at either end: it is in the force over
         the whole range, and takes from the contact's.
         """

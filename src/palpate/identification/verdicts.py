@@ -29,6 +29,8 @@ _NUISANCE = ("x0", "y0")
 """Where the surface is, and how a branch was stretched when the log began: found, not asked for."""
 _IN_TIME = ("B", "M", "K1", "tau")
 """Parameters that are seen in time: a shift of the force looks like them."""
+_UNTOLD = "lag", "low-pass", "missing force"
+"""Causes of which no faster motion tells more."""
 _BELOW = "below zero: no passive surface does that"
 _STEADY = "the log does not show it: the probe moves at constant speed"
 _UNSIGNED = (
@@ -79,7 +81,7 @@ def _parameter(name: str, found: Answer, holds: Fit, tolerance: float, units: Un
     if name in holds.names:
         reach = float(np.hypot(holds.half_of(name), parts["calibration"].half))
         whole = replace(whole, ci95_if_model_holds=(holds[name] - reach, holds[name] + reach))
-    if name in found.fit.model.positive and high < 0:
+    if name in found.fit.model.positive and _highest(found, name) < 0:
         reason = f"the fit gives {_digits(value)} {_show(unit)}, {_BELOW}"
         return whole.without_number(" ".join(reason.split()), Verdict.REJECTED)
     if half > _NOTHING * max(abs(value), 1e-300):
@@ -95,6 +97,12 @@ def _parameter(name: str, found: Answer, holds: Fit, tolerance: float, units: Un
     main = cause_of(next(iter(whole.budget), "noise"))
     reason = f"{bounds}; {limit}. Mostly due to {main.described}: {main.remedy}"
     return replace(whole, reason=reason) if clear else whole.without_number(reason, ci95=interval)
+
+
+def _highest(found: Answer, name: str) -> float:
+    """Upper end of a parameter's interval: a low-pass that nobody gave adds to a mass, and takes nothing from it."""
+    parts = found.contributions(name)
+    return found[name] + half_width({cause: part for cause, part in parts.items() if cause != "low-pass"})
 
 
 def against_working_point(found: Answer, point: WorkingPoint | None) -> Answer:
@@ -131,10 +139,10 @@ def _lacking(found: Answer) -> Answer:
 
     Of a force in an unknown phase, as much is in quadrature as in phase.
     """
-    if "M" not in found.names or found["M"] + found.half_of("M") >= 0:
+    if "M" not in found.names or (highest := _highest(found, "M")) >= 0:
         return found
     speed, acceleration = (np.std(found.problem.motion.moved(k, found.fit.lag)) for k in (1, 2))
-    most = (found["M"] + found.half_of("M")) * acceleration / speed
+    most = highest * acceleration / speed
     return found.with_cause("missing force", most / NORMAL * np.equal(found.names, "B"))
 
 
@@ -204,7 +212,7 @@ def _warnings(
             )
             told.append((Code.FORCE_LAGS_POSITION, text))
     damping, stiffness = parameters.get("B"), parameters.get("K")
-    if damping is not None and "below zero" in damping.reason and damping.verdict is not Verdict.IDENTIFIED:
+    if damping is not None and _BELOW in damping.reason and damping.verdict is not Verdict.IDENTIFIED:
         text = f"B: {damping.reason}; a lag T of the force adds -K T to it: calibrate the lag and give --lag"
         told.append((Code.FORCE_LAGS_POSITION, text))
     elif damping is not None and damping.verdict is not Verdict.IDENTIFIED and not lag.known:
@@ -220,7 +228,7 @@ def _warnings(
         told.append((Code.NEGATIVE_STIFFNESS, text))
     low = [
         n for n, p in parameters.items()
-        if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") != "lag"
+        if p.verdict is Verdict.NOT_IDENTIFIABLE and next(iter(p.budget), "noise") not in _UNTOLD
     ]  # fmt: skip
     if low:
         remedy, more = NOISE.remedy, {"B": "damping needs", "M": "mass needs"}.get(low[-1])

@@ -136,9 +136,23 @@ def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float
 def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
     """Share of the force's power that a filter or a curve of the position accounts for, 0 to 1.
 
-    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing,
-    and its coherence (Welch) tells. In taps most rows are noise in free motion: the means by place (correlation ratio)
-    tell.
+    In taps most rows are noise in free motion: the means by place (correlation ratio) tell more than any filter.
+    """
+    a, b = position.readings, force.readings
+    there = np.isfinite(a) & np.isfinite(b)
+    if there.sum() < 16 or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
+        return 0.0
+    force_there = b[there] - b[there].mean()
+    place = np.floor(_BLOCKS * (a[there] - a[there].min()) / np.ptp(a[there])).astype(np.intp)
+    sums, count = np.bincount(place, force_there), np.bincount(place)
+    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (force_there @ force_there)
+    return max(filtered_power(position, force), float(by_place))
+
+
+def filtered_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
+    """Share of the force's power that a filter of the position accounts for, by their coherence (Welch), 0 to 1.
+
+    At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
     """
     from scipy.signal import coherence, welch
 
@@ -148,12 +162,7 @@ def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> floa
     if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
         return 0.0
     power = welch(b[there], nperseg=rows)[1]
-    by_filter = coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum()
-    force_there = b[there] - b[there].mean()
-    place = np.floor(_BLOCKS * (a[there] - a[there].min()) / np.ptp(a[there])).astype(np.intp)
-    sums, count = np.bincount(place, force_there), np.bincount(place)
-    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (force_there @ force_there)
-    return float(max(by_filter, by_place))
+    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
 
 
 def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:

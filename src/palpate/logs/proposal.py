@@ -15,6 +15,7 @@ from palpate.logs.columns import (
     NAMES,
     ColumnStatistics,
     explained_power,
+    filtered_power,
     is_one_reading,
     is_rate,
     rank_correlation,
@@ -35,7 +36,7 @@ _FOLLOWS = 0.3
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
 _COHERENT = 0.5
 """Share of the power of a column that is named a force above which it follows a filtered position: of two columns of
-noise it is under a tenth (`explained_power`)."""
+noise it is under a tenth (`filtered_power`)."""
 _PAIRS = 800
 """Most pairs of columns that are compared, the 780 of 40 columns without names among them: that takes seconds."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
@@ -271,7 +272,7 @@ def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> Colum
         for column in moving[:40]
         if roughness(column) < min(map(roughness, pair))
         and all(rank_correlation(column, own) <= _FOLLOWS for own in pair)
-        and all(explained_power(column, own) > _COHERENT for own in pair)
+        and all(filtered_power(column, own) > _COHERENT for own in pair)
     ]
     return max(found, key=lambda column: column.counts, default=None)
 

@@ -489,7 +489,9 @@ def _answer(
         return SlideFound(first, (), {"friction": None, "path_m": course.path})
     towards = ", ".join(f"{x + 0.0:.3f}" for x in mean)
     normals = (
-        f"({towards}) in the base, 95 % cone {wide:.2g} deg, turns by {turns:.2g} deg" if wide else "unknown"
+        f"({towards}) in the base, 95 % cone {wide:.2g} deg, turns by {turns:.2g} deg"
+        if wide is not None
+        else "unknown"
     )
     facts = [f"Normal into the surface {normals}.", f"Path {1e3 * course.path:.3g} mm."]
     if len(parts):
@@ -499,7 +501,7 @@ def _answer(
     known = own.value is not None
     table = [dict(zip(("speed_m_s", "mu", "half"), row, strict=True)) for row in mu.table.tolist()]
     keys = ("x", "y", "z", "stiffness", "half")
-    shown = (values[::every].tolist() for values in (course.place, normal, np.degrees(cone)))
+    shown = (values[::every].tolist() for values in (course.place, normal, cone))
     values: dict[str, Any] = {
         "friction": {"value": mu.value, "ci95": [mu.value - mu.half, mu.value + mu.half]} if known else None,
         "by_speed": table if known else [],
@@ -508,7 +510,7 @@ def _answer(
         "relaxation_m": length,
         "stiffness": [dict(zip(keys, row, strict=True)) for row in parts.tolist()],
         "places": [
-            {"x": p[0], "y": p[1], "z": p[2], "normal": n, "cone95_deg": c}
+            {"x": p[0], "y": p[1], "z": p[2], "normal": n, "cone95_deg": cone95(c)}
             for p, n, c in zip(*shown, strict=True)
         ],
     }

@@ -46,7 +46,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Descent:
-    """The search for the parameters of a model: of a filtered force at the motion's rows, shape (n,), that lags [s]."""
+    """The search for a model's parameters: the force is filtered, shape (n,), and its lag behind the motion in [s]."""
 
     model: Model
     motion: Motion
@@ -197,9 +197,14 @@ def fit(descent: Descent, nonlinear: dict[str, float], prior: Lag) -> Fit:
     noise = noise_of(point.residuals, rows, len(names) - int(prior.std == 0))
     weight = float(np.sqrt(max(noise.variance, 1e-300))) / np.maximum(std, 1e-300)
     free = slice(None if prior.std > 0 else -1)
-    own = np.vstack([jacobian, np.diag(weight)])[:, free]
-    step = solve(own, np.concatenate([point.residuals, weight * (mean - at)]))
+    both = np.vstack([jacobian, np.diag(weight)])[:, free]
+    step = solve(both, np.concatenate([point.residuals, weight * (mean - at)]))
     theta, cov = at.copy(), np.zeros((len(at), len(at)))
     theta[free] += step
+    own = {p.name: float(np.clip(theta[names.index(p.name)], p.low, p.high)) for p in descent.model.nonlinear}
+    if any(
+        theta[names.index(name)] != value for name, value in own.items()
+    ):  # a step beyond a limit ends there
+        theta[:-1] = [*descent.at(own).theta, *own.values()]
     cov[free, free] = covariance(jacobian[:, free], rows, noise, std[free])
     return Fit(names, theta, cov, noise.effective)
