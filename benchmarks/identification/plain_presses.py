@@ -256,7 +256,7 @@ def judged(world: World, found: Identification) -> Judged:
     assert own.ci95 is not None
     assert own.value is not None
     sign = -1.0 if "force-sign-reversed" in found.codes else 1.0
-    truth = world.tangent(point.force_N, sign, "contact-at-start" not in found.codes)
+    truth = world.tangent(point.force_N, sign, point.from_surface)
     half = (own.ci95[1] - own.ci95[0]) / 2
     if truth is None:
         return Judged("names a force that the log never has", own.value, half, point.force_N)

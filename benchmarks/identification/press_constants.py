@@ -51,7 +51,7 @@ def pressed(world: World, seed: int) -> Case:
     def truth(contacts: Contacts, force: float) -> tuple[float, float] | None:
         codes = {warn.code.word for warn in contacts.warnings}
         sign = -1.0 if "force-sign-reversed" in codes else 1.0
-        slope = world.tangent(force, sign, "contact-at-start" not in codes)
+        slope = world.tangent(force, sign, not contacts.bonded)
         return None if slope is None else (slope, slope)
 
     record = world.log(np.random.default_rng([seed, 0]))
