@@ -20,27 +20,27 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=250, lines=49440, tokens=340470),
+    "src/palpate": Weight(files=250, lines=49439, tokens=340329),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
-    "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1926, tokens=12577),
-    "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=9499, tokens=78911),
-    "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2445, tokens=16229),
+    "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1926, tokens=12559),
+    "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=9498, tokens=78900),
+    "packages/palpate-laboratory/src/palpate_laboratory": Weight(files=14, lines=2438, tokens=16170),
     "packages/palpate-native/src/palpate_native": Weight(files=14, lines=2412, tokens=17978),
-    "packages/palpate-references/src/palpate_references": Weight(files=6, lines=761, tokens=6210),
-    "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1429, tokens=12138),
-    "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=760, tokens=5555),
-    "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2152, tokens=13743),
+    "packages/palpate-references/src/palpate_references": Weight(files=6, lines=761, tokens=6179),
+    "packages/palpate-certify/src/palpate_certify": Weight(files=6, lines=1427, tokens=12138),
+    "packages/palpate-checks/src/palpate_checks": Weight(files=7, lines=757, tokens=5550),
+    "packages/palpate-excitation/src/palpate_excitation": Weight(files=10, lines=2138, tokens=13570),
     "packages/palpate-export/src/palpate_export": Weight(files=8, lines=1936, tokens=12408),
     "packages/palpate-live/src/palpate_live": Weight(files=10, lines=2534, tokens=15971),
-    "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2502, tokens=19604),
+    "packages/palpate-maps/src/palpate_maps": Weight(files=10, lines=2501, tokens=19538),
     "packages/palpate-rehearsal/src/palpate_rehearsal": Weight(files=9, lines=1305, tokens=9043),
     "packages/palpate-slide/src/palpate_slide": Weight(files=12, lines=2890, tokens=25561),
     "packages/palpate-wires/src/palpate_wires": Weight(files=19, lines=3168, tokens=18712),
-    "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6284, tokens=42397),
+    "packages/palpate-studies/src/palpate_studies": Weight(files=28, lines=6284, tokens=42381),
 }
 """Largest weights. They may only fall: who makes a package lighter enters the new figure here, and who adds to it takes
 out as much."""
-PARTICIPLES, SHORT_DOCSTRINGS = 34, 0
+PARTICIPLES, SHORT_DOCSTRINGS = 33, 0
 """Most functions whose name is a bare participle, and most docstrings below four words; they may only fall, too."""
 UNTESTED = 240
 """Most modules without a test file of their own name, `test_MODULE.py`; others test them by what they do."""
