@@ -98,7 +98,7 @@ def test_silverbox(measured, capsys):
     assert {own[name]["unit"] for name in "KBM"} == {"1"}
     k, m = (own[name]["value"] for name in "KM")
     half = 0.5 * np.hypot(*(1.96 * own[name]["std"] / own[name]["value"] for name in "KM"))
-    assert half < 0.1  # of the mass an eighth, by a lag of up to a radian
+    assert half < 0.13  # of the mass a quarter: a lag of up to a radian may be a delay or a low-pass
     assert np.sqrt(k / m) / (2 * np.pi) == pytest.approx(68.6, rel=half)  # its frequency at small amplitudes
 
 

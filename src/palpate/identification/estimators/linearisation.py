@@ -228,8 +228,14 @@ class Linearisation:
 
         The log of its response is -T s + C s^2/2 - ... with a second cumulant C from 0 to T^2, and K C s^2/2 is a mass.
         """
-        most = solution.theta[self.names.index("K")] / 2 * (self.lag**2 + self.problem.lag.std**2)
+        time = min(float(np.hypot(self.lag, self.problem.lag.std)), self._radian())
+        most = solution.theta[self.names.index("K")] / 2 * time**2
         return Spread((most / NORMAL * np.equal(self.names, "M")) ** 2)
+
+    def _radian(self) -> float:
+        """Time of a radian of the fastest motion [s]: a longer lag is seen apart from all but a damping."""
+        band = self.problem.band
+        return 1 / (2 * np.pi * band) if np.isfinite(band) else np.inf
 
     def _with_position(self, solution: Solution, sensor: Array) -> Array:
         """Variance of a line by the noise of both channels, shape (octaves,)."""
@@ -257,18 +263,17 @@ class Linearisation:
 
         A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves
         the lag that a fit finds, and them with it: they count as if it were held anywhere in its prior, and as far from
-        the prior's mean as the fit has moved it. Nothing but a damping passes for a lag of more than a radian of the
-        fastest motion.
+        the prior's mean as the fit has moved it, but for the damping no farther than a radian of the fastest motion.
         """
         lag = self.names.index(LAG)
         rest = [i for i in range(len(self.names)) if i != lag]
         normal = inverse(member.solution.cov)
         slope = np.zeros(len(self.names))
         slope[rest] = inverse(normal[np.ix_(rest, rest)]) @ normal[rest, lag]
-        std, band = self.problem.lag.std, self.problem.band
+        std = self.problem.lag.std
         std = max(std, abs(float(member.solution.theta[lag]) - self.problem.lag.value))
         in_time = self.names[: self.own] if self.model.nonlinear else ("M",)
-        reach = dict.fromkeys(in_time, min(std, 1 / (2 * np.pi * band)) if np.isfinite(band) else std)
+        reach = dict.fromkeys(in_time, min(std, self._radian()))
         reach |= {"B": std, LAG: 0.0}
         by_prior = (slope * [reach.get(name, 0.0) for name in self.names]) ** 2
         return Spread(np.maximum(found.variance, by_prior), found.freedom)
