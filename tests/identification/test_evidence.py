@@ -16,11 +16,12 @@ from palpate.identification.estimators.octaves import segments_of
 from palpate.identification.evidence.press import evidence_of, press_of
 from palpate.identification.evidence.slope import Loading, slope_of
 from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
-from palpate.identification.filters.state_variable import low_pass_once
+from palpate.identification.filters.state_variable import low_passed
 from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
 from palpate.identification.steady_press import WINDOW, Curve, Slopes, SteadyPress, slopes_at
 from palpate.identification.uncertainty import Contribution, Measurement
+from palpate.signals.low_pass import LowPass
 
 DT = 1e-3
 COUNT = 6000
@@ -395,7 +396,7 @@ def test_a_way_in_as_short_as_the_filter_is_held_against_its_readings():
     time = np.arange(0, 14, 0.1)
     x = np.interp(time, [0, 2, 3, 11, 12, 14], [-1e-3, -1e-3, 5e-3, 5e-3, -1e-3, -1e-3])
     depth = np.maximum(x, 0.0)
-    branch = depth - low_pass_once(depth, 0.8, 0.1)
+    branch = depth - low_passed(depth, LowPass.of_first_order(0.8), 0.1)
     log = record(time, x, np.maximum(1000 * depth + 1500 * branch, 0) + 1e-3 * np.sin(99 * time))
     found = identify(log, lag=0.0)
     rising = (time > 2.6) & (time < 3)

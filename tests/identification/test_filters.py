@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate.identification.filters.state_variable import ORDER, Chain, low_pass_once, white_noise
+from palpate.identification.filters.state_variable import ORDER, Chain, low_passed, white_noise
+from palpate.signals.low_pass import LowPass
 
 CHAIN = Chain(cutoff=60.0, dt=1e-3)
 
@@ -20,7 +21,7 @@ def test_the_chain_is_the_state_variable_filter(derivative):
     np.testing.assert_allclose(CHAIN(u, derivative), expected, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("derivative", range(5))
+@pytest.mark.parametrize("derivative", range(4))
 def test_derivatives_of_a_sine_are_analytic(derivative):
     time = np.arange(3000) * CHAIN.dt
     omega = 2 * np.pi * 20
@@ -56,9 +57,10 @@ def test_a_constant_passes_unchanged():
 
 
 def test_one_lag_against_scipy():
-    u = np.random.default_rng(1).normal(size=400)
+    u = 3 + np.random.default_rng(1).normal(size=400)
     b, a, _ = signal.cont2discrete(([1.0], [0.05, 1.0]), 1e-3, method="foh")
-    np.testing.assert_allclose(low_pass_once(u, 0.05, 1e-3), signal.lfilter(np.ravel(b), a, u), atol=1e-12)
+    read = low_passed(u, LowPass.of_first_order(0.05), 1e-3) - u[0]
+    np.testing.assert_allclose(read, signal.lfilter(np.ravel(b), a, u - u[0]), atol=1e-12)
 
 
 def test_white_noise_is_measured_under_a_slow_motion():

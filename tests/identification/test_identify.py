@@ -6,7 +6,8 @@ import pytest
 from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
-from palpate.identification.filters.state_variable import low_pass_once
+from palpate.identification.filters.state_variable import low_passed
+from palpate.signals.low_pass import LowPass
 
 TIME = np.arange(6000) / 1000
 
@@ -95,7 +96,7 @@ def test_a_standard_linear_solid_is_recognised():
     x = press_path(TIME, 0.06)
     d = np.maximum(x, 0)
     v = np.gradient(x, 1e-3)
-    branch = d - low_pass_once(d, 0.23, 1e-3)
+    branch = d - low_passed(d, LowPass.of_first_order(0.23), 1e-3)
     force = np.where(x > 0, np.maximum(5600 * d + 13 * v + 6900 * branch, 0), 0)
     log = record(TIME, x, noisy(force))
     found = identify(log, lag=0.0)

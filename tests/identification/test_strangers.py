@@ -157,32 +157,61 @@ def test_a_lag_that_was_told_is_said_again_with_the_filter_in_it():
     assert (found.lag.value, found.lag.kind) == (pytest.approx(4e-3), "told")
 
 
-def test_a_low_pass_that_only_its_lag_was_told_of_is_no_mass():
-    """A spring behind 16 Hz of first order follows like one with a mass of K lag^2/2, a delay like none."""
+def swept(*low_passes, mass=0.0, noise=0.01):
+    """A spring with a mass, swept from 0.5 to 6.5 Hz, behind low-passes (order, cut-off in Hz), or 20 ms late."""
     fine = np.arange(0, 10, 1e-4)
     x = 1e-3 * np.sin(2 * np.pi * (0.5 + 0.3 * fine) * fine)
-    read = K * sosfilt(butter(1, 16, fs=1e4, output="sos"), x)[::10]
-    noise = 0.01 * np.random.default_rng(0).standard_normal(len(read))
-    told = {"lag": 1 / (2 * np.pi * 16), "bonded": True, "model": "kelvin-voigt-mass"}
-    alone = identified(fine[::10], x[::10], read + noise, **told).parameters["M"]
+    force = K * x + mass * np.gradient(np.gradient(x, fine), fine)
+    for order, cutoff in low_passes:
+        force = sosfilt(butter(order, cutoff, fs=1e4, output="sos"), force)
+    read = (force if low_passes else np.roll(force, 200))[::10]
+    return fine[::10], x[::10], read + noise * np.random.default_rng(0).standard_normal(len(read))
+
+
+def test_a_low_pass_that_only_its_lag_was_told_of_is_no_mass():
+    """A spring behind 16 Hz of first order follows like one with a mass of K lag^2/2, a delay like none."""
+    log, told = swept((1, 16)), {"lag": 1 / (2 * np.pi * 16), "bonded": True, "model": "kelvin-voigt-mass"}
+    alone = identified(*log, **told).parameters["M"]
     assert in_range(alone, 0, 0)
     assert (*alone.budget,)[0] == "low-pass"
-    both = identified(fine[::10], x[::10], read + noise, **told, force_filter="butterworth1:16")
+    both = identified(*log, **told, force_filter="butterworth1:16")
     assert "low-pass" not in both.parameters["M"].budget
 
 
+_OF_20_MS = 1 / (2 * np.pi * 0.02)
+
+
+@pytest.mark.parametrize(
+    "low_passes",
+    [
+        [(1, _OF_20_MS)],
+        [(1, 4 * _OF_20_MS)] * 4,
+        *([(n, _OF_20_MS / np.sin(np.pi / 2 / n))] for n in (2, 3, 4)),
+    ],
+    ids=["first order", "four of it", "Butterworth 2", "3", "4"],
+)
+@pytest.mark.parametrize("noise", [0.001, 0.03])
+def test_a_low_pass_is_not_taken_for_a_delay(low_passes, noise):
+    """Each delays by 20 ms, and none with 0.1 kg shows that mass."""
+    found = identified(*swept(*low_passes, mass=0.1, noise=noise), lag=0.02, bonded=True).parameters["M"]
+    assert found.verdict is Verdict.NOT_IDENTIFIABLE
+    assert in_range(found, 0.1, 0.1)
+
+
+def test_a_log_tells_a_delay_from_a_low_pass():
+    """K lag^2/2 = 0.8 kg were it a low-pass; with a tenth of the noise the sweep shows that it is none."""
+    found = identified(*swept(mass=0.1, noise=0.001), lag=0.02, bonded=True).parameters["M"]
+    assert found.verdict is Verdict.IDENTIFIED
+    assert in_range(found, 0.1, 0.1)
+
+
 def test_a_lag_that_is_told_to_be_no_low_pass_leaves_the_mass_its_own_interval():
-    """Of 0.1 kg, K lag^2/2 = 0.2 kg may be a low-pass of the force, unless there is none."""
-    fine = np.arange(0, 10, 1e-4)
-    x = 1e-3 * np.sin(2 * np.pi * (0.5 + 0.3 * fine) * fine)
-    read = np.roll(1000 * x + 0.1 * np.gradient(np.gradient(x, fine), fine), 200)[::10]
-    read = read + 0.003 * np.random.default_rng(0).standard_normal(len(read))
+    """Where the noise hides what a low-pass would do, it costs most of the mass' interval, unless there is none."""
     told = {"lag": 0.02, "bonded": True, "model": "kelvin-voigt-mass"}
-    alone, none = (
-        identified(fine[::10], x[::10], read, **told, force_filter=low_pass).parameters["M"]
-        for low_pass in (None, "none")
-    )
-    assert "low-pass" in alone.budget
+    log = swept(mass=0.1, noise=0.03)
+    alone, none = (identified(*log, **told, force_filter=own).parameters["M"] for own in (None, "none"))
+    assert (*alone.budget,)[0] == "low-pass"
+    assert alone.verdict is not Verdict.IDENTIFIED
     assert "low-pass" not in none.budget
     assert in_range(none, 0.1, 0.1)
     assert none.verdict is Verdict.IDENTIFIED

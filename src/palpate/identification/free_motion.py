@@ -40,8 +40,6 @@ _OF_MEDIAN = 2 / np.pi
 """Variance of a mean over that of a median, of normal noise."""
 _MIDDLE = (0.05, 0.95)
 """Of the force's range, between which it is the surface's for sure."""
-
-
 _BENDS = 3
 """Ways of a drift to bend between stays in free motion: the first three have five sixths of a random walk's power."""
 

@@ -59,9 +59,7 @@ def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Nois
     if variance <= 0:
         return Noise(np.zeros(1), float(len(residuals)), 0.0)
     shape = raw / pairs / variance
-    below = np.flatnonzero(
-        np.abs(shape) < 0.1
-    )  # the correlation time: where it has first come down to a tenth
+    below = np.flatnonzero(np.abs(shape) < 0.1)  # the correlation time: the first to come down to a tenth
     width = int(np.clip(8 * (int(below[0]) if len(below) else most), 4, most))
     u = np.arange(width) / width
     taper = np.where(u < 0.5, 1 - 6 * u**2 + 6 * u**3, 2 * (1 - u) ** 3)  # Parzen
@@ -86,9 +84,7 @@ def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Arr
     meat = scaled.T @ _smooth(scaled, place, noise.autocovariance)
     if prior is not None:
         curve = noise.autocovariance
-        level = max(
-            float(curve[0] + 2 * curve[1:].sum()), noise.variance
-        )  # of a mean of n residuals, times n
+        level = max(float(curve[0] + 2 * curve[1:].sum()), noise.variance)  # n times that of a mean of n
         weight = level / (prior * scale) ** 2
         gram = gram + np.diag(weight)
         meat = meat + level * np.diag(weight)

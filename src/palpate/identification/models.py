@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from palpate.arrays import Array, Mask
 from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
-from palpate.identification.filters.state_variable import Chain, low_pass_once
+from palpate.identification.filters.state_variable import Chain, low_passed
+from palpate.signals.low_pass import LowPass
 
 
 @dataclass
@@ -51,6 +52,11 @@ class Motion:
     def filtered(self, signal: Array, derivative: int, lag: float) -> Array:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain.read(signal, derivative, lag, self.rows)
+
+    def through(self, change: Callable[[Array], Array]) -> Motion:
+        """The same with its signals changed, of shape (n,) each."""
+        free, touched = (own if own is None else change(own) for own in (self.free, self.touched))
+        return replace(self, position=change(self.position), free=free, touched=touched, _kept={}, _turned={})
 
     def direction(self, least: float = 0.0) -> Array:
         """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
@@ -158,7 +164,7 @@ KELVIN_VOIGT_MASS = Model(NAMES[1], ("K", "B", "M", "offset"), _of_derivatives(3
 
 def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
     """f = K u + B u' + K1 y, shape (n,), where the spring K1 of a Maxwell branch is stretched by y: y' + y/tau = u'."""
-    branch = u - u[0] - low_pass_once(u - u[0], tau, motion.chain.dt)
+    branch = u - low_passed(u, LowPass.of_first_order(tau), motion.chain.dt)
     columns = [motion.filtered(u, k, lag) for k in (0, 1)]
     return [*columns, motion.filtered(branch, 0, lag), np.ones(len(motion.rows))]
 

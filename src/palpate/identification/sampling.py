@@ -197,29 +197,25 @@ def _common(
 
 def _check(time: Array, position: Array, force: Array) -> None:
     if len(time) < _FEWEST:
-        count = (
-            "1 row with a time of its own" if len(time) == 1 else f"{len(time)} rows with a time of their own"
-        )
+        count = "1 row with a time of its" if len(time) == 1 else f"{len(time)} rows with a time of their"
         advice = "log longer, or check --time, --start and --end"
-        raise InputError(f"the log has {count}; at least {_FEWEST} are needed: {advice}")
+        raise InputError(f"the log has {count} own; at least {_FEWEST} are needed: {advice}")
     back = np.flatnonzero(np.diff(time) < 0)
     if len(back):
         row = int(back[0]) + 2
         text = f"time runs backwards at row {row} (from {time[row - 2]:.6g} to {time[row - 1]:.6g} s)"
         raise InputError(f"{text}; sort the log or cut it there with --start and --end")
     if (rate := _rate(time)) > _FASTEST:
-        raise InputError(
-            f"there are {rate:.3g} rows a second, faster than any sensor; is the unit of time right?"
-        )
+        text = f"there are {rate:.3g} rows a second, faster than any sensor"
+        raise InputError(f"{text}; is the unit of time right?")
     for name, values in (("position", position), ("force", force)):
         seen = values[np.isfinite(values)]
         if len(seen) < _FEWEST:
             raise InputError(f"the {name} has {len(seen)} readings; at least {_FEWEST} are needed")
         reach = float(np.abs(seen).max())
         if reach > _LARGEST or 0 < reach < 1 / _LARGEST:
-            raise InputError(
-                f"the {name} reaches {reach:.3g}, beyond any sensor; is it the right column and unit?"
-            )
+            text = f"the {name} reaches {reach:.3g}, beyond any sensor"
+            raise InputError(f"{text}; is it the right column and unit?")
         if np.ptp(seen) == 0:
             always = f"the {name} is {seen[0]:.6g} in every row"
             raise InputError(f"{always}; is it the right column, and did anything move?")

@@ -84,15 +84,11 @@ def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
     turns = _turns(x, _STROKE * reach)
     ends = [own for a, b in pairwise(turns) if (own := _steady(x, a, b, least)) is not None]
     # Ways [m] of the strokes, of the legs between large turns at any speed, and of all between turns above the noise.
-    strokes, legs, whole = (
-        np.array([x[b] - x[a] for a, b in ends]),
-        np.diff(x[turns]),
-        np.diff(x[_turns(x, least)]),
-    )
+    strokes = np.array([x[b] - x[a] for a, b in ends])
+    legs, whole = np.diff(x[turns]), np.diff(x[_turns(x, least)])
     for sign in (1, -1):
-        there, advance, back = (
-            np.maximum(way, 0).sum() for way in (sign * whole, sign * strokes, -sign * legs)
-        )
+        ways = sign * whole, sign * strokes, -sign * legs
+        there, advance, back = (np.maximum(way, 0).sum() for way in ways)
         if 0 < _SHARE * there <= advance and advance + back >= _SHARE * np.abs(whole).sum():
             break
     else:
@@ -131,14 +127,12 @@ def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
     first, last = int(np.flatnonzero(share <= _ENDS)[-1]), int(np.argmax(share >= 1 - _ENDS))
     if last - first < _FINE:
         return None
-    speed, fine = (
-        np.diff(np.interp(np.linspace(first, last, parts + 1), np.arange(len(share)), share))
-        for parts in (_PARTS, _FINE)
-    )
+    edges = (np.linspace(first, last, parts + 1) for parts in (_PARTS, _FINE))
+    speed, fine = (np.diff(np.interp(own, np.arange(len(share)), share)) for own in edges)
     moves = fine >= _STILL / _FINE
     if not moves.all():
-        edges = np.linspace(first, last, _FINE + 1).astype(np.intp)
-        parts = [(int(edges[i]), int(edges[j])) for i, j in runs(moves)]
+        ends = np.linspace(first, last, _FINE + 1).astype(np.intp)
+        parts = [(int(ends[i]), int(ends[j])) for i, j in runs(moves)]
         i, j = max(parts, key=lambda part: share[part[1]] - share[part[0]], default=(first, first))
         return _steady(x, a + i, a + j, least)
     even = speed.min() >= _SLOWEST * speed.max() and speed[_PARTS // 2] <= _BULGE * (speed[0] + speed[-1]) / 2
@@ -252,9 +246,7 @@ class Curve:
         every = []
         for degree in degrees:
             inverse = np.linalg.pinv(chebyshev.chebvander(u, degree))
-            weights = np.asarray(
-                chebyshev.chebval(at, chebyshev.chebder(inverse))
-            )  # of each block on the slope
+            weights = np.asarray(chebyshev.chebval(at, chebyshev.chebder(inverse)))  # of blocks on the slope
             misfit = force - chebyshev.chebval(u, inverse @ force)
             criterion = float(misfit @ misfit) / variance + 2 * (degree + 1)
             every.append((float(weights @ force), variance * float(weights @ weights), criterion))
@@ -280,11 +272,9 @@ def curves_of(
             continue
         time, force = channels.time[there], signs[1] * channels.force[there]
         begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
-        gone = (
-            np.zeros(len(time))
-            if drift is None
-            else np.interp(time - channels.start, drift.times, drift.levels)
-        )
+        gone = np.zeros(len(time))
+        if drift is not None:
+            gone = np.interp(time - channels.start, drift.times, drift.levels)
         readings = min(channels.rate * channels.dt, 1.0)
         curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
     return curves

@@ -217,12 +217,7 @@ class Parameter(Readable):
 
     @classmethod
     def of(
-        cls,
-        value: float,
-        unit: str,
-        verdict: Verdict,
-        reason: str,
-        contributions: Contributions,
+        cls, value: float, unit: str, verdict: Verdict, reason: str, contributions: Contributions
     ) -> Parameter:
         """A parameter with its interval and its budget, of the contributions to its uncertainty by cause."""
         whole = Measurement(value, contributions)

@@ -40,8 +40,6 @@ _UNTOUCHED = (
     "a power law needs depth and force from the touch on, and the log never leaves the surface:"
     " let it begin in free motion"
 )
-
-
 Units = Mapping[str, str]
 """Of a record's columns; here of its force and its position."""
 

@@ -55,6 +55,11 @@ class LowPass:
             raise InputError(f"a force filter is given as {_FORM}; got {text!r}")
         return cls(tuple((int(section[1]), float(section[2])) for section in found if section))
 
+    @classmethod
+    def of_first_order(cls, time: float, count: int = 1) -> "LowPass":
+        """As many equal ones of first order, whose time constants add up to a time [s]."""
+        return cls(((1, count / (2 * pi * time)),) * count)
+
     def __str__(self) -> str:
         return "+".join(f"butterworth{order}:{cutoff:.12g}" for order, cutoff in self.sections) or "none"
 

@@ -135,9 +135,7 @@ def of_stretches(system: System, solution: Solution) -> Spread:
     weight = np.where(system.lines > 0, 1 / solution.noise, 0.0)
     summed = np.einsum("o,goij->gij", weight, products)
     normal, pull = summed[:, :-1, :-1], summed[:, :-1, :] @ np.append(-solution.theta, 1.0)
-    scaled = (
-        np.stack([_scaling(own, solution.cov).T for own in normal]) @ solution.cov
-    )  # (g, p, p): from pull to theta
+    scaled = np.stack([_scaling(own, solution.cov).T for own in normal]) @ solution.cov  # from pull to theta
     variance = (np.einsum("gi,gij->gj", pull, scaled) ** 2).sum(axis=0)
     seen = np.einsum("gki,gkl,gli->gi", scaled, normal, scaled)
     crossed = np.einsum("gki,gkl->gil", scaled, normal)  # (g, p, p)

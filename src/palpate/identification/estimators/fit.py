@@ -202,9 +202,7 @@ def fit(descent: Descent, nonlinear: dict[str, float], prior: Lag) -> Fit:
     theta, cov = at.copy(), np.zeros((len(at), len(at)))
     theta[free] += step
     own = {p.name: float(np.clip(theta[names.index(p.name)], p.low, p.high)) for p in descent.model.nonlinear}
-    if any(
-        theta[names.index(name)] != value for name, value in own.items()
-    ):  # a step beyond a limit ends there
+    if any(theta[names.index(name)] != value for name, value in own.items()):  # a step ends at a limit
         theta[:-1] = [*descent.at(own).theta, *own.values()]
     cov[free, free] = covariance(jacobian[:, free], rows, noise, std[free])
     return Fit(names, theta, cov, noise.effective)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from palpate.identification.estimators.averaging import (
 )
 from palpate.identification.estimators.budget import (
     FRICTION,
+    HIDDEN_SHARE,
     Answer,
     Budget,
     Prediction,
@@ -37,12 +39,15 @@ from palpate.identification.estimators.octaves import (
     System,
     longest_of,
     octaves_of,
+    solve,
     system_of,
 )
+from palpate.identification.filters.state_variable import low_passed
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.options import LAG, mass_std
 from palpate.identification.problem import Problem
+from palpate.signals.low_pass import LowPass
 from palpate.signals.types import NORMAL
 
 
@@ -167,9 +172,7 @@ class Linearisation:
         lines = self.octaves, self.use, self.system
         sensor, told = sensor_lines(self.problem, self.segments, *lines, solution)
         both = self._with_position(solution, sensor)
-        explained, left, hidden = self._explained_part(
-            solution, both
-        )  # what may be another force's does not count
+        explained, left, hidden = self._explained_part(solution, both)  # another force's does not count
         question = self.system, solution.noise, both, self._forces()
         likely = members(*question)
         solution = averaged(likely)
@@ -179,7 +182,7 @@ class Linearisation:
             place = self.names.index("M")
             budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
             if self.problem.filtered is None:
-                budget["low-pass"] = self._by_low_pass(solution)
+                budget["low-pass"] = self._by_low_pass(solution, both, budget)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
@@ -223,14 +226,43 @@ class Linearisation:
             budget["lag"] = self._by_prior_of_lag(member, budget["lag"])
         return budget
 
-    def _by_low_pass(self, solution: Solution) -> Spread:
+    def _by_low_pass(self, solution: Solution, sensor: Array, budget: Budget) -> Spread:
         """The mass by a low-pass that nobody gave: a lag T may be a delay, a low-pass of first order, or both.
 
         The log of its response is -T s + C s^2/2 - ... with a second cumulant C from 0 to T^2, and K C s^2/2 is a mass.
+        Of real poles with a C of T^2/n or more, n equal ones are the least unlike a delay: the third cumulant is at
+        least 2 C^2/T (Cauchy and Schwarz). A larger C is left out if the log is less likely with them than with a
+        delay, and with what is as far on its other side, where Butterworth's are. The residual counts as if hidden.
         """
         time = min(float(np.hypot(self.lag, self.problem.lag.std)), self._radian())
-        most = solution.theta[self.names.index("K")] / 2 * time**2
-        return Spread((most / NORMAL * np.equal(self.names, "M")) ** 2)
+        place, count = self.names.index("M"), 1
+        most = abs(solution.theta[self.names.index("K")]) / 2 * time**2
+        rest = NORMAL**2 * sum(part.variance[place] for part in budget.values())
+        hidden = np.maximum(HIDDEN_SHARE**2 * self.system.lines, 1.0) * (solution.noise - sensor)
+        least = _misfit(self.system, sensor + hidden) + NORMAL**2
+        while (most / count) ** 2 > rest:
+            others = self._behind(LowPass.of_first_order(time, 2 * count))
+            if any(_misfit(other, sensor + hidden) <= least for other in others):
+                break
+            count *= 2
+        return Spread((most / count / NORMAL * np.equal(self.names, "M")) ** 2)
+
+    def _behind(self, low_pass: LowPass) -> Iterator[System]:
+        """Normal equations with the position behind a low-pass that is part of the lag, and on a delay's other side."""
+        motion, lag = self.problem.motion, self.problem.lag
+
+        def behind(signal: Array) -> Array:
+            return low_passed(signal, low_pass, motion.chain.dt)
+
+        def mirror(signal: Array) -> Array:
+            rows = np.arange(len(signal))
+            return 2 * np.interp(rows - low_pass.lag / motion.chain.dt, rows, signal) - behind(signal)
+
+        about = self.about | {LAG: self.lag - low_pass.lag}
+        rest = replace(lag, value=lag.value - low_pass.lag)
+        for change in (behind, mirror):
+            problem = replace(self.problem, motion=motion.through(change), lag=rest)
+            yield Linearisation.of(problem, self.model, self.segments, about, self.use).system
 
     def _radian(self) -> float:
         """Time of a radian of the fastest motion [s]: a longer lag is seen apart from all but a damping."""
@@ -297,6 +329,14 @@ class Linearisation:
         count = max(float(self.system.lines.sum()), 1.0)
         beyond = float(np.maximum(solution.noise - sensor, 0.0) @ self.system.lines)
         return 1 - left / whole, float(np.sqrt(left / count)), float(np.sqrt(beyond / whole))
+
+
+def _misfit(system: System, noise: Array) -> float:
+    """-2 log of the likelihood and the priors for variances of a line, shape (octaves,), but for a constant."""
+    found = solve(system, noise)
+    full, weight = np.append(-found.theta, 1.0), np.where(system.lines > 0, 1 / noise, 0.0)
+    left = float(full @ np.tensordot(weight, system.products, axes=1) @ full)
+    return left + float(system.prior_weight @ (found.theta - system.prior_mean) ** 2)
 
 
 def _linearise(

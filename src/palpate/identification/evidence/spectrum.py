@@ -157,9 +157,8 @@ def _blocks(
 
     def lines(values: Array) -> Complex:
         parts = [values[s.first : s.last] for s in segments if s.length >= length]
-        views = (
-            np.lib.stride_tricks.sliding_window_view(own, length)[:: max(length // 2, 1)] for own in parts
-        )
+        strided = np.lib.stride_tricks.sliding_window_view
+        views = (strided(own, length)[:: max(length // 2, 1)] for own in parts)
         real = np.concatenate([own @ seen for own in views])
         return np.asarray(real[:, :count] + 1j * real[:, count:])
 

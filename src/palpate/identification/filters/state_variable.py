@@ -1,7 +1,7 @@
 """The one filter chain that every channel of an identification passes through.
 
 A state-variable filter: five equal first-order lags in a row, F(s) = (w / (s + w))^5, whose inner states give the
-filtered signal and its first four derivatives without ever taking a difference. f = M a + B v + K x holds for the
+filtered signal and its first three derivatives without ever taking a difference. f = M a + B v + K x holds for the
 filtered channels exactly as for the raw ones, because F is the same on all of them.
 """
 
@@ -76,7 +76,7 @@ class Chain:
     def __call__(
         self, signal: Array, derivative: int = 0, lag: float = 0.0, first: int = 0, every: int = 1
     ) -> Array:
-        """The filtered signal, or one of its derivatives 0 to 4, at the times t - lag, shape (n,).
+        """The filtered signal, or one of its derivatives 0 to 3, at the times t - lag, shape (n,).
 
         Before its first and after its last sample the signal, shape (n,), is taken to rest there; the lag may be
         negative. Of the samples one in `every` from the `first` on is returned, by as many short filters, each of whose
@@ -131,7 +131,7 @@ def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
 
 
 def _integrate(w: float, derivative: int, time: Array) -> Array:
-    """The impulse response integrated twice and then differentiated `derivative` times, 0 to 4."""
+    """The impulse response integrated twice and then differentiated `derivative` times, 0 to 3."""
     tau = w * np.maximum(time, 0.0)
     if derivative == 0:
         return (tau * _erlang_cdf(ORDER, tau) - ORDER * _erlang_cdf(ORDER + 1, tau)) / w
@@ -141,9 +141,7 @@ def _integrate(w: float, derivative: int, time: Array) -> Array:
         return w * _erlang(ORDER, tau)
     if derivative == 3:
         return w**2 * (_erlang(ORDER - 1, tau) - _erlang(ORDER, tau))
-    if derivative == 4:
-        return w**3 * (_erlang(ORDER - 2, tau) - 2 * _erlang(ORDER - 1, tau) + _erlang(ORDER, tau))
-    raise ValueError(f"the chain gives derivatives 0 to 4, not {derivative}")
+    raise ValueError(f"the chain gives derivatives 0 to 3, not {derivative}")
 
 
 def _erlang(order: int, tau: Array) -> Array:
@@ -158,16 +156,6 @@ def _erlang_cdf(order: int, tau: Array) -> Array:
         term = term * tau / k
         total += term
     return 1.0 - total * np.exp(-tau)
-
-
-def low_pass_once(signal: Array, time_constant: float, dt: float) -> Array:
-    """One lag 1/(1 + s T), exact for straight lines between the samples, starting from rest at 0. Shape (n,)."""
-    from scipy.linalg import solve_banded
-
-    decay = np.exp(-dt / time_constant)
-    b1, b0 = 1 - time_constant / dt * (1 - decay), time_constant / dt * (1 - decay) - decay
-    driven = b1 * signal + b0 * np.r_[0.0, signal[:-1]]
-    return np.asarray(solve_banded((1, 0), np.outer([1.0, -decay], np.ones(len(signal))), driven))
 
 
 def white_noise(signal: Array) -> float:
@@ -186,7 +174,7 @@ def block_means(signal: Array, size: int) -> Array:
 
 
 def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
-    """A signal, shape (n,), behind Butterworth low-passes, exact for straight lines between the samples."""
+    """A signal, shape (n,), behind Butterworth low-passes at rest, exact for straight lines between the samples."""
     from scipy.signal import butter, cont2discrete, lfilter
 
     for order, cutoff in low_pass.sections:
@@ -214,9 +202,7 @@ def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> floa
     highest = FASTEST * rate
     if len(position) < FEWEST_SEGMENT:
         return highest
-    edge = 2 * min(
-        _edge(position, dt), _edge(force, dt)
-    )  # five lags halve the power at 0.39 of their cut-off
+    edge = 2 * min(_edge(position, dt), _edge(force, dt))  # five lags halve the power at .39 of their cut-off
     lowest = min(highest, 10 / (len(position) * dt))
     return float(np.clip(edge, max(lowest, highest / 50), highest))
 
