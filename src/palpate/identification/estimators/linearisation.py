@@ -108,13 +108,11 @@ class Linearisation:
         most = max(orders.values(), default=0) + (LAG in free)
         noisy = averaging.position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
         if use is None:
-            use = averaging.seen(
-                motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()}
-            )
+            derivatives = {-1: 0} | {free.index(name): k for name, k in orders.items()}
+            use = averaging.seen(motion, noisy, whole, derivatives)
         names = (*free, *effects, *bending)
-        friction = np.column_stack(
-            [column for name, column in effects.items() if name.startswith(causes.FRICTION)]
-        )
+        rubs = [column for name, column in effects.items() if name.startswith(causes.FRICTION)]
+        friction = np.column_stack(rubs)
         system = system_of(octaves.only(use), names, prior)
         return cls(
             problem, model, lag, at, theta, names, friction, len(free), prior, segments, octaves, use, noisy, system,
@@ -159,16 +157,14 @@ class Linearisation:
         question = self.system, solution.noise, both, self._forces()
         likely = averaging.members(*question)
         solution = averaging.averaged(likely)
-        budget = averaging.mean_budget(
-            likely, [self._budget(own, sensor, told) for own in likely], solution.theta
-        )
+        each = [self._budget(own, sensor, told) for own in likely]
+        budget = averaging.mean_budget(likely, each, solution.theta)
         budget["octaves"] = averaging.of_octaves(solution, *question)
         if "M" in self.names and "M" not in self.prior:
             place = self.names.index("M")
-            budget["other forces"].variance[place] += averaging.of_supposition(
-                solution, likely, self.system, place
-            )
-            if not (self.problem.filtered or self.problem.motion.matched):
+            supposed = averaging.of_supposition(solution, likely, self.system, place)
+            budget["other forces"].variance[place] += supposed
+            if self.problem.filtered is None:
                 budget["low-pass"] = self._by_low_pass(solution)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == causes.FRICTION]
         names = tuple(self.names[i] for i in kept)
