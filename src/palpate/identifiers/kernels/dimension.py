@@ -194,8 +194,8 @@ class Mat4(NamedTuple):
 
     def map_left(B, A):
         """The matrix product from the left."""
-        columns = B.T
-        return Mat4(A @ columns.r1, A @ columns.r2, A @ columns.r3, A @ columns.r4).T
+        C = B.T
+        return Mat4(C @ A.r1, C @ A.r2, C @ A.r3, C @ A.r4)
 
     @property
     def T(A):
@@ -210,10 +210,14 @@ class Mat4(NamedTuple):
 
     def map_solve(A, b):
         """x with A x = b."""
-        numbers = np.empty(20)
-        _FOUR.put_matrix(numbers, 0, A)
-        _FOUR.put_vector(numbers, 16, b)
-        return _FOUR.vector(eliminate(numbers[:16].reshape(4, 4), numbers[16:]), 0)
+        numbers, right = np.empty((4, 4)), np.empty(4)
+        numbers[0, 0], numbers[0, 1], numbers[0, 2], numbers[0, 3] = A.r1.v.x, A.r1.v.y, A.r1.v.z, A.r1.w
+        numbers[1, 0], numbers[1, 1], numbers[1, 2], numbers[1, 3] = A.r2.v.x, A.r2.v.y, A.r2.v.z, A.r2.w
+        numbers[2, 0], numbers[2, 1], numbers[2, 2], numbers[2, 3] = A.r3.v.x, A.r3.v.y, A.r3.v.z, A.r3.w
+        numbers[3, 0], numbers[3, 1], numbers[3, 2], numbers[3, 3] = A.r4.v.x, A.r4.v.y, A.r4.v.z, A.r4.w
+        right[0], right[1], right[2], right[3] = b.v.x, b.v.y, b.v.z, b.w
+        x = eliminate(numbers, right)
+        return Vec4(Vec3(x[0], x[1], x[2]), x[3])
 
 
 Vec4.__array_ufunc__ = Mat4.__array_ufunc__ = None  # type: ignore[attr-defined]  # NumPy leaves the operators alone
@@ -307,9 +311,6 @@ class Four(NamedTuple):
     def variances(self, S):
         """The diagonal of S S^T."""
         return Vec4(Vec3(S.r1 @ S.r1, S.r2 @ S.r2, S.r3 @ S.r3), S.r4 @ S.r4)
-
-
-_FOUR = Four()
 
 
 @part
