@@ -1,8 +1,8 @@
 """Every claim's verdict and numbers as they were last measured, and what has changed since.
 
 `make claims` takes a whole measurement of `palpate thesis` into runs/claims, and
-`python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it; of some figures alone, those. Studies
-that take long are kept with two seeds, too: the tests repeat these, and leave the other seeds to `make claims`.
+`python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it; of some figures alone, those.
+Studies that take long are kept with two seeds, too: tests repeat these, and leave the other seeds to `make claims`.
 """
 
 from __future__ import annotations

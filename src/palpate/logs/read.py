@@ -70,9 +70,9 @@ def read_log(
     path, kind = Path(path), kind_of(Path(path))
     if not columns:
         return read_record(path, limits)
-    if kind.is_bag and rate is not None:
-        raise InputError(f"the messages of {path} have their own times; leave out --rate")
     if kind.is_bag:
+        if rate is not None:
+            raise InputError(f"the messages of {path} have their own times; leave out --rate")
         with bag_reader().Bag(path, kind, limits) as bag:
             loaded = bag_reader().from_bag(bag, columns, missing, held)
     else:
@@ -184,7 +184,7 @@ def measured_by(path: Path) -> dict[str, Any]:
         return {}
     low_pass = LowPass.parse(found.force.filter)
     lag = low_pass.lag + found.force.delay_s - found.position.lag_s
-    return {"lag": lag, "force_filter": found.force.filter if low_pass.roll_off else None}
+    return {"lag": lag, "force_filter": found.force.filter}
 
 
 _Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]

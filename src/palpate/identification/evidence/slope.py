@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
@@ -174,7 +173,7 @@ def _slope_in(loading: Loading, level: float | None) -> tuple[float, ...] | None
     return value, variance, change, by_filter, by_speed, at, float(depth.mean()), rise
 
 
-def _rows(force: Array, level: float | None) -> NDArray[np.intp]:
+def _rows(force: Array, level: float | None) -> Indices:
     """Rows about a share of the force; or all after the last below the upper part, as a force may fall once."""
     low, high = np.percentile(force, [2, 98])
     share = (force - low) / (high - low or 1.0)
