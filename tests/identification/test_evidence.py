@@ -159,7 +159,7 @@ def press_path(rise, hold=0.0, depth=2e-3, start=0.5, lead=-0.5e-3):
 
 def press(time, x, force, noise=1e-3, **said):
     asked = problem(record(time, x, force + np.random.default_rng(0).normal(0, noise, len(x))), 0.0, **said)
-    return press_of(asked, 0.0, segments_of(asked.motion.rows, asked.spans))
+    return press_of(asked, None, segments_of(asked.motion.rows, asked.spans))
 
 
 def test_of_a_spring_the_press_is_one_line_and_nothing_is_lost():
