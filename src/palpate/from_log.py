@@ -57,7 +57,7 @@ class LogIdentifier:
         own, words = self._complete(log)
         known: dict[str, Any] = measured_by(log) if own.signals.plain and is_run(log) else {}
         known |= self.options
-        samples = known.get("force_filter") is not None
+        samples = str(known.get("force_filter") or "none") != "none"
         record = read_as(own.signals.read(log, samples=samples), words)
         in_space = "force_x" in record.columns
         if not in_space:

@@ -171,6 +171,23 @@ def test_a_low_pass_that_only_its_lag_was_told_of_is_no_mass():
     assert "low-pass" not in both.parameters["M"].budget
 
 
+def test_a_lag_that_is_told_to_be_no_low_pass_leaves_the_mass_its_own_interval():
+    """Of 0.1 kg, K lag^2/2 = 0.2 kg may be a low-pass of the force, unless there is none."""
+    fine = np.arange(0, 10, 1e-4)
+    x = 1e-3 * np.sin(2 * np.pi * (0.5 + 0.3 * fine) * fine)
+    read = np.roll(1000 * x + 0.1 * np.gradient(np.gradient(x, fine), fine), 200)[::10]
+    read = read + 0.003 * np.random.default_rng(0).standard_normal(len(read))
+    told = {"lag": 0.02, "bonded": True, "model": "kelvin-voigt-mass"}
+    alone, none = (
+        identified(fine[::10], x[::10], read, **told, force_filter=low_pass).parameters["M"]
+        for low_pass in (None, "none")
+    )
+    assert "low-pass" in alone.budget
+    assert "low-pass" not in none.budget
+    assert in_range(none, 0.1, 0.1)
+    assert none.verdict is Verdict.IDENTIFIED
+
+
 @pytest.mark.parametrize("mass", [-0.1, -0.3])
 def test_a_low_pass_that_nobody_gave_excuses_no_mass_below_zero(mass):
     """It adds up to K lag^2/2 = 0.2 kg to what is seen of a mass, and takes nothing from it."""

@@ -65,7 +65,9 @@ def test_columns_lag_and_filter_come_from_the_record(path, capsys):
 
 def test_what_is_said_counts_more(path, capsys):
     assert main(["identify", str(path), "--json", "--lag", "0.001", "--force-filter", "none"]) == 0
-    assert json.loads(capsys.readouterr().out)["lag_s"]["value"] == 0.001
+    found = json.loads(capsys.readouterr().out)
+    assert found["lag_s"]["value"] == 0.001
+    assert found["options"]["force_filter"] == "none"
 
 
 @pytest.mark.long

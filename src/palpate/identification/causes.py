@@ -26,7 +26,7 @@ NOISE = Cause("noise", "press deeper, longer or more often; try palpate excite",
 _CAUSES = {
     "noise": NOISE,
     "lag": Cause("the uncalibrated lag of the force", "calibrate the lag and give it with --lag"),
-    "low-pass": Cause("a low-pass of the force that may be its lag", "give it with --force-filter"),
+    "low-pass": Cause("a low-pass of the force that may be its lag", "give it with --force-filter, or none"),
     "other forces": Cause(
         "drift, friction or relaxation beside the model",
         "let the log begin and end in free motion, and press more often",

@@ -75,9 +75,9 @@ class Options:
         series_mass: mass between that and the surface, which swings on it, and its standard deviation [kg].
         bonded: True if the probe is fixed to the surface, False if it is not, None to find out.
         cutoff: of the filter chain [Hz]; None to choose.
-        force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`.
-            The position then goes through the same, and is read at the sensor's own samples. The lag, if it is given,
-            is that of a fresh reading, this low-pass included.
+        force_filter: what the force sensor low-passes the force with before it is sampled, as `butterworth3:120`, or
+            `none`. The position then goes through the same, and is read at the sensor's own samples. The lag, if it is
+            given, is that of a fresh reading, this low-pass included. None if it is not known.
         mass: prior of the mass, value and standard deviation [kg]; 0 fixes it.
         force_sign: 1 if the force grows as the probe presses, -1 if it falls; None to find out.
     """
@@ -100,8 +100,7 @@ class Options:
     def of(cls, **said: Any) -> Options:
         """Check what was said; a value out of its range is an `InputError`."""
         told = said.get("force_filter")
-        low_pass = LowPass.parse(told) if isinstance(told, str) else told
-        options = cls(**(said | {"force_filter": low_pass if low_pass and low_pass.sections else None}))
+        options = cls(**(said | {"force_filter": LowPass.parse(told) if isinstance(told, str) else told}))
         _check(options)
         return options
 

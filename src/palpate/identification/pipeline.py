@@ -157,7 +157,7 @@ def _inputs(problem: Problem, options: Options) -> dict[str, Input]:
     """The input quantities whose uncertainty is given, or assumed, before the log is read."""
     payload, (share, share_std) = problem.contacts.payload, options.swing
     found = {
-        "lag": Input(problem.lag.value + problem.filtered, problem.lag.std, "s"),
+        "lag": Input(problem.lag.value + (problem.filtered or 0.0), problem.lag.std, "s"),
         "calibration": Input(1.0, options.calibration, "1"),
         "series stiffness": Input(options.series_stiffness or 0.0, options.series_std, "N/m"),
         "tip's mass": Input(share, share_std, "s^2"),
@@ -178,7 +178,7 @@ def _correlation(
 
 
 def _lag(choice: Choice) -> LagFound | None:
-    prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered
+    prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered or 0.0
     if prior.known:
         told = prior.value + filtered != 0 or prior.std > 0
         return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "told") if told else None

@@ -89,7 +89,7 @@ class Problem:
         read: the force before any filter, at the samples of the motion's position, shape (n,); None if it is another's.
         rounding: deviation of a sample of the force by the last digit of the log [N]; 0 behind a sensor, whose readings
             are as white as their noise.
-        filtered: part of the force's lag that the position was sent through beforehand, so that `lag` is the rest [s].
+        filtered: lag of the low-pass that the position was sent through, `lag` is the rest [s]; None if none is given.
         with_touches: the same over the rows from shortly before each touch, the force counted from where it rests; None
             if no touch is in the log.
         with_approach: the same from as long before each touch as the contact lasts, where there are so many rows.
@@ -105,7 +105,7 @@ class Problem:
     counted: bool = False
     read: Array | None = None
     rounding: float = 0.0
-    filtered: float = 0.0
+    filtered: float | None = None
     with_touches: Problem | None = None
     with_approach: Problem | None = None
 
@@ -268,7 +268,7 @@ def _behind_filter(
     channels: Channels, chain: Chain, contacts: Contacts, options: Options
 ) -> tuple[Problem, Memory]:
     """Both channels behind the chain; a known low-pass of the force is applied to the position too."""
-    position, filtered, told = channels.position, 0.0, options.lag
+    position, filtered, told = channels.position, None, options.lag
     if options.force_filter is not None:
         position = low_passed(position, options.force_filter, channels.dt)
         filtered = options.force_filter.lag
@@ -378,5 +378,6 @@ def _behind_sensor(
         free=tuple(force[a:b] for a, b in runs(free) if b - a >= FREE_ROWS),
         origin=origin,
         contacts=contacts,
+        filtered=0.0,
     )
     return problem, Memory(force, usable, begins, int(np.ceil(path.settling / path.period)))

@@ -184,7 +184,7 @@ def measured_by(path: Path) -> dict[str, Any]:
         return {}
     low_pass = LowPass.parse(found.force.filter)
     lag = low_pass.lag + found.force.delay_s - found.position.lag_s
-    return {"lag": lag, "force_filter": found.force.filter if low_pass.roll_off else None}
+    return {"lag": lag, "force_filter": found.force.filter}
 
 
 _Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]

@@ -295,7 +295,7 @@ def identification_of(record: Record, asked: Asked) -> dict[str, Any]:
             log,
             lag=low_pass.lag + asked.delay(record),
             lag_std=asked.delay_std(record),
-            force_filter=low_pass if low_pass.sections else None,
+            force_filter=low_pass,
         )
     except InputError as error:
         return {"why_not": str(error), "parameters": {}, "warnings": []}

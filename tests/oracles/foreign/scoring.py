@@ -115,7 +115,7 @@ def score_log(log: Log) -> Score:
         "lag_told": "lag" in log.options,
     }
     bound = half_widths(log)
-    known = tuple(n for n in bound if bound[n] <= 0.05 * abs(log.truth[n][0]))
+    known = tuple(n for n in bound if bound[n] <= 0.05 * log.truth[n][0])  # none below zero is a surface's
     begin = time.perf_counter()
     try:
         found = identify(record_of(log), **log.options)

@@ -192,7 +192,7 @@ class ModelOptions:
         if lag is not None:
             known |= {"lag": lag[0], "lag_std": lag[1]}
         if self.force_filter is not None:
-            known["force_filter"] = None if self.force_filter == "none" else self.force_filter
+            known["force_filter"] = self.force_filter
         if self.mass is not None:
             known["mass"] = values.with_std("mass", self.mass, "0.5:0.02")
         names = ("model", "tolerance", "calibration", "bonded", "cutoff")

@@ -178,7 +178,7 @@ class Linearisation:
         if "M" in self.names and "M" not in self.prior:
             place = self.names.index("M")
             budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
-            if not (self.problem.filtered or self.problem.motion.matched):
+            if self.problem.filtered is None:
                 budget["low-pass"] = self._by_low_pass(solution)
         kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
         names = tuple(self.names[i] for i in kept)
