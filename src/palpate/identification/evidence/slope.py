@@ -309,12 +309,12 @@ class Parabola:
         u = (depth - middle) / reach
         square = float((u**2).mean())
         columns = np.column_stack([np.ones_like(u), u, u**2 - square])
-        theta, *_ = np.linalg.lstsq(columns, force, rcond=None)
+        theta: Array = np.linalg.lstsq(columns, force, rcond=None)[0]
         noise = noise_of(force - columns @ theta, np.arange(len(force)), 3)
-        gram = np.linalg.pinv(columns.T @ columns)
-        return cls(
-            middle, reach, theta, square, noise.variance * len(force) / max(noise.effective, 4.0) * gram
+        cov: Array = (
+            noise.variance * len(force) / max(noise.effective, 4.0) * np.linalg.pinv(columns.T @ columns)
         )
+        return cls(middle, reach, theta, square, cov)
 
     @property
     def change(self) -> float:
