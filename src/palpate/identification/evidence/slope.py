@@ -309,12 +309,11 @@ class Parabola:
         u = (depth - middle) / reach
         square = float((u**2).mean())
         columns = np.column_stack([np.ones_like(u), u, u**2 - square])
-        theta: Array = np.linalg.lstsq(columns, force, rcond=None)[0]
+        theta = np.asarray(np.linalg.lstsq(columns, force, rcond=None)[0], np.float64)
         noise = noise_of(force - columns @ theta, np.arange(len(force)), 3)
-        cov: Array = (
-            noise.variance * len(force) / max(noise.effective, 4.0) * np.linalg.pinv(columns.T @ columns)
-        )
-        return cls(middle, reach, theta, square, cov)
+        gram = np.asarray(np.linalg.pinv(columns.T @ columns), np.float64)
+        scale = noise.variance * len(force) / max(noise.effective, 4.0)
+        return cls(middle, reach, theta, square, scale * gram)
 
     @property
     def change(self) -> float:
