@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
-from palpate.identification.estimators.octaves import segments_of
+from palpate.identification.estimators.octaves import PERIODS, segments_of
 from palpate.identification.evidence.press import evidence_of, press_of
 from palpate.identification.evidence.slope import Loading, slope_of
-from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
-from palpate.identification.filters.state_variable import low_pass_once
+from palpate.identification.evidence.spectrum import dynamic_stiffness, working_point
+from palpate.identification.filters import low_pass_once
 from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
 from palpate.identification.steady_press import WINDOW, Curve, Slopes, SteadyPress, slopes_at

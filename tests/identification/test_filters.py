@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate.identification.filters.state_variable import ORDER, Chain, low_pass_once, white_noise
+from palpate.identification.filters import ORDER, Chain, low_pass_once
+from palpate.signals.samples import white_noise
 
 CHAIN = Chain(cutoff=60.0, dt=1e-3)
 

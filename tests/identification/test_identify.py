@@ -6,7 +6,7 @@ import pytest
 from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
-from palpate.identification.filters.state_variable import low_pass_once
+from palpate.identification.filters import low_pass_once
 
 TIME = np.arange(6000) / 1000
 

@@ -1,18 +1,14 @@
 """The contact models that are fitted and compared. Each turns a position into the columns of a regression."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from math import isqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
-from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
-from palpate.identification.filters.state_variable import Chain, low_pass_once
+from palpate.arrays import Array, Indices, Mask
+from palpate.identification.filters import NOISELESS, Chain, PositionNoise, SensorPath, low_pass_once
 
 
 @dataclass
@@ -31,7 +27,7 @@ class Motion:
 
     chain: Chain | SensorPath
     position: Array
-    rows: NDArray[np.intp]
+    rows: Indices
     bonded: bool
     noise: PositionNoise = NOISELESS
     free: Array | None = None

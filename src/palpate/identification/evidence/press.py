@@ -1,7 +1,5 @@
 """The press: force over depth in loading and unloading, its tangents, the lost work, and the relaxation of a hold."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.problem import Problem
@@ -175,7 +174,7 @@ def _slope_in(loading: Loading) -> tuple[float, ...] | None:
     return value, variance, change, by_filter, by_speed, float(force.mean()), float(depth.mean()), rise
 
 
-def _upper(force: Array) -> NDArray[np.intp]:
+def _upper(force: Array) -> Indices:
     """All rows after the last below the upper part of the force, as a force may fall once; shape (n,) to (k,)."""
     if not len(force):
         return np.empty(0, np.intp)
