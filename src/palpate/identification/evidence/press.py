@@ -133,7 +133,7 @@ _DAMPING = 0.5
 
 
 def press_of(problem: Problem, answer: Answer | None, segments: list[Segment]) -> Press | None:
-    """The press of a log, what its force has of the speed by an answer; None without a loading."""
+    """The press of a log, its tangents less the damping of an answer; None without a loading."""
     lag = problem.lag.value
     loadings = loadings_in(problem, lag, segments)
     if not loadings:

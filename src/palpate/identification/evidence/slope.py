@@ -146,12 +146,12 @@ def slope_of(loadings: list[Loading]) -> Slopes | None:
     slopes, variances, changes, filters, speeds, forces, depths, rises = np.array(every).T
     mean = random_effects(slopes, variances)
     bounds = {"curvature": changes, "filter": filters, "speed": speeds}
-    found = _pooled(mean, bounds, len(slopes))
+    found = _mean_slope(mean, bounds, len(slopes))
     at = float(forces.mean()), float(depths.mean())
     return Slopes(*at, found, tuple(slopes.tolist()), mean.next_half, float(rises.mean()))
 
 
-def _pooled(mean: Mean, bounds: dict[str, Array], count: int) -> Measurement:
+def _mean_slope(mean: Mean, bounds: dict[str, Array], count: int) -> Measurement:
     """The mean of some slopes with its causes: bounds of each, shape (n,), and what they scatter by."""
     causes = {cause: Contribution.within(float(own.mean())) for cause, own in bounds.items()}
     causes["repetition" if count > 1 else "noise"] = Contribution(mean.std, mean.freedom)
@@ -196,7 +196,7 @@ def _apart(read: Array, slope: float, variance: float) -> float:
 
 @dataclass(frozen=True)
 class Drag:
-    """What the force has of the speed [N s/m], and the 95 % half-width of that."""
+    """Force over speed [N s/m] and its 95 % half-width: a damping as a tangent needs it."""
 
     value: float
     half: float
@@ -229,7 +229,7 @@ def tangent_at(
         return None
     slopes, variances, changes, filters, speeds = np.array(found).T
     bounds = {"curvature": changes, "filter": filters, "speed": speeds}
-    return _pooled(random_effects(slopes, variances), bounds, len(slopes))
+    return _mean_slope(random_effects(slopes, variances), bounds, len(slopes))
 
 
 def _advance_through(whole: Loading, force: float) -> Loading | None:
