@@ -76,7 +76,7 @@ FEW = {
     "experiment, edited": 30,
     "arm of TOML": 25,
     "options": 10,
-    "FOUND, tuned": 25,
+    "FOUND, tuned": 6,
     "certificate, checked": 25,
 }
 """Inputs of kinds that take little time; the slow ones are `long`."""

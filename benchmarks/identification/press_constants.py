@@ -27,13 +27,13 @@ from foreign.scoring import record_of, working_truth
 from plain_presses import World, world_of
 
 from palpate.errors import InputError
-from palpate.identification import steady_press
+from palpate.identification import steady_press, strokes
 from palpate.identification.contacts import Contacts, contacts_of
 from palpate.identification.options import NAMED, Options
 from palpate.identification.sampling import Channels, channels_of
 
 VALUES: dict[str, tuple[float, ...]] = {
-    "_STROKE": (0.05, 0.1, 0.2, 0.4),
+    "STROKE": (0.05, 0.1, 0.2, 0.4),
     "_ENDS": (0.005, 0.01, 0.02, 0.05, 0.1),
     "_SLOWEST": (0.1, 0.2, 0.4, 0.6, 0.8),
     "_BULGE": (1.1, 1.3, 1.5, 1.8, 3.0),
@@ -110,16 +110,19 @@ def main() -> None:
     others = cases_of(lambda own: shaken(make_log(*own)), [(cell, asked.seed) for cell in cells])
     print(f"{len(presses)} presses, {len(others)} shaken logs, from seed {asked.seed} on")
     for name, values in track(VALUES.items(), "constants", console=Console(stderr=True), transient=True):
-        own = getattr(steady_press, name)
+        modules = [module for module in (strokes, steady_press) if hasattr(module, name)]
+        own = getattr(modules[0], name)
         for value in values:
-            setattr(steady_press, name, value)
+            for module in modules:
+                setattr(module, name, value)
             mark = "*" if np.isclose(value, own) else " "
             (seen, hold), (taken, held) = (count(logs, name == "NEAR") for logs in (presses, others))
             print(
                 f"{mark} {name.strip('_').lower():8} {value:<5g} seen {seen:3d} hold {hold:3d}"
                 f"   taken {taken:3d} hold {held:3d}", flush=True,
             )  # fmt: skip
-        setattr(steady_press, name, own)
+        for module in modules:
+            setattr(module, name, own)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.synthetic_contacts import Array
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.models import Motion
 from palpate.identification.problem import highest_motion
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from identification.problems import problem
 from identification.synthetic_contacts import pressed, record
 from palpate.identification import Verdict, identify
-from palpate.identification.estimators.octaves import segments_of
+from palpate.identification.estimators.octaves import PERIODS, segments_of
 from palpate.identification.evidence.press import evidence_of, press_of
 from palpate.identification.evidence.slope import Loading, slope_of
-from palpate.identification.evidence.spectrum import PERIODS, dynamic_stiffness, working_point
-from palpate.identification.filters.state_variable import low_passed
+from palpate.identification.evidence.spectrum import dynamic_stiffness, working_point
+from palpate.identification.filters import low_passed
 from palpate.identification.options import Lag, Options
 from palpate.identification.result import DynamicStiffness
 from palpate.identification.steady_press import WINDOW, Curve, Slopes, SteadyPress, slopes_at
@@ -160,7 +160,25 @@ def press_path(rise, hold=0.0, depth=2e-3, start=0.5, lead=-0.5e-3):
 
 def press(time, x, force, noise=1e-3, **said):
     asked = problem(record(time, x, force + np.random.default_rng(0).normal(0, noise, len(x))), 0.0, **said)
-    return press_of(asked, 0.0, segments_of(asked.motion.rows, asked.spans))
+    return press_of(asked, None, segments_of(asked.motion.rows, asked.spans))
+
+
+def test_a_press_in_steps_has_slopes_at_the_forces_of_all_of_them():
+    time = np.arange(int(9.0 / DT)) * DT
+    x = np.interp(
+        time,
+        [0.5, 1.0, 3.0, 3.2, 5.0, 5.2, 8.0, 8.5],
+        [-0.5e-3, 1e-3, 1e-3, 1.6e-3, 1.6e-3, 2e-3, 2e-3, -0.5e-3],
+    )
+    depth = np.maximum(x, 0)
+    found = press(time, x, 3000 * depth + 8e8 * depth**3)
+    reached = np.array([own.force for own in found.tangent])
+    at = np.interp(
+        reached, 3000 * depth[: np.argmax(x)] + 8e8 * depth[: np.argmax(x)] ** 3, depth[: np.argmax(x)]
+    )
+    assert reached.min() < 8 < 10 < reached.max()  # the rests are at 3.8 N, at 8.1 N and at 12.4 N
+    for own, truth in zip(found.tangent, 3000 + 2.4e9 * at**2, strict=True):
+        assert abs(own.stiffness - truth) <= own.half < 0.1 * truth
 
 
 def test_of_a_spring_the_press_is_one_line_and_nothing_is_lost():

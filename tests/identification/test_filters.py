@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate.identification.filters.state_variable import ORDER, Chain, low_passed, white_noise
+from palpate.identification.filters import ORDER, Chain, low_passed
 from palpate.signals.low_pass import LowPass
+from palpate.signals.samples import white_noise
 
 CHAIN = Chain(cutoff=60.0, dt=1e-3)
 

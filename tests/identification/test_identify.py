@@ -6,7 +6,7 @@ import pytest
 from identification.synthetic_contacts import coloured, force_of, press_path, pressed, record, shaken
 from palpate.errors import InputError
 from palpate.identification import Verdict, identify
-from palpate.identification.filters.state_variable import low_passed
+from palpate.identification.filters import low_passed
 from palpate.signals.low_pass import LowPass
 
 TIME = np.arange(6000) / 1000

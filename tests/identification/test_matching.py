@@ -9,7 +9,7 @@ from identification.problems import problem
 from identification.sensor_logs import SAMPLING, TRUTH, log, press_and_chirp, rig, sensor_log
 from palpate.errors import InputError
 from palpate.identification.estimators.fit import Descent, fit
-from palpate.identification.filters.sensor_path import SensorPath
+from palpate.identification.filters import SensorPath
 from palpate.identification.models import KELVIN_VOIGT_MASS
 from palpate.identification.options import USUAL_LAG, USUAL_LAG_STD, Lag
 from palpate.identification.sample_clock import sample_clock_of

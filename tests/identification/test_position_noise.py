@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, position_noise
+from palpate.identification.filters import NOISELESS, PositionNoise, position_noise
 from palpate.signals.samples import quantise
 
 SAMPLES = 6000

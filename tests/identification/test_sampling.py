@@ -10,7 +10,6 @@ from palpate.errors import InputError
 from palpate.identification import identify
 from palpate.identification.sample_clock import past_end
 from palpate.identification.sampling import channels_of, last_digit
-from palpate.identification.steady_press import strokes_of
 
 
 def test_a_jump_of_the_time_that_would_fill_the_memory_is_refused():
@@ -55,14 +54,6 @@ def test_spikes_of_one_row_are_bridged_and_noise_and_edges_stay():
     steps = np.where(np.arange(len(log)) % 500 < 250, 0.0, 10.0) + rng.normal(0, 0.02, len(log))
     for clean in (force, steps, np.round(force, 1)):
         assert not channels_of(record(log["time"], log["position"], clean)).warnings
-
-
-def test_a_stroke_begins_where_the_probe_last_rested():
-    time = np.arange(5000) / 1000
-    position = np.interp(time, [0.0, 0.5, 1.5, 3.0, 5.0], [0.0, 0.3e-3, 0.3e-3, 2e-3, 0.0])
-    advance, retreat = strokes_of(channels_of(record(time, position, 3000 * position)))
-    assert 1.45 < advance.begin < 1.6
-    assert 2.9 < advance.end < 3.0 < retreat.begin < 3.1
 
 
 def test_a_position_at_the_end_of_its_sensor_carries_no_stiffness():

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import NOISELESS, Chain, PositionNoise, SensorPath
 from palpate.signals.low_pass import LowPass
 
 DT = 1e-3

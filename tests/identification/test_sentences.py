@@ -19,7 +19,7 @@ from foreign.scoring import record_of
 from palpate.errors import InputError
 from palpate.identification import Identification, Parameter, Verdict, identify
 from palpate.identification.sampling import channels_of
-from palpate.identification.steady_press import strokes_of
+from palpate.identification.strokes import strokes_of
 from palpate.logs import read_log
 from palpate.report.identification.answer import lines
 from palpate.report.identification.words import UNTOUCHED, full_number, sentence

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.models import Motion
 from palpate.identification.options import Lag
 from palpate.identification.problem import Memory, Problem, touching

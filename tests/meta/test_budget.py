@@ -20,7 +20,7 @@ class Weight(NamedTuple):
 ROOM = 1.01
 """Of a figure, for what several people add on the same day."""
 LARGEST = {
-    "src/palpate": Weight(files=250, lines=49439, tokens=340329),
+    "src/palpate": Weight(files=249, lines=49439, tokens=340329),
     "packages/palpate-bags/src/palpate_bags": Weight(files=5, lines=1348, tokens=9289),
     "packages/palpate-benchmark/src/palpate_benchmark": Weight(files=13, lines=1926, tokens=12559),
     "packages/palpate-thesis/src/palpate_thesis": Weight(files=56, lines=9498, tokens=78900),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.report.identification.spectra import (
     leaving,
     over_noise,

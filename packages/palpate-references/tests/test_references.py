@@ -20,7 +20,10 @@ def test_there_are_forty_logs_and_more_of_every_model():
     assert {p.level for p in KNOWN} == {"easy", "average", "hard"}
 
 
-@pytest.mark.parametrize("problem", KNOWN[::9], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "problem",
+    [pytest.param(p, id=p.name, marks=pytest.mark.long if p.law.nonlinear else ()) for p in KNOWN[::9]],
+)
 def test_a_certificate_is_made_again_to_its_last_digit(problem):
     assert certify(problem) == problem
 

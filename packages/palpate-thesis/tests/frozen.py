@@ -2,6 +2,7 @@
 
 `make claims` takes a whole measurement of `palpate thesis` into runs/claims, and
 `python packages/palpate-thesis/tests/frozen.py runs/claims` compares and keeps it; of some figures alone, those.
+Studies that take long are kept with two seeds, too: tests repeat these, and leave the other seeds to `make claims`.
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from palpate_thesis.claims import ThesisClaim
-from palpate_thesis.figure import studies
+from palpate_thesis.figure import studies, study
 from palpate_thesis.measure import STATE
+from palpate_thesis.runs import Runs
 
 FILE = Path(__file__).with_name("claims.json")
+FEW = Path(__file__).with_name("claims_of_two_seeds.json")
+"""The studies that take longest, with the first two seeds alone: what the tests repeat of them."""
 NUMBER = r"[-±]?\d+(?:\.\d+)?(?:e[-+]\d+)?"
 SPREAD = re.compile(
     rf"(?P<middle>{NUMBER})(?P<unit>[^()\d]*) \((?P<low>{NUMBER}) to (?P<high>{NUMBER}), (?P<of>\d+ seeds[^)]*)\)"
@@ -67,16 +71,20 @@ def differences(before: Mapping[str, str], claims: Sequence[ThesisClaim]) -> Ite
             yield f"{name} was {before[name]!r}, and is {now[name]!r}"
 
 
-def kept() -> dict[str, dict[str, str]]:
+def kept(file: Path = FILE) -> dict[str, dict[str, str]]:
     """By study and claim, what became of it."""
-    return json.loads(FILE.read_text("utf-8"))
+    return json.loads(file.read_text("utf-8"))
 
 
-def main(folder: str) -> None:
+def of_two_seeds(number: str) -> list[ThesisClaim]:
+    """The claims of a study, measured with the first two seeds."""
+    one = study(number)
+    return list(one.check(one.run(Runs(range(2)))))
+
+
+def keep(file: Path, measured: Mapping[str, Sequence[ThesisClaim]]) -> None:
     """Keep a measurement, and say what is not what it was."""
-    done = json.loads((Path(folder) / STATE).read_text("utf-8"))["done"]
-    measured = {number: [ThesisClaim(**claim) for claim in one["claims"]] for number, one in done.items()}
-    before = kept()
+    before = kept(file)
     for number, claims in measured.items():
         for line in differences(before.get(number, {}), claims):
             sys.stdout.write(f"{line}\n")
@@ -84,7 +92,14 @@ def main(folder: str) -> None:
         number: {claim.id: told(claim) for claim in claims} for number, claims in measured.items()
     }
     kept_now = {one.NUMBER: new[one.NUMBER] for one in studies() if one.NUMBER in new}
-    FILE.write_text(json.dumps(kept_now, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    file.write_text(json.dumps(kept_now, indent=1, ensure_ascii=False) + "\n", "utf-8")
+
+
+def main(folder: str) -> None:
+    """Keep a measurement of all seeds, and measure and keep what the tests repeat of it."""
+    done = json.loads((Path(folder) / STATE).read_text("utf-8"))["done"]
+    keep(FILE, {number: [ThesisClaim(**claim) for claim in one["claims"]] for number, one in done.items()})
+    keep(FEW, {number: of_two_seeds(number) for number in kept(FEW) if number in done})
 
 
 if __name__ == "__main__":

@@ -8,16 +8,9 @@ from typing import Any, NamedTuple
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Vec3, solve
+from palpate.bench import force_input
 from palpate.bench.estimators import Estimators, EstimatorsState
-from palpate.bench.force_input import (
-    Conditioning,
-    ConditioningState,
-    ForceInput,
-    ForceInputState,
-    Sequence,
-    SequenceState,
-    put,
-)
+from palpate.bench.force_input import put
 from palpate.bench.summary import CONTACT
 from palpate.controllers.resolved_acceleration import ResolvedAcceleration
 from palpate.environments.stick_slip import StickSlip, StickSlipState
@@ -205,10 +198,10 @@ class Loop(NamedTuple):
     start: Vec3
     plant: Plant
     encoder: Encoder
-    force: ForceInput
+    force: force_input.ForceInput
     output: Converter
-    conditioning: Conditioning
-    sequence: Sequence
+    conditioning: force_input.Conditioning
+    sequence: force_input.Sequence
     schedule: ForceSchedule
     approach: ResolvedAcceleration
     controller: Any
@@ -222,9 +215,9 @@ class Loop(NamedTuple):
 class LoopState(NamedTuple):
     plant: PlantState
     felt: SurfaceTouch  # during the step before this tick
-    force: ForceInputState
-    conditioning: ConditioningState
-    sequence: SequenceState
+    force: force_input.ForceInputState
+    conditioning: force_input.ConditioningState
+    sequence: force_input.SequenceState
     approach: float
     controller: Any
     estimators: EstimatorsState

@@ -65,12 +65,17 @@ class OneLog:
     def identification_along(self, log: Path) -> tuple[Identification, Record, Source]:
         """The same, with the force and the position along the normal."""
         from palpate.contact_frame.arm import describe
-        from palpate.report.identification.words import Source, sha256_of
+        from palpate.report.identification.words import sha256_of
 
         found, along = self.identifier.identify(log)
+        return found, along, self.source_of(log, sha256=sha256_of(log), notes=tuple(describe(along.meta)))
+
+    def source_of(self, log: Path, **known: Any) -> Source:
+        """Where an identification is from: a log, these options, this command, now."""
+        from palpate.report.identification.words import Source
+
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        notes = tuple(describe(along.meta))
-        return found, along, Source(str(log), self.options, sha256_of(log), command(), made=now, notes=notes)
+        return Source(str(log), self.options, command=command(), made=now, **known)
 
     @property
     def identifier(self) -> LogIdentifier:
@@ -105,14 +110,23 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
+@dataclass(frozen=True)
+class _OutputFiles:
+    """Paths of the files of an identification, None for those not wanted, and the figure's dots per inch."""
+
+    figure: Path | None
+    page: Path | None
+    table: Path | None
+    dpi: int | None
+
+    @property
+    def wanted(self) -> list[Path]:
+        """Paths of those that are written."""
+        return [path for path in (self.figure, self.page, self.table) if path is not None]
+
+
 def many(
-    logs: Sequence[Path],
-    asked: OneLog,
-    covariates: Mapping[str, Array],
-    files: tuple[Path | None, Path | None, Path | None],
-    *,
-    json: bool,
-    dpi: int | None = None,
+    logs: Sequence[Path], asked: OneLog, covariates: Mapping[str, Array], files: _OutputFiles, *, json: bool
 ) -> int:
     """Identify many logs, and print a row for each and the pooled result.
 
@@ -123,9 +137,8 @@ def many(
         logs: paths of them.
         asked: options that are common to all.
         covariates: one number of each log, by name.
-        files: paths of figure, page and table, None for those not wanted.
+        files: to be written.
         json: whether the result is printed as JSON.
-        dpi: of the figure.
 
     Returns:
         0 if a number is identified; 1 if none is; 130 if it was interrupted.
@@ -149,7 +162,8 @@ def many(
     if rows:
         from palpate.report.many.table import answer_of
 
-        written = [(f"{kind_of(path)}:", path) for path in _write(rows, pooled, files, dpi)]
+        _write(rows, pooled, files)
+        written = [(f"{kind_of(path)}:", path) for path in files.wanted]
         print_result(answer_of(rows, pooled), json=json, files=written)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
@@ -172,15 +186,12 @@ def _rows(logs: Sequence[Path], asked: OneLog) -> list[LogRow]:
 
 
 def _row(log: Path, asked: OneLog) -> LogRow:
-    from palpate.report.identification.words import Source
     from palpate.report.many.table import LogRow
 
     try:
         found, source = asked.identification(log)
     except (PalpateError, OSError, MemoryError) as error:
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        source = Source(str(log), asked.options, command=command(), made=now)
-        return LogRow(source, None, " ".join((str(error) or type(error).__name__).split()))
+        return LogRow(asked.source_of(log), None, " ".join((str(error) or type(error).__name__).split()))
     return LogRow(source, _light(found))
 
 
@@ -195,26 +206,19 @@ def _light(found: Identification) -> Identification:
     return replace(found, traces=traces, estimate=None)
 
 
-def _write(
-    rows: Sequence[LogRow],
-    pooled: Pooled,
-    files: tuple[Path | None, Path | None, Path | None],
-    dpi: int | None,
-) -> list[Path]:
-    figure, page, table = files
-    if figure is not None:
+def _write(rows: Sequence[LogRow], pooled: Pooled, files: _OutputFiles) -> None:
+    if files.figure is not None:
         from palpate.report.many.page import write_figure
 
-        write_figure(rows, pooled, figure, dpi)
-    if page is not None:
+        write_figure(rows, pooled, files.figure, files.dpi)
+    if files.page is not None:
         from palpate.report.many.page import page_of_logs as page_of
 
-        write_text(page, page_of(rows, pooled))
-    if table is not None:
+        write_text(files.page, page_of(rows, pooled))
+    if files.table is not None:
         from palpate.report.many.table import write_table
 
-        write_table(rows, pooled, table)
-    return [path for path in files if path is not None]
+        write_table(rows, pooled, files.table)
 
 
 @options(WRITTEN)
@@ -250,6 +254,10 @@ class IdentifyOutput(PictureOptions):
 
         check_dpi(self.dpi)
         return self.picture(f"{name}.identify.png", FORMATS)
+
+    def files(self, name: str) -> _OutputFiles:
+        """Files of the log, or the logs, of a name; checked before any work is done."""
+        return _OutputFiles(self.png(name), self.page(), self.paper_table(), self.dpi)
 
 
 @options("Several logs", 5)
@@ -341,33 +349,31 @@ def _identify(logs: tuple[Path, ...], asked: OneLog, beside: CovariateOptions, o
         return _one(formats.log_of(logs[0]), asked, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")
-    figure, page, table = output.png("pooled"), output.page(), output.paper_table()
-    logs = formats.gather_logs(logs)
-    known = beside.of(logs, asked.source)
-    return many(logs, asked, known, (figure, page, table), json=output.json, dpi=output.dpi)
+    files, logs = output.files("pooled"), formats.gather_logs(logs)
+    return many(logs, asked, beside.of(logs, asked.source), files, json=output.json)
 
 
 def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
-    figure, page, table = output.png(log.stem), output.page(), output.paper_table()
+    files = output.files(log.stem)
     found, origin = asked.identification(log)
     if found.traces is None:
-        figure = None
-    if figure is not None:
+        files = replace(files, figure=None)
+    if files.figure is not None:
         from palpate.report.identification.figure import write_figure
 
-        write_figure(found, figure, title=log.name, dpi=output.dpi)
-    if page is not None:
+        write_figure(found, files.figure, title=log.name, dpi=files.dpi)
+    if files.page is not None:
         from palpate.report.identification.page import page as page_of
 
-        write_text(page, page_of(found, origin))
-    if table is not None:
+        write_text(files.page, page_of(found, origin))
+    if files.table is not None:
         from palpate.report.many.table import LogRow, write_table
 
-        write_table([LogRow(origin, found)], None, table)
+        write_table([LogRow(origin, found)], None, files.table)
     from palpate.report.identification.answer import answer_of
 
     more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
-    written = [f"{kind_of(path)}: {path}" for path in (figure, page, table) if path is not None]
+    written = [f"{kind_of(path)}: {path}" for path in files.wanted]
     answer = answer_of(found, origin, written, more, verbose=output.verbose, budget=output.budget)
     print_result(answer, json=output.json)
     return 0 if has_number(found) else 1

@@ -148,14 +148,12 @@ def _draw(
         return
     from palpate.report.identification.words import sha256_of
     from palpate.report.run.figures import draw
-    from palpate.report.run.page import run_page
+    from palpate.report.run.page import film, run_page
 
     draw(record, folder, drawn.endings, drawn.dpi)
     page = run_page(record, summary, found, source, sha256_of(folder / RECORD))
     write_text(folder / "report.html", page)
     if len(record) > 1:
-        from palpate.report.run.page import film
-
         write_text(folder / "film.svg", film(record))
 
 

@@ -11,13 +11,7 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.contact_frame import free_motion
 from palpate.contact_frame.load import MATTERS, Normal, direction_of, load_of, scale_std, turns
-from palpate.contact_frame.signals_in_base import (
-    BaseSignals,
-    ContactFrame,
-    Unloaded,
-    in_range,
-    signals_of,
-)
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, Unloaded, in_range, signals_of
 from palpate.errors import InputError
 from palpate.identification import Identification, Verdict
 from palpate.records import Record

@@ -1,7 +1,5 @@
 """From a record to an Identification: contacts found, channels matched, models fitted and compared, verdicts given."""
 
-from __future__ import annotations
-
 from palpate.identification.causes import Code, Warn
 from palpate.identification.pipeline import identify
 from palpate.identification.pooling import Pooled, pool

@@ -1,7 +1,5 @@
 """The causes of an interval: each with its description, and with a measurement that makes it narrower."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple

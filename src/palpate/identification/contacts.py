@@ -1,7 +1,5 @@
 """Where in a log the probe touches the surface, and which way each channel counts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,12 +7,13 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.identification.causes import BRIEF, Code, Warn
-from palpate.identification.filters.state_variable import FASTEST, Chain, block_means, choose_cutoff
+from palpate.identification.filters import FASTEST, Chain, choose_cutoff
 from palpate.identification.free_motion import FLAT, Drift, FreeMotion, MovingMass, free_motion_of, payload_of
 from palpate.identification.options import NOTHING_SAID, Options, lag_prior
 from palpate.identification.sampling import Channels, thinned
-from palpate.identification.steady_press import SteadyPress, Stroke, steady_press, strokes_of
-from palpate.signals.samples import GAUSSIAN, detrend, runs
+from palpate.identification.steady_press import SteadyPress, steady_press
+from palpate.identification.strokes import Stroke, strokes_of
+from palpate.signals.samples import GAUSSIAN, block_means, detrend, runs
 
 ONSET = 0.05
 """Share of the peak force above rest at which contact is counted."""

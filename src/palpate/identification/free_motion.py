@@ -1,22 +1,17 @@
 """Where the probe is in free motion: at one end of its range the position travels, and the force does not follow."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
-from palpate.identification.filters.sensor_path import position_noise
-from palpate.identification.filters.state_variable import Chain, block_means, white_noise
+from palpate.arrays import Array, Indices, Mask
+from palpate.identification.filters import Chain, position_noise
 from palpate.identification.least_squares import noise_of
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
-from palpate.signals.samples import GAUSSIAN, runs
+from palpate.signals.samples import GAUSSIAN, block_means, runs, white_noise
 from palpate.signals.types import NORMAL
 
 FLAT = 0.4
@@ -104,54 +99,80 @@ class FreeMotion:
 def free_motion_of(
     force: Array, position: Array, ends: tuple[float, float], *, none: bool = True
 ) -> FreeMotion | None:
-    """The air of a log; None if the force goes with the position at both ends of the position's range, or at neither.
+    """The free motion of a log; None if the force goes with the position at both ends of its range, or at neither.
 
     The slope of force over position, with its interval under coloured noise, is not above none (that of an inertia is
     below, and may do where `none` is not asked for) and far below that of the contact. Rows are chosen by position:
     chosen by force, they would follow its noise. Both are as they stand in the log, shape (n,): behind a filter a fast
     touch is a slow one. The ends are of the force's range, outliers left aside [N].
     """
-    from scipy.special import chdtri
-
     size = max(len(force) // _MOST, 1)
     force, position = block_means(force, size), block_means(position, size)
-    slope, white = _in_contact(force, position, ends), white_noise(position)
+    search = _Search(force, position, _in_contact(force, position, ends), white_noise(position), none)
+    shares = [0.0, 0.0]
+    for bound in (np.inf, _OUTLYING):
+        if search.slope and not any(shares):
+            shares = [search.share_from(way, bound) for way in (1.0, -1.0)]
+    if max(shares) == 0 or max(shares) < _TWICE * min(shares):
+        return None
+    return _beyond(force, position, 1.0 if shares[0] >= shares[1] else -1.0, max(shares), size)
 
-    @cache
-    def slope_at(way: float, share: float, bound: float) -> tuple[float, float] | None:
-        """Slope over a share of the position's range from its lower (1) or upper (-1) end, and its half-width."""
-        stays = _stays_in(way * position < _limit(way * position, share))
-        return _slope(force, position, stays, white, bound) if stays else None
 
-    def share_of(way: float, bound: float) -> float:
-        """The largest share over which the force stays: its slope is clearly below that of the contact.
+@dataclass(frozen=True)
+class _Search:
+    """Search for free motion from both ends of the position's range.
 
-        It is so over that share or over the next larger one, which may hold a touch.
-        That of an inertia is held against the steepest that an interval leaves at either end: it is in the force over
-        the whole range, and takes from the contact's.
+    Args:
+        force, position: shape (n,) [N], [m].
+        slope: of force over position in contact [N/m].
+        white: deviation of the position's noise [m].
+        none: whether a slope below none will not do.
+    """
+
+    force: Array
+    position: Array
+    slope: float
+    white: float
+    none: bool
+    _slopes: dict[tuple[float, float, float], tuple[float, float] | None] = field(default_factory=dict)
+
+    def share_from(self, way: float, bound: float) -> float:
+        """The largest share from the lower (1) or upper (-1) end in which the force stays; 0 if there is none.
+
+        Its slope is clearly below that of the contact. It is so over that share or over the next larger one, which may
+        hold a touch. That of an inertia is held against the steepest that an interval leaves at either end: it is in
+        the force over the whole range, and takes from the contact's.
         """
         clear = False
         for share in _SHARES:
-            if (found := slope_at(way, share, bound)) is None:
+            if (found := self._slope_over(way, share, bound)) is None:
                 continue
-            own, half = float(np.sign(slope)) * found[0], found[1]
-            before, clear = clear, own + half < FLAT * abs(slope)
-            if not (clear or before) or (none and own > half):
+            own, half = float(np.sign(self.slope)) * found[0], found[1]
+            before, clear = clear, own + half < FLAT * abs(self.slope)
+            if not (clear or before) or (self.none and own > half):
                 continue
-            least = abs(own - half if none else own)
-            every = (slope_at(end, other, np.inf) for end in (1.0, -1.0) for other in _SHARES)
-            if least < FLAT * abs(slope) or any(least < FLAT * (abs(k) - h) for k, h in filter(None, every)):
-                return float(share) * _quiet(force, way * position, share)
+            least = abs(own - half if self.none else own)
+            every = (self._slope_over(end, other, np.inf) for end in (1.0, -1.0) for other in _SHARES)
+            steepest = (abs(k) - h for k, h in filter(None, every))
+            if least < FLAT * abs(self.slope) or any(least < FLAT * steep for steep in steepest):
+                return float(share) * _quiet(self.force, way * self.position, share)
         return 0.0
 
-    found = [0.0, 0.0]
-    for bound in (np.inf, _OUTLYING):
-        if slope and not any(found):
-            found = [share_of(way, bound) for way in (1.0, -1.0)]
-    way = 1.0 if found[0] >= found[1] else -1.0
-    if max(found) == 0 or max(found) < _TWICE * min(found):
-        return None
-    limit = _limit(way * position, max(found))
+    def _slope_over(self, way: float, share: float, bound: float) -> tuple[float, float] | None:
+        """Slope over a share of the position's range from an end, and its half-width; None if none is seen."""
+        question = way, share, bound
+        if question not in self._slopes:
+            stays = _stays_in(way * self.position < _limit(way * self.position, share))
+            found = _slope(self.force, self.position, stays, self.white, bound) if stays else None
+            self._slopes[question] = found
+        return self._slopes[question]
+
+
+def _beyond(force: Array, position: Array, way: float, share: float, size: int) -> FreeMotion:
+    """Free motion over a share of the position's range; of means of so many rows of the log."""
+    from scipy.special import chdtri
+
+    limit = _limit(way * position, share)
     stays = _stays_in(way * position < limit)
     middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
     rows, stay = _rows_of(stays)
@@ -195,13 +216,13 @@ def _stays_in(inside: Mask) -> list[tuple[int, int]]:
     return [(a, b) for a, b in runs(inside) if b - a >= _FEWEST]
 
 
-def _rows_of(stays: list[tuple[int, int]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _rows_of(stays: list[tuple[int, int]]) -> tuple[Indices, Indices]:
     """Rows of all stays, and the number of each one's stay."""
     rows = [np.arange(a, b) for a, b in stays]
     return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(own) for own in rows])
 
 
-def _medians(values: Array, number: NDArray[np.intp]) -> Array:
+def _medians(values: Array, number: Indices) -> Array:
     """Of the values of each number, which only grows."""
     ordered = [np.sort(own) for own in np.split(values, np.flatnonzero(np.diff(number)) + 1)]
     return np.array([(own[(len(own) - 1) // 2] + own[len(own) // 2]) / 2 for own in ordered])

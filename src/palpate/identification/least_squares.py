@@ -1,13 +1,10 @@
 """Least squares whose intervals stay honest when the noise is coloured."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 
 _LONGEST = 20_000  # lags of the autocovariance that are ever looked at
 
@@ -43,7 +40,7 @@ def solve(columns: Array, target: Array) -> Array:
     return np.linalg.solve(gram, (columns.T @ target) / scale) / scale
 
 
-def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Noise:
+def noise_of(residuals: Array, place: Indices, parameters: int) -> Noise:
     """Measure the colour of the noise from residuals at the rows `place` of an even grid, both of shape (n,).
 
     The autocovariance is tapered (Parzen), which keeps it a valid one, over eight times the residuals' own correlation
@@ -69,7 +66,7 @@ def noise_of(residuals: Array, place: NDArray[np.intp], parameters: int) -> Nois
     return Noise(curve * effective / (effective - parameters), effective, variance)
 
 
-def covariance(columns: Array, place: NDArray[np.intp], noise: Noise, prior: Array | None = None) -> Array:
+def covariance(columns: Array, place: Indices, noise: Noise, prior: Array | None = None) -> Array:
     """Covariance of the least-squares answer under coloured noise, shape (p, p).
 
     (A + L)^-1 (Phi' Gamma Phi + prior part) (A + L)^-1 with A = Phi' Phi: the sandwich with the noise's own Gamma. Phi,
@@ -123,7 +120,7 @@ def solved(normal: Array, right: Array) -> tuple[Array, Array]:
     return theta, wide
 
 
-def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
+def _closed_up(place: Indices) -> Indices:
     """Rows counted in steps of the finest spacing between them, so that a thinned grid has no holes.
 
     Nor gaps longer than any lag that is looked at.
@@ -133,7 +130,7 @@ def _closed_up(place: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.asarray(np.r_[0, np.cumsum(np.minimum(jumps // step, _LONGEST + 1))])
 
 
-def _spread(values: Array, place: NDArray[np.intp]) -> Array:
+def _spread(values: Array, place: Indices) -> Array:
     first = int(place[0])
     line = np.zeros(int(place[-1]) - first + 1)
     line[place - first] = values
@@ -146,7 +143,7 @@ def _autocorrelation(line: Array, count: int) -> Array:
     return np.fft.irfft(power, size)[:count]
 
 
-def _smooth(columns: Array, place: NDArray[np.intp], autocovariance: Array) -> Array:
+def _smooth(columns: Array, place: Indices, autocovariance: Array) -> Array:
     """Gamma times each column."""
     from scipy.signal import oaconvolve
 

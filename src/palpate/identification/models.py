@@ -1,18 +1,14 @@
 """The contact models that are fitted and compared. Each turns a position into the columns of a regression."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from math import isqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
-from palpate.identification.filters.sensor_path import NOISELESS, PositionNoise, SensorPath
-from palpate.identification.filters.state_variable import Chain, low_passed
+from palpate.arrays import Array, Indices, Mask
+from palpate.identification.filters import NOISELESS, Chain, PositionNoise, SensorPath, low_passed
 from palpate.signals.low_pass import LowPass
 
 
@@ -32,7 +28,7 @@ class Motion:
 
     chain: Chain | SensorPath
     position: Array
-    rows: NDArray[np.intp]
+    rows: Indices
     bonded: bool
     noise: PositionNoise = NOISELESS
     free: Array | None = None
@@ -53,7 +49,7 @@ class Motion:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain.read(signal, derivative, lag, self.rows)
 
-    def through(self, change: Callable[[Array], Array]) -> Motion:
+    def through(self, change: Callable[[Array], Array]) -> "Motion":
         """The same with its signals changed, of shape (n,) each."""
         free, touched = (own if own is None else change(own) for own in (self.free, self.touched))
         return replace(self, position=change(self.position), free=free, touched=touched, _kept={}, _turned={})

@@ -1,39 +1,54 @@
 """From a record to an Identification: the stages one after the other."""
 
-from __future__ import annotations
-
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from palpate.identification.causes import Code, Warn
-from palpate.identification.contacts import contacts_of
+from palpate.identification.contacts import Contacts, contacts_of
 from palpate.identification.estimators.fit import Descent, Fit, fit
 from palpate.identification.estimators.linearisation import lag_open
 from palpate.identification.evidence import evidence_of
-from palpate.identification.filters.state_variable import Chain, block_means
+from palpate.identification.filters import Chain
 from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem, problem_of, with_fewer_rows
-from palpate.identification.result import (
-    Identification,
-    LagFound,
-    Press,
-    Traces,
-    WorkingPoint,
-)
+from palpate.identification.result import Identification, LagFound, Press, Traces, WorkingPoint
 from palpate.identification.sampling import Channels, channels_of, thinned
 from palpate.identification.selection import Choice, choose
 from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
 from palpate.identification.verdicts import Units, verdicts
 from palpate.records import Record
 from palpate.signals import Estimate
+from palpate.signals.samples import block_means
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
 _MOST_SAMPLES = 2_000_000
 _FOLLOWS = 0.3
+
+
+@dataclass(frozen=True)
+class _PreparedLog:
+    """A log that is being identified.
+
+    Args:
+        channels: position and force.
+        chain: the filter of both.
+        options: as given.
+        units: of the record's columns, by name.
+    """
+
+    channels: Channels
+    chain: Chain
+    options: Options
+    units: Units
+
+    @property
+    def impedance_units(self) -> dict[str, str]:
+        """Units of K, B and M."""
+        return impedance_units(self.units["force"], self.units["position"])
 
 
 def identify(record: Record, **given: Any) -> Identification:
@@ -54,9 +69,9 @@ def identify(record: Record, **given: Any) -> Identification:
     options.check_lag(len(channels.position) * channels.dt)
     channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
-    warnings = (*channels.warnings, *contacts.warnings)
+    log, warnings = _PreparedLog(channels, chain, options, units), (*channels.warnings, *contacts.warnings)
     if not contacts.spans:
-        return _nothing(channels, chain, options, units, warnings)
+        return _nothing(log, warnings)
     problem = with_fewer_rows(problem_of(channels, chain, contacts, options))
     choice = choose(problem, options)
     problem, fitted = choice.problem, choice.answer.fit
@@ -64,10 +79,10 @@ def identify(record: Record, **given: Any) -> Identification:
     if not (contacts.clear or options.bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
-        return _nothing(channels, chain, options, units, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
+        return _nothing(log, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
     searched = {own.name: fitted[own.name] for own in fitted.model.nonlinear}
     holds = fit(Descent(fitted.model, problem.motion, problem.force, fitted.lag), searched, problem.lag)
-    return _outcome(channels, chain, choice, holds, warnings, options, units)
+    return _outcome(log, choice, holds, warnings)
 
 
 _SOFTEST, _STIFFEST = 1.0, 1e8
@@ -79,43 +94,27 @@ _NARROWER = 0.5
 """Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
-def _outcome(
-    channels: Channels,
-    chain: Chain,
-    choice: Choice,
-    holds: Fit,
-    warnings: tuple[Warn, ...],
-    options: Options,
-    units: Units,
-) -> Identification:
+def _outcome(log: _PreparedLog, choice: Choice, holds: Fit, warnings: tuple[Warn, ...]) -> Identification:
     """Identification from the fit: its evidence, and the verdicts that rest on both."""
-    problem, unit = choice.problem, impedance_units(units["force"], units["position"])["K"]
+    problem, options, unit = choice.problem, log.options, log.impedance_units["K"]
     spectrum, press, point = evidence_of(problem, options, unit, choice.answer)
-    series, payload = SeriesSpring.of(options), problem.contacts.payload
-    if series is not None:
-        choice = replace(choice, answer=series.parameters(choice.answer, problem.band))
-        holds = series.parameters(holds, problem.band)
-    if payload is not None:
-        weighed = np.where(np.array(choice.answer.names) == "M", payload.std, 0.0)
-        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
-    parameters, told = verdicts(choice, holds, point, options, units)
+    choice, holds = _of_surface(choice, holds, options)
+    parameters, told = verdicts(choice, holds, point, options, log.units)
     warnings, found = (*warnings, *told), choice.answer
     mass, name = parameters.get("M"), found.fit.model.name
     massless = options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
-    delay = 0.0 if problem.contacts.bonded else chain.delay
-    ends = ((channels.start + i * channels.dt - delay for i in span) for span in problem.contacts.spans)
     return Identification(
         model="kelvin-voigt" if massless and name == "kelvin-voigt-mass" else name,
         parameters=parameters,
-        contacts=tuple((max(float(begin), channels.start), float(end)) for begin, end in ends),
+        contacts=_contact_times(log, problem.contacts),
         lag=_lag(choice),
         r2=max(found.fit.r2, 0.0),
         rmse=found.fit.rmse,
         n=len(problem.force),
-        warnings=(*warnings, *_doubts(parameters, press, problem, warnings, options, units)),
+        warnings=(*warnings, *_doubts(log, parameters, press, problem, warnings)),
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
-        traces=_traces(channels, chain, choice, units),
+        traces=_traces(log, choice),
         estimate=Estimate(holds.names, holds.theta, holds.cov, holds.effective),
         working_point=point,
         dynamic_stiffness=spectrum,
@@ -127,19 +126,35 @@ def _outcome(
     )
 
 
-def _nothing(
-    channels: Channels, chain: Chain, options: Options, units: Units, warnings: tuple[Warn, ...]
-) -> Identification:
+def _of_surface(choice: Choice, holds: Fit, options: Options) -> tuple[Choice, Fit]:
+    """The surface alone: without the spring in series with it, and as uncertain as the tool's weighed inertia."""
+    series, payload, band = SeriesSpring.of(options), choice.problem.contacts.payload, choice.problem.band
+    if series is not None:
+        choice = replace(choice, answer=series.parameters(choice.answer, band))
+        holds = series.parameters(holds, band)
+    if payload is not None:
+        weighed = np.where(np.array(choice.answer.names) == "M", payload.std, 0.0)
+        choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
+    return choice, holds
+
+
+def _contact_times(log: _PreparedLog, contacts: Contacts) -> tuple[tuple[float, float], ...]:
+    """Begin and end of each contact on the log's clock [s]."""
+    start, delay = log.channels.start, 0.0 if contacts.bonded else log.chain.delay
+    ends = ((start + i * log.channels.dt - delay for i in span) for span in contacts.spans)
+    return tuple((max(float(begin), start), float(end)) for begin, end in ends)
+
+
+def _nothing(log: _PreparedLog, warnings: tuple[Warn, ...]) -> Identification:
     """There is no contact: every parameter without a number, and the force, which says why."""
     reason, nan = "there is no contact in this log", float("nan")
-    every = impedance_units(units["force"], units["position"]).items()
     return Identification(
-        options.model or "kelvin-voigt",
-        {name: Parameter.unknown(unit, reason) for name, unit in every},
+        log.options.model or "kelvin-voigt",
+        {name: Parameter.unknown(unit, reason) for name, unit in log.impedance_units.items()},
         (), None, nan, nan, 0, warnings,
-        cutoff=chain.cutoff,
-        traces=_traces(channels, chain, None, units),
-        options=_plain_options(options),
+        cutoff=log.chain.cutoff,
+        traces=_traces(log, None),
+        options=_plain_options(log.options),
     )  # fmt: skip
 
 
@@ -189,12 +204,11 @@ def _lag(choice: Choice) -> LagFound | None:
 
 
 def _doubts(
+    log: _PreparedLog,
     parameters: dict[str, Parameter],
     press: Press | None,
     problem: Problem,
     warnings: tuple[Warn, ...],
-    options: Options,
-    units: Units,
 ) -> list[Warn]:
     """The lag that the work of the presses tells, where it is beyond an assumed prior's bound; unlikely numbers."""
     found, prior, late = [], problem.lag, press.late if press else None
@@ -210,20 +224,21 @@ def _doubts(
         off = "is a unit off, as by a factor of 1000?"
         text = f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: {off}"
         found.append(Warn(Code.UNIT_DOUBTFUL, text))
-    series = options.series_stiffness
+    series = log.options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
         beside = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it"
         text = f"{beside}: K depends on that calibration"
         found.append(Warn(Code.SERIES_COMPLIANCE, text))
     deep = float(np.ptp(problem.motion.position[problem.in_contact]))
-    if units["position"] == "m" and deep > _DEEPEST:
+    if log.units["position"] == "m" and deep > _DEEPEST:
         text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
         found.append(Warn(Code.UNIT_DOUBTFUL, text))
     return found
 
 
-def _traces(channels: Channels, chain: Chain, choice: Choice | None, units: Units) -> Traces:
+def _traces(log: _PreparedLog, choice: Choice | None) -> Traces:
     """Signals and fit to be drawn; of a log in which nothing is touched, the force alone."""
+    channels, chain, units = log.channels, log.chain, log.units
     step, both = max(len(channels.position) // _SHOWN, 1), (units["position"], units["force"])
     time = (channels.time - chain.delay)[::step]
     if choice is None:

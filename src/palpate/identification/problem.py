@@ -13,35 +13,26 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 from palpate.errors import InputError
+from palpate.identification import filters
 from palpate.identification.causes import Code
 from palpate.identification.contacts import Contacts
-from palpate.identification.filters.sensor_path import PositionNoise, SensorPath, noise_within, position_noise
-from palpate.identification.filters.state_variable import (
-    ABOVE_FLOOR,
-    FEWEST_SEGMENT,
-    Chain,
-    low_passed,
-    white_noise,
-)
+from palpate.identification.filters import Chain, PositionNoise, SensorPath
 from palpate.identification.models import Motion
 from palpate.identification.options import Lag, Options, lag_prior
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.identification.sampling import Channels
 from palpate.signals.low_pass import LowPass
-from palpate.signals.samples import periodogram, runs
-
-Rows = NDArray[np.intp]
+from palpate.signals.samples import periodogram, runs, white_noise
 
 FREE_ROWS = 64
 """Rows of a stretch out of contact below which it tells nothing of the force's noise."""
 _FEWEST = 30
 
 
-def number_rows(contacts: list[Rows], channels: Channels) -> tuple[Rows, Rows]:
+def number_rows(contacts: list[Indices], channels: Channels) -> tuple[Indices, Indices]:
     """The rows of all contacts, and the number of each one's contact; an `InputError` where they are too few."""
     rows = np.concatenate(contacts)
     if len(rows) < _FEWEST:
@@ -97,7 +88,7 @@ class Problem:
 
     motion: Motion
     force: Array
-    spans: NDArray[np.intp]
+    spans: Indices
     lag: Lag
     free: tuple[Array, ...]
     origin: float
@@ -124,7 +115,7 @@ class Problem:
         """Zero of the force: its mean out of contact, for rows that hold the touches [N]."""
         return self.contacts.resting if self.counted else 0.0
 
-    def at(self, rows: Rows, force: Array, spans: Rows) -> Problem:
+    def at(self, rows: Indices, force: Array, spans: Indices) -> Problem:
         """The same at other rows, with the force there and the number of each one's contact, all of shape (m,)."""
         return replace(self, motion=replace(self.motion, rows=rows, _kept={}), force=force, spans=spans)
 
@@ -217,16 +208,20 @@ def highest_motion(motion: Motion) -> float:
     step = np.diff(rows)
     contacts = np.split(rows, np.flatnonzero(step > _APART * np.median(step)) + 1)
     stretches = [motion.position[own[0] : own[-1] + 1] for own in contacts]
-    told = [stretch for stretch in sorted(stretches, key=len)[-_CONTACTS:] if len(stretch) >= FEWEST_SEGMENT]
+    told = [
+        stretch
+        for stretch in sorted(stretches, key=len)[-_CONTACTS:]
+        if len(stretch) >= filters.FEWEST_SEGMENT
+    ]
     if not told:
         return float("inf")
     spectra = []
     for stretch in told:
         speed = np.diff(stretch)
         frequency, power = periodogram(speed, _TAPER)
-        noise = position_noise([stretch])
+        noise = filters.position_noise([stretch])
         floor = 2 * (noise.jump**2 + noise.white**2 * 4 * np.sin(np.pi * frequency) ** 2)
-        seen = np.where(power > ABOVE_FLOOR * floor, power, 0.0)
+        seen = np.where(power > filters.ABOVE_FLOOR * floor, power, 0.0)
         spectra.append((frequency, seen * len(speed) / len(frequency)))
     frequency, energy = (np.concatenate(parts) for parts in zip(*spectra, strict=True))
     order = np.argsort(frequency, kind="stable")
@@ -270,7 +265,7 @@ def _behind_filter(
     """Both channels behind the chain; a known low-pass of the force is applied to the position too."""
     position, filtered, told = channels.position, None, options.lag
     if options.force_filter is not None:
-        position = low_passed(position, options.force_filter, channels.dt)
+        position = filters.low_passed(position, options.force_filter, channels.dt)
         filtered = options.force_filter.lag
         told = None if told is None else told - filtered
     position, read = contacts.position_sign * position, contacts.force_sign * channels.force
@@ -328,13 +323,13 @@ def _settling(chain: Chain, begin: int, length: int) -> int:
     return min(int(np.ceil((chain.settling - eaten) / chain.dt)), length // 4)
 
 
-def _noise(position: Array, rows: Rows, spans: Rows, rounding: float) -> PositionNoise:
+def _noise(position: Array, rows: Indices, spans: Indices, rounding: float) -> PositionNoise:
     """That of the position: white by its highest differences, and the jumps of an encoder where its counts are seen.
 
     No less than what the log's last digit hides, which does not show where the probe rests; nor than what counts are
     seen to hide in contact, which is all of them where each reading is counts away from the one before.
     """
-    found = noise_within(position, rows, spans)
+    found = filters.noise_within(position, rows, spans)
     least = min(found.white, found.count / 12**0.5) if found.count else rounding
     return PositionNoise(max(white_noise(position), least), found.jump if found.count else 0.0, found.count)
 
@@ -371,7 +366,9 @@ def _behind_sensor(
     if contacts.payload is not None:
         force = force - contacts.payload.mass * path.read(position, 2, lag.value, np.arange(len(time)))
     problem = Problem(
-        motion=Motion(path, position, rows, contacts.bonded, noise=noise_within(position, whole, spans)),
+        motion=Motion(
+            path, position, rows, contacts.bonded, noise=filters.noise_within(position, whole, spans)
+        ),
         force=force[rows],
         spans=spans,
         lag=lag,

@@ -1,7 +1,5 @@
 """The result of an identification."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field
 from math import isclose, pi, sqrt
 from typing import Any

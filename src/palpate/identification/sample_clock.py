@@ -5,15 +5,12 @@ they say more: an even grid must have one refresh in each of these rows and none
 interval of its phase (of 1/12 row, for 480 readings a second in a log of 1000 rows).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 from palpate.signals.samples import runs
 
 _BLOCKS = 1 << 10
@@ -41,7 +38,7 @@ class SampleClock:
     """
 
     instants: Array
-    rows: NDArray[np.intp]
+    rows: Indices
     spread: float
     period: float
 
@@ -74,7 +71,7 @@ def sample_clock_of(values: Array) -> SampleClock:
     return SampleClock(instants[kept], rows[kept], spread, period)
 
 
-def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
+def _beats(changed: Indices) -> list[tuple[float, float]]:
     """Periods that may be meant, and a place in the middle of a sample's row for each.
 
     They are lines of the changes' spectrum: the strongest that the shortest steps allow, and the one at the changes'
@@ -108,13 +105,13 @@ def _beats(changed: NDArray[np.intp]) -> list[tuple[float, float]]:
     return found
 
 
-def _reach(changed: NDArray[np.intp]) -> tuple[NDArray[np.intp], int]:
+def _reach(changed: Indices) -> tuple[Indices, int]:
     """Distance of each change from the middle one, and that within which enough of them are to look for the grid."""
     far = np.abs(changed - changed[len(changed) // 2])
     return far, max(_AT_FIRST, int(np.partition(far, _FEWEST - 1)[_FEWEST - 1]) + 1)
 
 
-def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[NDArray[np.intp], float]:
+def _number(changed: Indices, period: float, middle: float) -> tuple[Indices, float]:
     """Which sample of an even grid each change is, and the grid's period in rows.
 
     Counted from the middle of the log to both sides, the period made better on the way.
@@ -128,7 +125,7 @@ def _number(changed: NDArray[np.intp], period: float, middle: float) -> tuple[ND
         reach *= 2
 
 
-def _even(number: NDArray[np.intp], changed: NDArray[np.intp], period: float) -> tuple[float, ...] | None:
+def _even(number: Indices, changed: Indices, period: float) -> tuple[float, ...] | None:
     """Period and phase of the even grid of the samples, room and standard deviation of the phase; in rows.
 
     Its instants stand farthest from the ends of their rows, by the room at least; None if no grid has one in each.

@@ -1,7 +1,5 @@
 """From the columns of a record to two channels on one even grid of time, with what was found on the way."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +7,9 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.errors import InputError
 from palpate.identification.causes import Code, Warn, from_word
-from palpate.identification.filters.state_variable import block_means
 from palpate.identification.sample_clock import at_limit, past_end
 from palpate.records import Record
-from palpate.signals.samples import fresh_rows
+from palpate.signals.samples import block_means, fresh_rows
 
 _FEWEST = 20
 _LARGEST = 1e30

@@ -5,8 +5,6 @@ each cause may do. The lag of the force is a column with a prior, never a free n
 about what is found until it rests.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -14,21 +12,11 @@ import numpy as np
 
 from palpate.arrays import Mask
 from palpate.errors import InputError
+from palpate.identification import models
 from palpate.identification.estimators.budget import TOUCH, Answer, of_another
 from palpate.identification.estimators.linearisation import Linearisation, lag_open
 from palpate.identification.estimators.octaves import Solution, estimate, held, segments_of, solve
-from palpate.identification.filters.state_variable import Chain
-from palpate.identification.models import (
-    KELVIN_VOIGT,
-    KELVIN_VOIGT_MASS,
-    Model,
-    at_rest_before,
-    begun_before,
-    from_surface,
-    hunt_crossley,
-    quasi_linear,
-    standard_linear_solid,
-)
+from palpate.identification.filters import Chain
 from palpate.identification.options import LAG, Options
 from palpate.identification.problem import Problem
 from palpate.identification.result import Comparison
@@ -41,7 +29,7 @@ _FOUND = 0.25
 variance."""
 
 
-def answer(problem: Problem, model: Model) -> Answer:
+def answer(problem: Problem, model: models.Model) -> Answer:
     """Fit a model and find how far to trust each parameter.
 
     Raises:
@@ -58,7 +46,7 @@ def answer(problem: Problem, model: Model) -> Answer:
     return found if found.half_of("K") < plain.half_of("K") else plain
 
 
-def _in_contact(problem: Problem, model: Model) -> tuple[Linearisation, Solution]:
+def _in_contact(problem: Problem, model: models.Model) -> tuple[Linearisation, Solution]:
     """Over the rows in contact; the lag looked for within its prior, the columns formed again at each."""
     segments = segments_of(problem.motion.rows, problem.spans)
     if not segments:
@@ -129,7 +117,7 @@ def _over_approach(problem: Problem, inside: Mask, known: Linearisation, found: 
     theta = dict(zip(known.names, found.theta, strict=True))
     surface, use = 0.0, None
     for _ in range(_ROUNDS if len(way) else 0):
-        motion = from_surface(problem.motion, inside, surface)
+        motion = models.from_surface(problem.motion, inside, surface)
         local = Linearisation.of(
             replace(problem, motion=motion), known.model, segments, theta | {LAG: known.lag}, use
         )
@@ -151,7 +139,9 @@ _ADDED = {
     "hunt-crossley": ("n",),
     "quasi-linear-viscoelastic": ("n", "K1", "tau"),
 }
-_MAKERS = dict(zip(_ADDED, (standard_linear_solid, hunt_crossley, quasi_linear), strict=True))
+_MAKERS = dict(
+    zip(_ADDED, (models.standard_linear_solid, models.hunt_crossley, models.quasi_linear), strict=True)
+)
 
 
 @dataclass(frozen=True)
@@ -184,7 +174,8 @@ def choose(problem: Problem, options: Options) -> Choice:
             )
         rich, own = _one_sided(_MAKERS[name], problem)
         return Choice(rich, own, (_comparison_of(rich, "asked for"),))
-    best, at = answer(problem, KELVIN_VOIGT if name == KELVIN_VOIGT.name else KELVIN_VOIGT_MASS), problem
+    plain = models.KELVIN_VOIGT if name == models.KELVIN_VOIGT.name else models.KELVIN_VOIGT_MASS
+    best, at = answer(problem, plain), problem
     told, left = best.explained, best.unexplained
     if problem.contacts.press is not None:
         best = replace(best, fit=best.fit.in_time(best.problem.motion, best.problem.force))
@@ -193,7 +184,10 @@ def choose(problem: Problem, options: Options) -> Choice:
     if name is None and series is None and left > noise:
         # A power of the depth needs the place of the surface, and looks like a lag that nobody has told.
         one_sided = problem.with_touches is not None and not lag_open(problem)
-        for make in (standard_linear_solid, *([hunt_crossley, quasi_linear] if one_sided else [])):
+        for make in (
+            models.standard_linear_solid,
+            *([models.hunt_crossley, models.quasi_linear] if one_sided else []),
+        ):
             rich, own = _one_sided(make, problem)
             why = _against(rich, told, options.tolerance)
             told = max(told, rich.explained)
@@ -203,13 +197,13 @@ def choose(problem: Problem, options: Options) -> Choice:
     return Choice(best, at, tuple(tried))
 
 
-def _one_sided(make: Callable[..., Model], problem: Problem) -> tuple[Answer, Problem]:
+def _one_sided(make: Callable[..., models.Model], problem: Problem) -> tuple[Answer, Problem]:
     """A model with the place of the surface in it, fitted to the touches too where the log has them."""
     wider = problem.with_touches
     if wider is None:
         model = make(problem.motion)
-        return answer(problem, begun_before(model) if "K1" in model.linear else model), problem
-    return answer(wider, at_rest_before(make(wider.motion))), wider
+        return answer(problem, models.begun_before(model) if "K1" in model.linear else model), problem
+    return answer(wider, models.at_rest_before(make(wider.motion))), wider
 
 
 def _against(rich: Answer, told: float, tolerance: float) -> str:

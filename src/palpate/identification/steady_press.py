@@ -1,11 +1,8 @@
-"""Presses at constant speed, as testing machines and arms make them: strokes of the position, and their tangents.
+"""Presses at constant speed: the force over the depth of their strokes, its tangents, and of these the press.
 
-A position that is a straight line in time has no power in any octave, so what a press shows is read from position and
-force themselves: strokes of the position, advances or retreats at about one speed (`strokes_of`); the force of each
-over its depth (`curves_of`); its tangents (`slopes_at`); and of these the press (`steady_press`). Where force and
-position are both smooth curves of one variable, the tangent is the quotient of their derivatives: at constant speed a
-lag of the force moves it along the curve, and does not change it; where the speed changes, it changes the slope by that
-change.
+Force and position are both smooth curves of one variable, so that a tangent is the quotient of their derivatives: at
+constant speed a lag of the force moves it along the curve, and does not change it; where the speed changes, it changes
+the slope by that change.
 
 In a window about one force the force is a smooth curve of the position. How bent it is, the log tells: curves of
 several degrees are averaged by Akaike's weights, with the variance between them (Burnham and Anderson, Model selection
@@ -17,127 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from palpate.arrays import Array
-from palpate.identification.filters.sensor_path import noise_within
-from palpate.identification.filters.state_variable import block_means, white_noise
 from palpate.identification.free_motion import Drift
 from palpate.identification.least_squares import noise_of
 from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
+from palpate.identification.strokes import BLOCKS, STROKE, Stroke, turns_of
 from palpate.identification.uncertainty import Contribution, Measurement
-from palpate.signals.samples import runs
-
-_BLOCKS = 1 << 13
-"""Of the whole log at most, in which strokes are looked for."""
-_STROKE = 0.2
-"""Share of the position's range that a stroke goes through at least; it is a press if its force does so, too.
-`benchmarks/identification/press_constants.py` shows which values do as well, of this and of the constants below."""
-_ENDS = 0.02
-"""Share of a stroke at both ends in which the probe speeds up and slows down."""
-_PARTS, _FINE = 5, 25
-"""Parts of a stroke by time, in which its speed is about the same, and those in which it never rests."""
-_SLOWEST = 0.4
-"""Speed of the slowest part over that of the fastest: a machine whose own compliance is half of the press has 0.5."""
-_BULGE = 1.5
-"""Speed of the middle over the mean of both ends: an advance that speeds up for a quarter of its time and slows down
-for another has 1.5, half a sine 1.9."""
-_STILL = 0.1
-"""Share of a stroke's mean speed below which a part of it rests."""
-_SHARE = 0.8
-"""Share of the probe's way, in or out, that goes in strokes, of a press: else something shakes it as well. A return may
-be at any speed."""
-_SEEN = 8.0
-"""Deviations of the noise that a way must exceed to be one."""
-
-
-@dataclass(frozen=True)
-class Stroke:
-    """An advance or a retreat at about constant speed, from its begin to its end on the log's clock [s]."""
-
-    begin: float
-    end: float
-
-    def rows(self, channels: Channels) -> slice:
-        """Its samples in the channels, thinned or not."""
-        first, last = ((t - channels.start) / channels.dt for t in (self.begin, self.end))
-        return slice(max(int(np.ceil(first)), 0), min(int(last) + 1, len(channels.position)))
-
-
-def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
-    """The strokes of an evenly sampled log that goes one way in strokes, comes back at any speed, and does little else.
-
-    None of another log.
-    """
-    size = -(-len(channels.position) // _BLOCKS)
-    x = block_means(channels.position, size)
-    noise = noise_within(x, np.arange(len(x)), np.zeros(len(x), np.intp))
-    least, reach = max(_SEEN * white_noise(x), noise.count), float(np.ptp(x))
-    if reach <= _FINE * least:
-        return ()
-    turns = _turns(x, _STROKE * reach)
-    ends = [own for a, b in pairwise(turns) if (own := _steady(x, a, b, least)) is not None]
-    # Ways [m] of the strokes, of the legs between large turns at any speed, and of all between turns above the noise.
-    strokes = np.array([x[b] - x[a] for a, b in ends])
-    legs, whole = np.diff(x[turns]), np.diff(x[_turns(x, least)])
-    for sign in (1, -1):
-        ways = sign * whole, sign * strokes, -sign * legs
-        there, advance, back = (np.maximum(way, 0).sum() for way in ways)
-        if 0 < _SHARE * there <= advance and advance + back >= _SHARE * np.abs(whole).sum():
-            break
-    else:
-        return ()
-    dt, start = size * channels.dt, channels.start + (size - 1) / 2 * channels.dt
-    return tuple(Stroke(start + a * dt, start + b * dt) for a, b in ends)
-
-
-def _turns(x: Array, least: float) -> list[int]:
-    """Where a position turns by more than a way, its first and last row included."""
-    turns, low, high, rising = [0], 0, 0, 0
-    for i, value in enumerate(x.tolist()):
-        if value > x[high]:
-            high = i
-        if value < x[low]:
-            low = i
-        if rising >= 0 and x[high] - value > least:
-            turns.append(high)
-            rising, low = -1, i
-        elif rising <= 0 and value - x[low] > least:
-            turns.append(low)
-            rising, high = 1, i
-    last = high if rising > 0 else low if rising < 0 else len(x) - 1
-    return sorted({*turns, last, len(x) - 1})
-
-
-def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
-    """First and last row between two turns in which the probe goes at about one speed; None if it does not.
-
-    Where it rests on the way, those of the part without a rest that goes farthest.
-    """
-    whole = float(x[b] - x[a])
-    if abs(whole) <= _FINE * least:
-        return None
-    share = (x[a : b + 1] - x[a]) / whole
-    first, last = int(np.flatnonzero(share <= _ENDS)[-1]), int(np.argmax(share >= 1 - _ENDS))
-    if last - first < _FINE:
-        return None
-    edges = (np.linspace(first, last, parts + 1) for parts in (_PARTS, _FINE))
-    speed, fine = (np.diff(np.interp(own, np.arange(len(share)), share)) for own in edges)
-    moves = fine >= _STILL / _FINE
-    if not moves.all():
-        ends = np.linspace(first, last, _FINE + 1).astype(np.intp)
-        parts = [(int(ends[i]), int(ends[j])) for i, j in runs(moves)]
-        i, j = max(parts, key=lambda part: share[part[1]] - share[part[0]], default=(first, first))
-        return _steady(x, a + i, a + j, least)
-    even = speed.min() >= _SLOWEST * speed.max() and speed[_PARTS // 2] <= _BULGE * (speed[0] + speed[-1]) / 2
-    return (a + first, a + last) if even else None
-
+from palpate.signals.samples import block_means
 
 WINDOW = (0.35, 0.97)
 """Shares of a stroke's force about the tangent that is named: below, a surface is still being met."""
@@ -200,7 +90,7 @@ class Curve:
         return self.reach[1] - self.reach[0]
 
     @property
-    def scaled(self) -> tuple[Array, float, float]:
+    def abscissa(self) -> tuple[Array, float, float]:
         """Depth from -1 to 1, shape (n,), about its middle [m], over half of its range [m]."""
         low, high = float(self.depth.min()), float(self.depth.max())
         return (self.depth - (low + high) / 2) / ((high - low) / 2), (low + high) / 2, (high - low) / 2
@@ -222,7 +112,7 @@ class Curve:
 
     def about(self, depth: float) -> Curve:
         """The half of it about a depth [m]; the whole where that has blocks at too few depths."""
-        near = np.abs(self.depth - depth) <= self.scaled[2] / 2
+        near = np.abs(self.depth - depth) <= self.abscissa[2] / 2
         if len(np.unique(self.depth[near])) < _FEWEST:
             return self
         time, x, force, drift = (own[near] for own in (self.time, self.depth, self.force, self.drift))
@@ -230,11 +120,11 @@ class Curve:
 
     def fit(self, degree: int) -> Array:
         """Chebyshev coefficients of the force over the scaled depth, shape (degree + 1,)."""
-        return np.asarray(chebyshev.chebfit(self.scaled[0], self.force, degree), np.float64)
+        return np.asarray(chebyshev.chebfit(self.abscissa[0], self.force, degree), np.float64)
 
     def tangent(self, level: float) -> _Tangent:
         """The slope of a window at a force [N]."""
-        (u, middle, reach), force = self.scaled, self.force
+        (u, middle, reach), force = self.abscissa, self.force
         degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < len(np.unique(u))]
         fine = np.linspace(-1, 1, 201)
         curve = chebyshev.chebval(fine, self.fit(degrees[:2][-1]))
@@ -392,14 +282,14 @@ def steady_press(
     deepest = max((own.span for own in every), default=0.0)
     curves = [own for own in every if own.span > deepest / 2]
     named = [own for own in curves if own.loads]
-    force = block_means(signs[1] * channels.force[channels.valid], -(-len(channels.force) // _BLOCKS))
-    if not named and (np.diff(force[_turns(force, deepest / 2)]) > deepest / 2).any():
+    force = block_means(signs[1] * channels.force[channels.valid], -(-len(channels.force) // BLOCKS))
+    if not named and (np.diff(force[turns_of(force, deepest / 2)]) > deepest / 2).any():
         return None
     named = named or curves
     headline = slopes_at(named, WINDOW, lag, rest)
     if headline is None:
         return None
-    beside = [own for own in every if own.loads is named[0].loads and own.span > _STROKE * deepest]
+    beside = [own for own in every if own.loads is named[0].loads and own.span > STROKE * deepest]
     if len(beside) > len(named):  # at a force that all reach
         headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):

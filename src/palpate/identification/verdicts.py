@@ -1,7 +1,5 @@
 """From an answer to verdicts: what of it may be believed, and why not the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

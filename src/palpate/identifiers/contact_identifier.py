@@ -4,8 +4,6 @@ The position is read through the force sensor's own low-pass at the instants of 
 that `palpate.identification` uses for a log, so that a stream and a log of it give the same regressors.
 """
 
-from __future__ import annotations
-
 from math import ceil
 from typing import Any, Protocol
 

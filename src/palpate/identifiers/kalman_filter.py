@@ -1,7 +1,5 @@
 """A Kalman filter on parameters that walk at random, each at its own pace."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -11,15 +9,8 @@ from palpate._jit import law, part
 from palpate._vector import sqrt
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.estimator import (
-    NAMES,
-    VAGUE,
-    IdentifierTable,
-    Streaming,
-    as_estimate,
-    check_start,
-    is_sample,
-)
+from palpate.identifiers import estimator
+from palpate.identifiers.estimator import NAMES, VAGUE, is_sample
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.least_squares import (
     covariance_in,
@@ -69,7 +60,7 @@ class KalmanUpdate(NamedTuple):
         return True
 
 
-class KalmanFilter(Streaming):
+class KalmanFilter(estimator.Streaming):
     """Estimates theta in ``force = regressor . theta`` while each parameter goes a random walk.
 
     When to use it: the surface changes slowly, and how fast is known for each parameter: a stiffness that drifts
@@ -99,7 +90,7 @@ class KalmanFilter(Streaming):
         noise: float | None = None,
         names: tuple[str, ...] | None = None,
     ):
-        start, P = check_start(theta, covariance)
+        start, P = estimator.check_start(theta, covariance)
         pace = np.array(drift, dtype=np.float64)
         if pace.shape != start.shape or not (np.isfinite(pace).all() and (pace >= 0.0).all()):
             raise InputError(
@@ -131,7 +122,7 @@ class KalmanFilter(Streaming):
         doubt, walked = error_covariance_in(self._state, size), size.matrix(self._state, length(n))
         C = doubt.covariance(float(n)).of + walked.of
         seen = max(float(doubt.weight) - _GUESS - n, 0.0)
-        return as_estimate(self.names, self.theta, C, seen, self._floor)
+        return estimator.as_estimate(self.names, self.theta, C, seen, self._floor)
 
 
 def _first(theta: Array, P: Array, steps: Array, noise: float) -> Array:
@@ -150,7 +141,7 @@ def _variance(doubt, given, n):
     return given if given > 0.0 else doubt.noise(n)
 
 
-class KalmanIdentifier(IdentifierTable, tag="kalman-filter"):
+class KalmanIdentifier(estimator.IdentifierTable, tag="kalman-filter"):
     """A Kalman filter whose parameters go a random walk."""
 
     drift: NotNegativeTriple = (0.0, 0.0, 0.0)

@@ -11,8 +11,6 @@
 - A change of the surface is looked for in the scores (Andrews, 1993); the answer rests on the stretches since then.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 

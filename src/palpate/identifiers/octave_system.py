@@ -7,9 +7,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Mask
 from palpate.identifiers.kernels import octave_sums as sums
 from palpate.identifiers.kernels.octave_sums import LineNoise, OctavePositionNoise
 
@@ -113,7 +112,7 @@ class OctaveSystem:
         """Samples that it rests on."""
         return float(self.plain[3, 3])
 
-    def only(self, use: NDArray[np.bool_]) -> OctaveSystem:
+    def only(self, use: Mask) -> OctaveSystem:
         """The same with some octaves, shape (octaves,)."""
         return replace(
             self,
@@ -165,7 +164,7 @@ def system_of(data: OctaveData, first: int, end: int) -> OctaveSystem | None:
     return found.only(use) if use.any() else None
 
 
-def _usable_octaves(system: OctaveSystem, data: OctaveData) -> NDArray[np.bool_]:
+def _usable_octaves(system: OctaveSystem, data: OctaveData) -> Mask:
     """Octaves that count, shape (octaves,): with more motion than noise, and no slower than a contact lasts.
 
     A line slower than its contacts would be made of their edges.

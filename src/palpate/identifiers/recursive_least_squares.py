@@ -1,7 +1,5 @@
 """Recursive least squares for a loop of one's own: any number of parameters, one sample or many at a time."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -11,20 +9,8 @@ from numpy.typing import ArrayLike
 
 from palpate._jit import law, part
 from palpate.arrays import Array
-from palpate.identifiers.estimator import (
-    NAMES,
-    VAGUE,
-    Directional,
-    Exponential,
-    Forgetting,
-    IdentifierTable,
-    SIFt,
-    Streaming,
-    as_estimate,
-    check_start,
-    is_sample,
-    policy_of,
-)
+from palpate.identifiers import estimator
+from palpate.identifiers.estimator import NAMES, VAGUE, Directional, Exponential, SIFt, is_sample
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.least_squares import (
     covariance_in,
@@ -38,7 +24,7 @@ from palpate.identifiers.kernels.least_squares import (
 from palpate.signals.types import Estimate
 
 
-class LeastSquaresEstimator(Streaming):
+class LeastSquaresEstimator(estimator.Streaming):
     """A least-squares estimate of theta: the front of the state as `flat` has it."""
 
     @property
@@ -54,7 +40,7 @@ class LeastSquaresEstimator(Streaming):
         """
         doubt = error_covariance_in(self._state, AnyNumber(self._n))
         C = doubt.covariance(float(self._n)).of
-        return as_estimate(self.names, self.theta, C, self._worth(float(doubt.weight)), self._floor)
+        return estimator.as_estimate(self.names, self.theta, C, self._worth(float(doubt.weight)), self._floor)
 
     @abstractmethod
     def _worth(self, weight: float) -> float:
@@ -94,11 +80,11 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
         self,
         theta: ArrayLike,
         covariance: ArrayLike,
-        forgetting: float | Forgetting = 1.0,
+        forgetting: float | estimator.Forgetting = 1.0,
         names: tuple[str, ...] | None = None,
     ):
-        start, P = check_start(theta, covariance)
-        self.forgetting = policy_of(forgetting)
+        start, P = estimator.check_start(theta, covariance)
+        self.forgetting = estimator.policy_of(forgetting)
         super().__init__(known_first(start, P), len(start), Recursion(self.forgetting), names)
 
     def _worth(self, weight: float) -> float:
@@ -124,7 +110,7 @@ def absorb(state, phi, y, forgetting, size):
     return e, a
 
 
-class LeastSquaresIdentifier(IdentifierTable, tag="least-squares"):
+class LeastSquaresIdentifier(estimator.IdentifierTable, tag="least-squares"):
     """Recursive least squares that forget what is told them to forget."""
 
     keep: Annotated[float, Meta(gt=0, le=1)] = 1.0

@@ -5,8 +5,6 @@ adds up how much better they are foretold so than they were by the old estimate:
 ratio (Gustafsson, Adaptive Filtering and Change Detection, 2000, ch. 9), whose largest value dates the change.
 """
 
-from __future__ import annotations
-
 from math import inf, log
 from typing import Annotated, Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """Contents of a log: topics, variables or columns, and their names on the command line."""
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +11,10 @@ import numpy as np
 from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.columns import ColumnStatistics
-from palpate.logs.formats import Bag, Kind, bag_reader, kind_of, open_table
-from palpate.logs.proposal import Proposal, clock_of, from_columns, from_topics
+from palpate.logs.columns import NAMES, ColumnStatistics
+from palpate.logs.formats import Bag, Kind, Topic, bag_reader, kind_of, open_table
+from palpate.logs.presets import preset_among
+from palpate.logs.proposal import Proposal, clock_of, from_columns
 from palpate.logs.read import is_run
 from palpate.logs.roles import epoch_unit
 from palpate.logs.tables.sheet import Sheet, Stated
@@ -131,6 +134,77 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     if not uses:
         return f"{name}.FIELD" if fields else "no numbers"
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
+
+
+def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
+    """The command for a bag."""
+    there = [topic for topic in bag.topics.values() if topic.count and topic.known]
+    guesses: list[str] = []
+    wrench = _topic([topic for topic in there if is_wrench(topic.kind)], "wrench", guesses)
+    pose = _topic([topic for topic in there if is_pose(topic.kind)], "pose", guesses)
+    name = preset_among(bag.topics)
+    if name is not None:
+        return Proposal({"preset": name}, (), (f"the topics are those of the preset {name}",))
+    if wrench and pose:
+        options = {"wrench": wrench.name, "pose": pose.name}
+        if not all(_frame(bag, topic) for topic in (wrench, pose)):
+            options["wrench_frame"] = "tool"
+            guesses.append(
+                "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
+            )
+        return Proposal(options, tuple(guesses))
+    pair = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
+    if not pair:
+        return Proposal(None, ("no two topics are a position and a force",))
+    return Proposal(pair, tuple(guesses))
+
+
+def _topic(topics: Sequence[Topic], what: str, guesses: list[str]) -> Topic | None:
+    """The topic with most messages; one of the base's own frames before another's."""
+    if len(topics) > 1:
+        others = ", ".join(topic.name for topic in topics[:8])
+        best = max(topics, key=lambda topic: (not topic.parent, topic.count))
+        guesses.append(f"{best.name} is taken for the {what}; there are {others}")
+        return best
+    return topics[0] if topics else None
+
+
+def _frame(bag: Bag, topic: Topic) -> str:
+    header = getattr(bag.first(topic.name), "header", None)
+    return str(getattr(header, "frame_id", ""))
+
+
+def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
+    """Position and effort of the joint whose effort changes most."""
+    for name, paths in fields.items():
+        if not bag.topics[name].kind.endswith("/JointState"):
+            continue
+        joints = [path.partition(".")[2] for path in paths if path.startswith("effort.")]
+        joints = [joint for joint in joints if f"position.{joint}" in paths]
+        if not joints:
+            continue
+        streams, _ = bag.streams({name: [f"effort.{joint}" for joint in joints]})
+        joint = joints[int(np.argmax(np.ptp(streams[name].values, axis=0)))]
+        guesses.append(
+            f"joint {joint!r} is taken, whose effort changes most, and to slide: say :rad and :Nm if it turns"
+        )
+        return {"position": f"{name}.position.{joint}:m", "force": f"{name}.effort.{joint}:N"}
+    return None
+
+
+def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
+    """Two fields that are called as a force and a position are."""
+    paths = [f"{name}.{path}" for name, inner in fields.items() for path in inner]
+    pair = []
+    for role in ("position", "force"):
+        named, left = re.compile(NAMES[role], re.I), [path for path in paths if path not in pair]
+        fits = [path for path in left if named.search(path.rpartition(".")[2])]  # z and fz of one topic
+        fits = fits or [path for path in left if named.search(path)]
+        if not fits:
+            return None
+        pair += [next((path for path in fits if path.endswith("z")), fits[0])]
+    guesses.append("the two fields are taken by their names")
+    return {"position": f"{pair[0]}:m", "force": f"{pair[1]}:N"}
 
 
 def _read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:

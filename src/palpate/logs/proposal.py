@@ -2,27 +2,17 @@
 
 import re
 import shlex
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from hashlib import blake2b
 from itertools import combinations, islice
 from pathlib import Path
 
 import numpy as np
 
-from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.columns import (
-    NAMES,
-    ColumnStatistics,
-    explained_power,
-    filtered_power,
-    is_one_reading,
-    is_rate,
-    rank_correlation,
-    roughness,
-)
-from palpate.logs.formats import Bag, Topic
-from palpate.logs.presets import preset, presets
+from palpate.logs import columns as statistics
+from palpate.logs.columns import NAMES, ColumnStatistics
+from palpate.logs.presets import preset, preset_among
 from palpate.logs.roles import epoch_unit, usual_unit
 from palpate.logs.tables.sheet import Sheet
 from palpate.units import known_unit, unit, unit_in_name
@@ -89,21 +79,20 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
     rows = [column for column in columns if len(column.values) == length]
     options = {} if delimiter is None else {"delimiter": delimiter}
     timing, clock = _timing(table, rows, guesses)
-    by_member = {_member(column.name): replace(column, name=_member(column.name)) for column in rows}
-    name = _preset_of(by_member)
+    members = {_member(column.name): column for column in rows}
+    name = preset_among(members)
     if name is not None:
-        facts = _motion(name, list(by_member.values()))
+        facts = _motion(name, members)
         if "time" in preset(name):
             return Proposal({**options, "preset": name}, (), facts)
         timing, guesses = _state_time(clock) if clock else (timing, guesses)
-        names = {_member(column.name): column.name for column in rows}
+        usual = {key: preset(name)[key] for key in ("wrench", "pose")}
         given = {
-            key: ",".join(names[member] for member in value.split(","))
-            for key, value in _columns_of(name).items()
+            key: ",".join(members[member].name for member in value.split(",")) for key, value in usual.items()
         }
-        changed = {} if given == _columns_of(name) else given
+        changed = {} if given == usual else given
         return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
-    if all(f"{part}[{i}]" in by_member for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
+    if all(f"{part}[{i}]" in members for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return Proposal(None, (_JOINTS_ONLY,))
     others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
     unique: dict[tuple[bool, bool, bytes], ColumnStatistics] = {}
@@ -143,36 +132,16 @@ def _member(name: str) -> str:
     )
 
 
-def _columns_of(name: str) -> dict[str, str]:
-    """Wrench and pose of a preset."""
-    return {key: preset(name)[key] for key in ("wrench", "pose")}
-
-
 def _state_time(clock: ColumnStatistics) -> tuple[dict[str, str], list[str]]:
     """The time of a driver's states: no controller gives them faster than `_STATES`, which leaves one unit."""
     symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _STATES > 0.5), "s")
     return {"time": clock.name if symbol == "s" else f"{clock.name}:{symbol}"}, []
 
 
-def _preset_of(names: Container[str]) -> str | None:
-    """The preset all of whose columns or topics are there."""
-    for name in presets():
-        options = preset(name)
-        needed = [
-            column
-            for key in ("time", "wrench", "pose")
-            for column in str(options.get(key, "")).split(",")
-            if column
-        ]
-        if all(column in names for column in needed):
-            return name
-    return None
-
-
-def _motion(name: str, columns: Sequence[ColumnStatistics]) -> tuple[str, ...]:
+def _motion(name: str, members: Mapping[str, ColumnStatistics]) -> tuple[str, ...]:
     """How far the tool moves in a log of a preset's columns, and with which force."""
-    options, by_name = preset(name), {column.name: column for column in columns}
-    used = [by_name[column] for key in ("wrench", "pose") for column in options[key].split(",")]
+    options = preset(name)
+    used = [members[column] for key in ("wrench", "pose") for column in options[key].split(",")]
     count = f"all {len(used) + ('time' in options)} columns of the preset {name} are there"
     forces, places = used[:3], used[6:]
     if options["rotation"].startswith("matrix"):
@@ -234,18 +203,21 @@ def _pair(
         lambda column: column.score("position", "length"),
     )
     places = places[:_PAIRS]
-    places = [own for own in places if not any(own is not p and is_rate(own, p) for p in places)]
+    places = [own for own in places if not any(own is not p and statistics.is_rate(own, p) for p in places)]
     candidates = ((a, b) for a in places or moving for b in forces or columns if a is not b)
     by_name = bool(places and forces)
     follow = [
         pair
         for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _PAIRS)
-        if rank_correlation(*pair) > _FOLLOWS or (by_name and explained_power(*pair) > _COHERENT)
+        if statistics.rank_correlation(*pair) > _FOLLOWS
+        or (by_name and statistics.explained_power(*pair) > _COHERENT)
     ]
-    pairs = [pair for pair in follow if not is_one_reading(*pair)]
+    pairs = [pair for pair in follow if not statistics.is_one_reading(*pair)]
     if not pairs:
         return None
-    position, force = max(pairs, key=lambda pair: (_stem(pair[0]) == _stem(pair[1]), rank_correlation(*pair)))
+    position, force = max(
+        pairs, key=lambda pair: (_stem(pair[0]) == _stem(pair[1]), statistics.rank_correlation(*pair))
+    )
     left = dict.fromkeys(column.name for pair in pairs for column in pair if column not in (position, force))
     if by_name and left:
         more = ", ".join([*left][:8])
@@ -254,7 +226,7 @@ def _pair(
         known, other = (position, force) if places else (force, position)
         guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
     elif not by_name:
-        smooth, rough = sorted((position, force), key=roughness)
+        smooth, rough = sorted((position, force), key=statistics.roughness)
         cause = _cause(moving, smooth, rough)
         position, force = (smooth, rough) if cause is None else (cause, smooth)
         why = "the smoother is" if cause is None else f"both follow the motion of {cause.name!r}, which is"
@@ -270,9 +242,9 @@ def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> Colum
     found = [
         column
         for column in moving[:40]
-        if roughness(column) < min(map(roughness, pair))
-        and all(rank_correlation(column, own) <= _FOLLOWS for own in pair)
-        and all(filtered_power(column, own) > _COHERENT for own in pair)
+        if statistics.roughness(column) < min(map(statistics.roughness, pair))
+        and all(statistics.rank_correlation(column, own) <= _FOLLOWS for own in pair)
+        and all(statistics.filtered_power(column, own) > _COHERENT for own in pair)
     ]
     return max(found, key=lambda column: column.counts, default=None)
 
@@ -343,74 +315,3 @@ def _triple(columns: Sequence[ColumnStatistics], pattern: str, axes: str = "xyz"
             return []
         triple.append(match)
     return triple
-
-
-def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
-    """The command for a bag."""
-    there = [topic for topic in bag.topics.values() if topic.count and topic.known]
-    guesses: list[str] = []
-    wrench = _topic([topic for topic in there if is_wrench(topic.kind)], "wrench", guesses)
-    pose = _topic([topic for topic in there if is_pose(topic.kind)], "pose", guesses)
-    name = _preset_of(bag.topics)
-    if name is not None:
-        return Proposal({"preset": name}, (), (f"the topics are those of the preset {name}",))
-    if wrench and pose:
-        options = {"wrench": wrench.name, "pose": pose.name}
-        if not all(_frame(bag, topic) for topic in (wrench, pose)):
-            options["wrench_frame"] = "tool"
-            guesses.append(
-                "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
-            )
-        return Proposal(options, tuple(guesses))
-    pair = _joint(bag, fields, guesses) or _fields_by_name(fields, guesses)
-    if not pair:
-        return Proposal(None, ("no two topics are a position and a force",))
-    return Proposal(pair, tuple(guesses))
-
-
-def _topic(topics: Sequence[Topic], what: str, guesses: list[str]) -> Topic | None:
-    """The topic with most messages; one of the base's own frames before another's."""
-    if len(topics) > 1:
-        others = ", ".join(topic.name for topic in topics[:8])
-        best = max(topics, key=lambda topic: (not topic.parent, topic.count))
-        guesses.append(f"{best.name} is taken for the {what}; there are {others}")
-        return best
-    return topics[0] if topics else None
-
-
-def _frame(bag: Bag, topic: Topic) -> str:
-    header = getattr(bag.first(topic.name), "header", None)
-    return str(getattr(header, "frame_id", ""))
-
-
-def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
-    """Position and effort of the joint whose effort changes most."""
-    for name, paths in fields.items():
-        if not bag.topics[name].kind.endswith("/JointState"):
-            continue
-        joints = [path.partition(".")[2] for path in paths if path.startswith("effort.")]
-        joints = [joint for joint in joints if f"position.{joint}" in paths]
-        if not joints:
-            continue
-        streams, _ = bag.streams({name: [f"effort.{joint}" for joint in joints]})
-        joint = joints[int(np.argmax(np.ptp(streams[name].values, axis=0)))]
-        guesses.append(
-            f"joint {joint!r} is taken, whose effort changes most, and to slide: say :rad and :Nm if it turns"
-        )
-        return {"position": f"{name}.position.{joint}:m", "force": f"{name}.effort.{joint}:N"}
-    return None
-
-
-def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
-    """Two fields that are called as a force and a position are."""
-    paths = [f"{name}.{path}" for name, inner in fields.items() for path in inner]
-    pair = []
-    for role in ("position", "force"):
-        named, left = re.compile(NAMES[role], re.I), [path for path in paths if path not in pair]
-        fits = [path for path in left if named.search(path.rpartition(".")[2])]  # z and fz of one topic
-        fits = fits or [path for path in left if named.search(path)]
-        if not fits:
-            return None
-        pair += [next((path for path in fits if path.endswith("z")), fits[0])]
-    guesses.append("the two fields are taken by their names")
-    return {"position": f"{pair[0]}:m", "force": f"{pair[1]}:N"}

@@ -70,9 +70,9 @@ def read_log(
     path, kind = Path(path), kind_of(Path(path))
     if not columns:
         return read_record(path, limits)
-    if kind.is_bag and rate is not None:
-        raise InputError(f"the messages of {path} have their own times; leave out --rate")
     if kind.is_bag:
+        if rate is not None:
+            raise InputError(f"the messages of {path} have their own times; leave out --rate")
         with bag_reader().Bag(path, kind, limits) as bag:
             loaded = bag_reader().from_bag(bag, columns, missing, held)
     else:

@@ -5,11 +5,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import law, part
 from palpate._vector import exp, sqrt
-from palpate.arrays import Array
+from palpate.arrays import Array, Counts
 from palpate.errors import InputError
 
 
@@ -127,7 +127,7 @@ class Network(NamedTuple):
         learning_rate: eta.
     """
 
-    sizes: NDArray[np.int64]
+    sizes: Counts
     weights: Array
     amplitude: Array
     learning_rate: float
@@ -176,7 +176,7 @@ class Network(NamedTuple):
         return sqrt(total)
 
 
-def layers_of(sizes: NDArray[np.int64], weights: Array) -> tuple[Array, ...]:
+def layers_of(sizes: Counts, weights: Array) -> tuple[Array, ...]:
     """The weights of each layer, shape (n, n_before + 1), thresholds in column 0: views of the flat array."""
     views, first = [], 0
     for n, m in pairwise(sizes):

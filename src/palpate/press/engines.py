@@ -15,7 +15,7 @@ from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, gains_for
 from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
-from palpate.robots.serial.serial_arm import SerialArm, tip_of
+from palpate.robots.serial.serial_arm import ArmState, SerialArm, tip_of
 from palpate.robots.serial.task import into, joint_torque, task_model
 from palpate.signals.types import Sense, triple
 
@@ -256,29 +256,43 @@ class TaskFrame(NamedTuple):
     damping: float
 
 
+@part
+class ArmReadings(NamedTuple):
+    """Encoders and force sensor of an arm at one tick.
+
+    Args:
+        q: joint positions [rad, m], shape (n,).
+        qd: their rates, shape (n,).
+        force: along the normal [N].
+        found: what `describe_arm` says of q and qd.
+    """
+
+    q: Array
+    qd: Array
+    force: float
+    found: ArmState
+
+
 @law
-def tip_torque(frame, control, state, force, task, q, qd, found, own, torque):
+def tip_torque(frame, control, state, task, readings, own, torque):
     """Fills the joints' torques from encoders and force reading: the controller's state.
 
     Args:
         frame: a `TaskFrame`.
         control: in six directions.
         state: its own.
-        force: reading along the normal [N].
         task: what is asked for, in the task's axes.
-        q: measured [rad, m], shape (n,).
-        qd: measured, shape (n,).
-        found: what `described` says of these.
+        readings: `ArmReadings`.
         own: room for the laws.
         torque: where it goes, shape (n,).
     """
-    axes, room, tip = frame.axes, found.room, tip_of(found, qd)
+    axes, room, tip = frame.axes, readings.found.room, tip_of(readings.found, readings.qd)
     model = task_model(axes, room, tip, own)
     x = into(axes, tip.p, half_turn(tip.R @ frame.held.T))
-    wrench = Vec6(Vec3(force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
-    sense = Sense(q, qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
+    wrench = Vec6(Vec3(readings.force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
+    sense = Sense(readings.q, readings.qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
     F, state = control.step(state, sense, task, model)
-    joint_torque(axes, room, model, own, F, frame.damping, qd, torque)
+    joint_torque(axes, room, model, own, F, frame.damping, readings.qd, torque)
     return state
 
 

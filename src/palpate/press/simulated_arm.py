@@ -13,7 +13,7 @@ from palpate.environments.surface import UNTOUCHED, rest_for
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
 from palpate.press.cell import Body, Reading, TouchState, Workcell
-from palpate.press.engines import ByMuJoCo, Engine, Own, Spring, TaskFrame, compiled_tip_torque
+from palpate.press.engines import ArmReadings, ByMuJoCo, Engine, Own, Spring, TaskFrame, compiled_tip_torque
 from palpate.press.sequence import TARE, TipSample
 from palpate.press.setting import Place
 from palpate.robots.serial.chain import room_for
@@ -249,10 +249,10 @@ class _TipLoop:
         kind = type(controller)
         if kind not in self._states:
             self._states[kind], self._laws[kind] = controller.start(), BoundKernel(compiled_tip_torque)
-        state = self._states[kind]
-        torque = np.zeros(self._n)
+        state, torque = self._states[kind], np.zeros(self._n)
         compiled_description(self._chain, q, qd, self._found)
+        readings = ArmReadings(q, qd, float(force), self._found)
         self._states[kind] = self._laws[kind](
-            self._frame, controller, state, float(force), task, q, qd, self._found, self._room, torque,
-        )  # fmt: skip
+            self._frame, controller, state, task, readings, self._room, torque
+        )
         return torque

@@ -1,4 +1,4 @@
-"""Sampled signals: slowly refreshed channels, unbroken runs, rounding, quaternions, detrending and spectra.
+"""Sampled signals: fresh rows, unbroken runs, rounding, quaternions, block means, white noise, detrending and spectra.
 
 `scipy.signal` has the last ones too, but its import takes longer than the identification of a log; so `scipy.fft`.
 """
@@ -159,3 +159,18 @@ def _tukey(n: int, taper: float) -> Array:
     window[: width + 1] = rise
     window[n - width - 1 :] = rise[::-1]
     return window
+
+
+def white_noise(signal: Array) -> float:
+    """Standard deviation of the white part of a signal, from its eighth differences.
+
+    An upper bound: what is left of the motion itself in the differences counts as noise.
+    """
+    differences = np.diff(signal, 8)  # the sum of whose squared weights is 12870
+    return float(GAUSSIAN * np.median(np.abs(differences)) / np.sqrt(12870)) if len(differences) else 0.0
+
+
+def block_means(signal: Array, size: int) -> Array:
+    """Means of neighbouring blocks of `size` samples, shape (n // size,); the rest at the end is dropped."""
+    count = len(signal) // size
+    return np.asarray(signal[: count * size].reshape(count, size).mean(axis=1))

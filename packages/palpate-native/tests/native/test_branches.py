@@ -138,7 +138,7 @@ def contacts(touch, **options):
     [
         ("force", 400_000, 300, IN_FORCE_LOOP),
         ("squares", 20_000, 35, IN_SQUARES),
-        ("identifier", 100_000, 290, IN_IDENTIFIER),
+        ("identifier", 50_000, 290, IN_IDENTIFIER),
     ],
 )
 def test_recorded_ticks_take_every_branch_that_there_is_a_way_to(

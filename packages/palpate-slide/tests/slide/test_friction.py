@@ -202,18 +202,17 @@ def test_a_normal_along_the_path_is_refused_in_one_line(normal, more, says, caps
 
 @pytest.mark.long
 def test_friction_holds_over_many_worlds():
-    held, known, stiff, cones = 0, 0, [], []
-    for seed in range(7000, 7030):
+    held, stiff, cones = [], [], []
+    for seed in range(7015, 7028):
         log = wipe(any_wipe(seed, free=1.5, turns=False, weight=0.0, stribeck=0.0))
         found = found_in(log)
         if found.slide is not None and (ends := found.parameters["mu"].ci95):
-            known += 1
-            held += ends[0] < log.world.mu < ends[1]
+            held.append(ends[0] < log.world.mu < ends[1])
             cones.append(cone_held(found, log))
             if span := found.parameters["K"].ci95:
                 stiff.append(span[0] < log.world.stiffness < span[1])
-    assert known >= 20
-    assert held >= 0.8 * known
+    assert len(held) >= 10
+    assert sum(held) >= len(held) - 1  # a third of the width misses two
     assert len(stiff) >= 3
-    assert np.mean(stiff) >= 0.8
+    assert all(stiff)
     assert np.mean(cones) >= 0.9

@@ -4,8 +4,6 @@ Bayesian model averaging (Hoeting, Madigan, Raftery and Volinsky, 1999). A force
 hardly counts; one that it could not show widens the interval as if it were there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise, product
@@ -13,19 +11,9 @@ from itertools import pairwise, product
 import numpy as np
 
 from palpate.arrays import Array, Mask
+from palpate.identification.estimators import octaves
 from palpate.identification.estimators.budget import Budget, Spread, white_level
-from palpate.identification.estimators.octaves import (
-    LARGEST,
-    Octaves,
-    Segment,
-    Solution,
-    System,
-    lines_of,
-    longest_of,
-    octaves_of,
-    solve,
-    worth,
-)
+from palpate.identification.estimators.octaves import LARGEST, Octaves, Segment, Solution, System
 from palpate.identification.models import Motion
 from palpate.identification.problem import Problem
 
@@ -69,7 +57,7 @@ def members(
     kept = share > _WINDOW
     systems = [replace(system, prior_weight=own) for own in weights[kept]]
     found = zip((share[kept] / share[kept].sum()).tolist(), systems, strict=True)
-    return [Member(weight, own, solve(own, noise, use)) for weight, own in found]
+    return [Member(weight, own, octaves.solve(own, noise, use)) for weight, own in found]
 
 
 def _evidence(whole: Array, weights: Array, mean: Array) -> Array:
@@ -107,7 +95,7 @@ def of_supposition(whole: Solution, parts: list[Member], system: System, place: 
     likeliest = max(parts, key=lambda part: part.weight)
     weights = likeliest.system.prior_weight.copy()
     weights[place] = system.prior_weight[place]
-    free = solve(replace(system, prior_weight=weights), whole.noise)
+    free = octaves.solve(replace(system, prior_weight=weights), whole.noise)
     grown = float(free.cov[place, place] - whole.cov[place, place])
     return max(grown, 0.0) + float(free.theta[place] - whole.theta[place]) ** 2
 
@@ -165,7 +153,7 @@ def position_lines(motion: Motion, dt: float, longest: int, count: int, most: in
         passed = motion.noise.power(f, chain.dt) * chain.position_gain(f) ** 2
         return passed * (2 * np.pi * f) ** k * chain.dt / dt
 
-    return {k: lines_of(partial(power, k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
+    return {k: octaves.lines_of(partial(power, k), dt, longest, count) for k in range(0, 2 * most + 1, 2)}
 
 
 def derivative_products(noisy: dict[int, Array]) -> Array:
@@ -181,35 +169,35 @@ def derivative_products(noisy: dict[int, Array]) -> Array:
     return found
 
 
-def seen(motion: Motion, noisy: dict[int, Array], octaves: Octaves, derivatives: dict[int, int]) -> Mask:
+def seen(motion: Motion, noisy: dict[int, Array], sums: Octaves, derivatives: dict[int, int]) -> Mask:
     """Octaves but those in which a column is mostly the position's noise, which pulls its parameter to zero.
 
     `noisy` is as `position_lines` has it; `derivatives` has the place of a column, and which derivative it is.
     """
     rounding = (_ROUNDED * np.finfo(float).eps * float(np.abs(motion.position).max())) ** 2
-    omega2 = (2 * np.pi * octaves.frequency) ** 2
-    power = np.stack([octaves.total[:, place, place] for place in derivatives])
-    noise = [np.maximum(octaves.all_lines * noisy[2 * k], rounding * omega2**k) for k in derivatives.values()]
+    omega2 = (2 * np.pi * sums.frequency) ** 2
+    power = np.stack([sums.total[:, place, place] for place in derivatives])
+    noise = [np.maximum(sums.all_lines * noisy[2 * k], rounding * omega2**k) for k in derivatives.values()]
     return np.all(power >= _SEEN * np.stack(noise), axis=0)
 
 
 def sensor_lines(
-    problem: Problem, segments: list[Segment], octaves: Octaves, use: Mask, system: System, solution: Solution
+    problem: Problem, segments: list[Segment], sums: Octaves, use: Mask, system: System, solution: Solution
 ) -> tuple[Array, Array]:
     """Variance of a line by the sensor's own noise in each octave, and the lines that tell it, shape (octaves,).
 
     Out of contact it is seen; where the log has no such stretch, it is what the quietest octaves have in common.
-    The octaves have the force last; those that count are in `use`, and the normal equations are theirs.
+    The sums have the force last; the octaves that count are in `use`, and the normal equations are theirs.
     """
-    longest, dt = longest_of(segments), float(np.median(np.diff(problem.time)))
+    longest, dt = octaves.longest_of(segments), float(np.median(np.diff(problem.time)))
     passed = problem.motion.chain.force_gain
-    gain = lines_of(lambda f: passed(f) ** 2, dt, longest, len(octaves.frequency))
+    gain = octaves.lines_of(lambda f: passed(f) ** 2, dt, longest, len(sums.frequency))
     gain = np.maximum(gain, np.finfo(float).eps)
     rest = _rest(problem, dt, longest)
     if rest is None:
-        own = octaves.total[:, -1, -1] / np.maximum(octaves.all_lines, 1.0)
+        own = sums.total[:, -1, -1] / np.maximum(sums.all_lines, 1.0)
         level = np.where(use, solution.noise, own)
-        lines = np.where(use, worth(system), octaves.all_lines)
+        lines = np.where(use, octaves.worth(system), sums.all_lines)
     else:
         lines = rest.all_lines
         level = rest.total[:, 0, 0] / np.maximum(lines, 1.0)
@@ -228,5 +216,5 @@ def _rest(problem: Problem, dt: float, longest: int) -> Octaves | None:
         return None
     edges = np.cumsum([0, *(len(f) for f in problem.free)])
     stretches = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
-    found = octaves_of(np.concatenate(problem.free)[:, None], stretches, dt, longest)
+    found = octaves.octaves_of(np.concatenate(problem.free)[:, None], stretches, dt, longest)
     return found if found.lines.any() else None

@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.identification.estimators.octaves import Segment, Solution, System, worth
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model, Motion
@@ -235,7 +234,7 @@ def effect_columns(motion: Motion, model: Model, lag: float, segments: list[Segm
     return found | shapes | ({"hysteresis, slow": slow} if slow.any() else {})
 
 
-def _friction(motion: Motion, lag: float, inside: NDArray[np.intp]) -> dict[str, Array]:
+def _friction(motion: Motion, lag: float, inside: Indices) -> dict[str, Array]:
     """Friction, and what of it turns within a shorter way: elements that hold as springs and slip one after the other.
 
     Side by side they follow any curve from sticking to slipping (Iwan 1966; the Maxwell-slip model). What the probe

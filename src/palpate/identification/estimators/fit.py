@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.least_squares import covariance, noise_of, solve
 from palpate.identification.models import Model, Motion
 from palpate.identification.options import LAG, Lag, mass_std
@@ -201,8 +201,10 @@ def fit(descent: Descent, nonlinear: dict[str, float], prior: Lag) -> Fit:
     step = solve(both, np.concatenate([point.residuals, weight * (mean - at)]))
     theta, cov = at.copy(), np.zeros((len(at), len(at)))
     theta[free] += step
-    own = {p.name: float(np.clip(theta[names.index(p.name)], p.low, p.high)) for p in descent.model.nonlinear}
-    if any(theta[names.index(name)] != value for name, value in own.items()):  # a step ends at a limit
-        theta[:-1] = [*descent.at(own).theta, *own.values()]
+    outer = slice(len(point.theta), -1)
+    each = zip(theta[outer], descent.model.nonlinear, strict=True)
+    within = [float(np.clip(value, parameter.low, parameter.high)) for value, parameter in each]
+    if within != theta[outer].tolist():  # a step beyond a limit ends there
+        theta[:-1] = [*descent.at(dict(zip(names[outer], within, strict=True))).theta, *within]
     cov[free, free] = covariance(jacobian[:, free], rows, noise, std[free])
     return Fit(names, theta, cov, noise.effective)

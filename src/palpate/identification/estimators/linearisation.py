@@ -4,32 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from palpate.arrays import Array, Mask
+from palpate.identification.estimators import averaging
 from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.averaging import (
-    Member,
-    averaged,
-    derivative_products,
-    mean_budget,
-    members,
-    of_octaves,
-    of_supposition,
-    position_lines,
-    seen,
-    sensor_lines,
-)
-from palpate.identification.estimators.budget import (
-    FRICTION,
-    HIDDEN_SHARE,
-    Answer,
-    Budget,
-    Prediction,
-    Spread,
-    effect_columns,
-)
+from palpate.identification.estimators.budget import Answer, Budget, Prediction, Spread
 from palpate.identification.estimators.fit import Descent, slope_of_lag
 from palpate.identification.estimators.octaves import (
     LARGEST,
@@ -42,7 +24,7 @@ from palpate.identification.estimators.octaves import (
     solve,
     system_of,
 )
-from palpate.identification.filters.state_variable import low_passed
+from palpate.identification.filters import low_passed
 from palpate.identification.least_squares import inverse
 from palpate.identification.models import Model
 from palpate.identification.options import LAG, mass_std
@@ -112,7 +94,7 @@ class Linearisation:
         lag = theta.get(LAG, problem.lag.value)
         at, own, target = _linearise(problem, model, lag, theta)
         free = list(own)
-        effects = effect_columns(motion, model, lag, segments)
+        effects = causes.effect_columns(motion, model, lag, segments)
         drift = problem.contacts.drift
         bends = drift.bends(problem.time).T if drift is not None else ()
         bending = {f"drift {i}": column for i, column in enumerate(bends)}
@@ -129,11 +111,13 @@ class Linearisation:
         octaves = Octaves(whole.products[:, :, :-1, :-1], whole.lines, whole.frequency)
         orders = model.derivatives if not model.nonlinear else {}
         most = max(orders.values(), default=0) + (LAG in free)
-        noisy = position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
+        noisy = averaging.position_lines(motion, dt, longest_of(segments), len(octaves.frequency), most)
         if use is None:
-            use = seen(motion, noisy, whole, {-1: 0} | {free.index(name): k for name, k in orders.items()})
+            derivatives = {-1: 0} | {free.index(name): k for name, k in orders.items()}
+            use = averaging.seen(motion, noisy, whole, derivatives)
         names = (*free, *effects, *bending)
-        friction = np.column_stack([column for name, column in effects.items() if name.startswith(FRICTION)])
+        rubs = [column for name, column in effects.items() if name.startswith(causes.FRICTION)]
+        friction = np.column_stack(rubs)
         system = system_of(octaves.only(use), names, prior)
         return cls(
             problem, model, lag, at, theta, names, friction, len(free), prior, segments, octaves, use, noisy, system,
@@ -170,20 +154,22 @@ class Linearisation:
     def answer(self, solution: Solution) -> Answer:
         """The answer with its budget."""
         lines = self.octaves, self.use, self.system
-        sensor, told = sensor_lines(self.problem, self.segments, *lines, solution)
+        sensor, told = averaging.sensor_lines(self.problem, self.segments, *lines, solution)
         both = self._with_position(solution, sensor)
         explained, left, hidden = self._explained_part(solution, both)  # another force's does not count
         question = self.system, solution.noise, both, self._forces()
-        likely = members(*question)
-        solution = averaged(likely)
-        budget = mean_budget(likely, [self._budget(own, sensor, told) for own in likely], solution.theta)
-        budget["octaves"] = of_octaves(solution, *question)
+        likely = averaging.members(*question)
+        solution = averaging.averaged(likely)
+        each = [self._budget(own, sensor, told) for own in likely]
+        budget = averaging.mean_budget(likely, each, solution.theta)
+        budget["octaves"] = averaging.of_octaves(solution, *question)
         if "M" in self.names and "M" not in self.prior:
             place = self.names.index("M")
-            budget["other forces"].variance[place] += of_supposition(solution, likely, self.system, place)
+            supposed = averaging.of_supposition(solution, likely, self.system, place)
+            budget["other forces"].variance[place] += supposed
             if self.problem.filtered is None:
                 budget["low-pass"] = self._by_low_pass(solution, both, budget)
-        kept = [i for i, name in enumerate(self.names) if i < self.own or name == FRICTION]
+        kept = [i for i, name in enumerate(self.names) if i < self.own or name == causes.FRICTION]
         names = tuple(self.names[i] for i in kept)
         budget = {cause: part.of(kept) for cause, part in budget.items()}
         values = self.at or dict(zip(self.names, solution.theta.tolist(), strict=True))
@@ -197,7 +183,7 @@ class Linearisation:
 
     def _friction(self, solution: Solution) -> Array:
         """Forces whose squares add up to the mean square of the friction's, its uncertainty included, shape (m, f)."""
-        places = [i for i, name in enumerate(self.names) if name.startswith(FRICTION)]
+        places = [i for i, name in enumerate(self.names) if name.startswith(causes.FRICTION)]
         theta = solution.theta[places]
         value, vector = np.linalg.eigh(solution.cov[np.ix_(places, places)] + np.outer(theta, theta))
         found = self.friction @ (vector * np.sqrt(np.maximum(value, 0.0)))
@@ -208,13 +194,14 @@ class Linearisation:
         """Places of the columns of each force that may be there or not: a mass, too, of which nobody knows."""
         others = list(enumerate(self.names))[self.own :]
         found = [
-            [i for i, name in others if name.startswith(kind)] for kind in (FRICTION, "depth", "hysteresis")
+            [i for i, name in others if name.startswith(kind)]
+            for kind in (causes.FRICTION, "depth", "hysteresis")
         ]
         if "M" in self.names and "M" not in self.prior:
             found.append([self.names.index("M")])
         return [places for places in found if places]
 
-    def _budget(self, member: Member, sensor: Array, told: Array) -> Budget:
+    def _budget(self, member: averaging.Member, sensor: Array, told: Array) -> Budget:
         """By cause, with what a member supposes."""
         system, solution = member.system, member.solution
         budget = causes.of_noise(system, solution, self.names, self.own, LAG)
@@ -238,7 +225,7 @@ class Linearisation:
         place, count = self.names.index("M"), 1
         most = abs(solution.theta[self.names.index("K")]) / 2 * time**2
         rest = NORMAL**2 * sum(part.variance[place] for part in budget.values())
-        hidden = np.maximum(HIDDEN_SHARE**2 * self.system.lines, 1.0) * (solution.noise - sensor)
+        hidden = np.maximum(causes.HIDDEN_SHARE**2 * self.system.lines, 1.0) * (solution.noise - sensor)
         least = _misfit(self.system, sensor + hidden) + NORMAL**2
         while (most / count) ** 2 > rest:
             others = self._behind(LowPass.of_first_order(time, 2 * count))
@@ -250,19 +237,16 @@ class Linearisation:
     def _behind(self, low_pass: LowPass) -> Iterator[System]:
         """Normal equations with the position behind a low-pass that is part of the lag, and on a delay's other side."""
         motion, lag = self.problem.motion, self.problem.lag
-
-        def behind(signal: Array) -> Array:
-            return low_passed(signal, low_pass, motion.chain.dt)
+        behind = partial(low_passed, low_pass=low_pass, dt=motion.chain.dt)
 
         def mirror(signal: Array) -> Array:
             rows = np.arange(len(signal))
             return 2 * np.interp(rows - low_pass.lag / motion.chain.dt, rows, signal) - behind(signal)
 
-        about = self.about | {LAG: self.lag - low_pass.lag}
-        rest = replace(lag, value=lag.value - low_pass.lag)
+        about, rest = {LAG: self.lag - low_pass.lag}, replace(lag, value=lag.value - low_pass.lag)
         for change in (behind, mirror):
             problem = replace(self.problem, motion=motion.through(change), lag=rest)
-            yield Linearisation.of(problem, self.model, self.segments, about, self.use).system
+            yield Linearisation.of(problem, self.model, self.segments, self.about | about, self.use).system
 
     def _radian(self) -> float:
         """Time of a radian of the fastest motion [s]: a longer lag is seen apart from all but a damping."""
@@ -287,10 +271,10 @@ class Linearisation:
             of[i, k] = 1.0
             if LAG in self.names:
                 of[self.names.index(LAG), k + 1] = -self.about.get(name, 0.0)
-        found = np.einsum("ai,oij,bj->oab", of, derivative_products(self.noisy), of)
+        found = np.einsum("ai,oij,bj->oab", of, averaging.derivative_products(self.noisy), of)
         return found * self.system.lines[:, None, None]
 
-    def _by_prior_of_lag(self, member: Member, found: Spread) -> Spread:
+    def _by_prior_of_lag(self, member: averaging.Member, found: Spread) -> Spread:
         """Parameters seen in time get the prior's uncertainty of an uncalibrated lag, no less.
 
         A lag T counts as a damping of -K T, and as a branch that relaxes. Whatever else shifts the force in time moves

@@ -19,9 +19,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array, Mask
+from palpate.arrays import Array, Indices, Mask
 from palpate.identification.least_squares import solved
 
 SHORTEST = 16
@@ -83,7 +82,7 @@ class Octaves:
         return Octaves(self.products * use[None, :, None, None], self.lines * use[None, :], self.frequency)
 
 
-def segments_of(rows: NDArray[np.intp], spans: NDArray[np.intp]) -> list[Segment]:
+def segments_of(rows: Indices, spans: Indices) -> list[Segment]:
     """Cut rows at the ends of contacts and at gaps; too short pieces are left out.
 
     The sample of each row and the number of its contact have the shape (m,).
@@ -171,7 +170,7 @@ def _window(length: int, numbers: tuple[float, ...]) -> Array:
 
 
 def _sums(
-    own: Array, starts: NDArray[np.intp], group: NDArray[np.intp], length: int, numbers: tuple[float, ...]
+    own: Array, starts: Indices, group: Indices, length: int, numbers: tuple[float, ...]
 ) -> list[tuple[int, tuple[Array, int]]]:
     """Products and lines of the blocks of each group."""
     seen, width = transform_of(length, numbers), own.shape[1]

@@ -1,7 +1,5 @@
 """The press: force over depth in loading and unloading, its tangents, the lost work, and the relaxation of a hold."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +10,12 @@ from palpate.identification.estimators.octaves import Segment, segments_of
 from palpate.identification.evidence.slope import (
     FEWEST,
     STILL,
+    Drag,
     loadings_in,
     read_later,
     slope_between,
     slope_of,
+    tangent_at,
 )
 from palpate.identification.evidence.spectrum import dynamic_stiffness, point_of, storage_near, working_point
 from palpate.identification.in_series import SeriesSpring
@@ -24,8 +24,8 @@ from palpate.identification.options import Options
 from palpate.identification.pooling import random_effects
 from palpate.identification.problem import Problem
 from palpate.identification.result import DynamicStiffness, Press, Relaxation, Tangent, WorkingPoint
-from palpate.identification.steady_press import Slopes, SteadyPress, few_points
-from palpate.identification.uncertainty import Contribution, Measurement
+from palpate.identification.steady_press import NEAR, Slopes, SteadyPress, few_points
+from palpate.identification.uncertainty import Contribution, Measurement, half_width
 from palpate.signals.samples import runs
 
 
@@ -127,26 +127,60 @@ def _late(contacts: list[tuple[Array, Array, Array, Array]]) -> tuple[float, flo
     return (mean.value, mean.half) if mean.value > mean.half else None
 
 
-_LEVELS = (0.3, 0.5, 0.7, 0.9)
+LEVELS = (0.3, 0.5, 0.7, 0.9)
+_DAMPING = 0.5
+"""Share of a model's damping by which that at one depth may differ: `benchmarks/identification/force_steps.py`."""
 
 
-def press_of(problem: Problem, lag: float, segments: list[Segment]) -> Press | None:
-    """The press of a log; None without a loading."""
+def press_of(problem: Problem, answer: Answer | None, segments: list[Segment]) -> Press | None:
+    """The press of a log, its tangents less the damping of an answer; None without a loading."""
+    lag = problem.lag.value
     loadings = loadings_in(problem, lag, segments)
     if not loadings:
         return None
     loading = max(loadings, key=lambda loading: len(loading.depth))
     later = read_later(problem, lag, segments, loadings)
-    slopes = (slope_between(loadings, later, level) for level in _LEVELS)
     unloading, loss, late = _unloading_of(problem, lag, segments)
     return Press(
-        tuple(Tangent(own.force, own.stiffness) for own in slopes if own and own.stiffness.known_to(1.0)),
+        _tangents(problem, answer, segments),
         few_points(np.stack([loading.depth, loading.force])),
         few_points(unloading),
         loss,
         relaxation(problem, lag, segments, slope_between(loadings, later)),
         late,
     )
+
+
+def _tangents(problem: Problem, answer: Answer | None, segments: list[Segment]) -> tuple[Tangent, ...]:
+    """Tangents at shares of the force, those that are known to their own size.
+
+    A lag is a damping of -K times as much: the answer's damping belongs to the answer's lag.
+    """
+    lag = problem.lag.value if answer is None else answer.fit.lag
+    loadings = loadings_in(problem, lag, segments)
+    inside = np.concatenate([np.arange(s.first, s.last) for s in segments])
+    low, high = np.percentile(problem.force[inside], [2, 98])
+    found = []
+    for force in (low + share * (high - low) for share in LEVELS):
+        slope = tangent_at(problem, lag, loadings, float(force), NEAR * (high - low), _drag(answer, force))
+        if slope is not None and slope.known_to(1.0):
+            found.append(Tangent(float(force), slope))
+    return tuple(found)
+
+
+def _drag(answer: Answer | None, force: float) -> Drag | None:
+    """The damping of an answer at a force [N]; None of a model whose damping is in its branch as well.
+
+    That of a power law grows with the force, and is known to within itself at best, as its scale and its exponent are
+    known together.
+    """
+    if answer is None or not {"K", "B"} <= set(answer.names) or "tau" in answer.names:
+        return None
+    if answer.fit.model.of_power:
+        most = answer["B"] / answer["K"] * force if answer["K"] else 0.0
+        return Drag(most, abs(most))
+    half = half_width({cause: part for cause, part in answer.contributions("B").items() if cause != "lag"})
+    return Drag(answer["B"], half + _DAMPING * abs(answer["B"]))
 
 
 def at_constant_speed(steady: SteadyPress, seen: Press | None, origin: float) -> Press:
@@ -183,7 +217,7 @@ def evidence_of(problem: Problem, options: Options, unit: str, answer: Answer | 
     )
     spectrum = dynamic_stiffness(problem, segments, lag.value, lag.std, friction)
     whole = problem.with_touches or problem  # a press may be over before a filter has settled
-    press = press_of(whole, lag.value, segments_of(whole.motion.rows, whole.spans) or segments)
+    press = press_of(whole, answer, segments_of(whole.motion.rows, whole.spans) or segments)
     steady = problem.contacts.press
     headline = None
     if steady is not None:
@@ -212,11 +246,10 @@ def _among_loadings(headline: Slopes, problem: Problem) -> Slopes:
         return headline
     rest = 0.0 if problem.counted else problem.contacts.resting
     low, high = np.percentile(np.concatenate([own.force for own in loadings]), [2, 98])
-    level = (headline.force + rest - low) / (high - low or 1.0)
-    other = slope_between(loadings, read_later(problem, lag, segments, loadings), level)
-    if other is None:
+    both = tangent_at(problem, lag, loadings, headline.force + rest, NEAR * float(high - low), None)
+    if both is None:
         return headline
-    own, both = headline.stiffness, other.stiffness
+    own = headline.stiffness
     between = max((both.value - own.value) ** 2 - both.half**2 - own.half**2, 0.0)
     differ = Contribution.within(float(np.sqrt(between)))
     return replace(headline, stiffness=own.with_cause("loadings", differ))

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Indices
 from palpate.identification.estimators.octaves import Segment
-from palpate.identification.filters.state_variable import Chain
+from palpate.identification.filters import Chain
 from palpate.identification.least_squares import noise_of
-from palpate.identification.pooling import random_effects
+from palpate.identification.pooling import Mean, random_effects
 from palpate.identification.problem import Problem
-from palpate.identification.steady_press import NEAR, Slopes
+from palpate.identification.steady_press import Slopes
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import runs
 from palpate.signals.types import NORMAL
@@ -123,78 +122,149 @@ def slope_in(problem: Problem, segments: list[Segment]) -> Slopes | None:
     return slope_between(loadings, read_later(problem, problem.lag.value, segments, loadings))
 
 
-def slope_between(loadings: list[Loading], later: list[Loading], level: float | None = None) -> Slopes | None:
+def slope_between(loadings: list[Loading], later: list[Loading]) -> Slopes | None:
     """The slope of some loadings; its interval reaches that with the force later, where the lag is not exact."""
-    found = slope_of(loadings, level)
-    other = slope_of(later, level) if found is not None and later is not loadings else None
+    found = slope_of(loadings)
+    other = slope_of(later) if found is not None and later is not loadings else None
     if found is None or other is None:
         return found
     by_lag = Contribution(abs(other.stiffness.value - found.stiffness.value))
     return replace(found, stiffness=found.stiffness.with_cause("lag", by_lag))
 
 
-def slope_of(loadings: list[Loading], level: float | None = None) -> Slopes | None:
-    """Slope in the upper part of the force, or about a share of it (`level`); None without a loading that rises.
+def slope_of(loadings: list[Loading]) -> Slopes | None:
+    """Slope in the upper part of the force; None without a loading that rises.
 
     Half way between the slope as it is and the slope at rest, less what the force has of the speed: both are told, and
     the interval reaches both. It has the scatter of each loading, what it differs by from the slope of the channels as
-    they were read, and the variance between loadings (a random effect, Student's t); of the upper part, the change of
-    the slope over it.
+    they were read, the change of the slope over the upper part, and the variance between loadings (a random effect,
+    Student's t).
     """
-    every = [own for loading in loadings if (own := _slope_in(loading, level)) is not None]
+    every = [own for loading in loadings if (own := _slope_in(loading)) is not None]
     if not every:
         return None
     slopes, variances, changes, filters, speeds, forces, depths, rises = np.array(every).T
     mean = random_effects(slopes, variances)
-    bounds = zip(("curvature", "filter", "speed"), (changes, filters, speeds), strict=True)
-    causes = {cause: Contribution.within(float(own.mean())) for cause, own in bounds}
-    if level is not None:
-        del causes["curvature"]
-    causes["repetition" if len(slopes) > 1 else "noise"] = Contribution(mean.std, mean.freedom)
-    at, found = (float(forces.mean()), float(depths.mean())), Measurement(mean.value, causes)
+    bounds = {"curvature": changes, "filter": filters, "speed": speeds}
+    found = _mean_slope(mean, bounds, len(slopes))
+    at = float(forces.mean()), float(depths.mean())
     return Slopes(*at, found, tuple(slopes.tolist()), mean.next_half, float(rises.mean()))
 
 
-def _slope_in(loading: Loading, level: float | None) -> tuple[float, ...] | None:
+def _mean_slope(mean: Mean, bounds: dict[str, Array], count: int) -> Measurement:
+    """The mean of some slopes with its causes: bounds of each, shape (n,), and what they scatter by."""
+    causes = {cause: Contribution.within(float(own.mean())) for cause, own in bounds.items()}
+    causes["repetition" if count > 1 else "noise"] = Contribution(mean.std, mean.freedom)
+    return Measurement(mean.value, causes)
+
+
+def _slope_in(loading: Loading) -> tuple[float, ...] | None:
     """Of one loading: slope, its variance, its change; by how much filter and speed move it; force, depth, duration."""
-    rows = _rows(loading.force, level)
+    rows = _upper(loading.force)
     depth, force = loading.depth[rows], loading.force[rows]
     if len(rows) < FEWEST or np.ptp(depth) <= 0:
         return None
     slope, variance, change = _line(depth, force)
-    if level is None:
-        at_rest, at = _at_rest(loading.whole or loading), float(force.mean())
-    else:
-        at_rest, *_ = _line(depth, force - _of_speed(loading) * loading.speed[rows])
-        low, high = np.percentile(loading.force, [2, 98])
-        at = float(low + level * (high - low))
-    by_filter = 0.0 if loading.read is None else _apart(loading.read, level, slope, variance)
+    at_rest = _at_rest(loading.whole or loading)
+    by_filter = 0.0
+    if loading.read is not None:
+        by_filter = _apart(loading.read[:, _upper(loading.read[1])], slope, variance)
     rise = float(loading.time[-1] - loading.time[0])
     value, by_speed = (slope + at_rest) / 2, abs(slope - at_rest) / 2
-    return value, variance, change, by_filter, by_speed, at, float(depth.mean()), rise
+    return value, variance, change, by_filter, by_speed, float(force.mean()), float(depth.mean()), rise
 
 
-def _rows(force: Array, level: float | None) -> NDArray[np.intp]:
-    """Rows about a share of the force; or all after the last below the upper part, as a force may fall once."""
+def _upper(force: Array) -> Indices:
+    """All rows after the last below the upper part of the force, as a force may fall once; shape (n,) to (k,)."""
+    if not len(force):
+        return np.empty(0, np.intp)
     low, high = np.percentile(force, [2, 98])
-    share = (force - low) / (high - low or 1.0)
-    if level is not None:
-        return np.flatnonzero(np.abs(share - level) < NEAR)
-    below = np.flatnonzero(share <= _UPPER)
+    below = np.flatnonzero(force - low <= _UPPER * (high - low or 1.0))
     return np.arange(int(below[-1]) + 1 if len(below) else 0, len(force))
 
 
-def _apart(read: Array, level: float | None, slope: float, variance: float) -> float:
-    """By how much a slope contradicts that of the channels as read [N/m], beyond their 95 % interval.
+def _apart(read: Array, slope: float, variance: float) -> float:
+    """By how much a slope contradicts that of depth and force as read, shape (2, k), beyond their 95 % interval [N/m].
 
     All of it, if there are too few readings for a slope of their own: the loading's shape is then the filter's.
     """
-    depth, force = read
-    rows = _rows(force, level) if len(force) else np.empty(0, np.intp)
-    if len(rows) < _LINE or np.ptp(depth[rows]) <= 0:
+    if read.shape[1] < _LINE or np.ptp(read[0]) <= 0:
         return abs(slope)
-    own, doubt, _ = _line(depth[rows], force[rows])
+    own, doubt, _ = _line(*read)
     return max(abs(own - slope) - NORMAL * float(np.sqrt(max(variance + doubt, 0.0))), 0.0)
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Force over speed [N s/m] and its 95 % half-width: a damping as a tangent needs it."""
+
+    value: float
+    half: float
+
+    @classmethod
+    def up_to(cls, most: float) -> Drag:
+        """From nothing to that [N s/m]."""
+        return cls(most / 2, abs(most) / 2)
+
+
+def tangent_at(
+    problem: Problem, lag: float, loadings: list[Loading], force: float, within: float, drag: Drag | None
+) -> Measurement | None:
+    """Slope of force over depth in loading at a force [N], less the drag, of the rows within so much of it [N].
+
+    Of each contact by the advance through that force that goes farthest. Where the drag is not known, the interval
+    reaches from the slope as it is to that less what the loading shows of the speed. None where no advance goes through
+    the force.
+    """
+    every = []
+    for loading in loadings:
+        whole = loading.whole or loading
+        advance = _advance_through(whole, force)
+        if advance is None:
+            continue
+        own = replace(advance, read=_as_read(problem, lag, advance))
+        every.append(_tangent_in(own, force, within, drag or Drag.up_to(_of_speed(whole))))
+    found = [own for own in every if own is not None]
+    if not found:
+        return None
+    slopes, variances, changes, filters, speeds = np.array(found).T
+    bounds = {"curvature": changes, "filter": filters, "speed": speeds}
+    return _mean_slope(random_effects(slopes, variances), bounds, len(slopes))
+
+
+def _advance_through(whole: Loading, force: float) -> Loading | None:
+    """The advance without a rest through a force [N] that goes farthest; None if there is none."""
+    moves = whole.speed > STILL * float(np.percentile(np.abs(whole.speed), 98))
+    through = [
+        (a, b) for a, b in runs(moves) if b - a >= FEWEST and whole.force[a] <= force <= whole.force[b - 1]
+    ]
+    if not through:
+        return None
+    first, last = max(through, key=lambda run: whole.depth[run[1] - 1] - whole.depth[run[0]])
+    rows = slice(first, last)
+    return Loading(whole.depth[rows], whole.speed[rows], whole.force[rows], whole.time[rows])
+
+
+def _tangent_in(advance: Loading, force: float, within: float, drag: Drag) -> tuple[float, ...] | None:
+    """Of one advance: slope at a force, its variance, its change; by how much filter and speed move it."""
+    rows = np.flatnonzero(np.abs(advance.force - force) < within)
+    depth = advance.depth[rows]
+    if len(rows) < FEWEST or np.ptp(depth) <= 0:
+        return None
+    curve = Parabola.of(depth, advance.force[rows])
+    at = curve.where(force)
+    slope, variance = curve.slope_at(at)
+    nearer = rows[np.abs(advance.force[rows] - force) < within / 2]
+    if len(nearer) < FEWEST:
+        change = curve.change
+    else:
+        half = Parabola.of(advance.depth[nearer], advance.force[nearer])
+        change = abs(half.slope_at(half.where(force))[0] - slope)
+    by_filter = 0.0
+    if advance.read is not None:
+        by_filter = _apart(advance.read[:, np.abs(advance.read[1] - force) < within], slope, variance)
+    turn = Parabola.of(depth, advance.speed[rows]).slope_at(at)[0]
+    return slope - drag.value * turn, variance, change, by_filter, drag.half * abs(turn)
 
 
 def unseen(problem: Problem) -> float:
@@ -214,18 +284,57 @@ def unseen(problem: Problem) -> float:
     return apart / float(position.var()) * gap / rest if rest else 0.0
 
 
-def _line(x: Array, f: Array) -> tuple[float, float, float]:
-    """Slope, its variance under coloured noise, and half of what the slope changes by over the range."""
-    middle, reach = float(x.mean()), float(np.ptp(x))
-    u = (x - middle) / reach
-    columns = np.column_stack([np.ones_like(u), u, u**2 - (u**2).mean()])
-    theta, *_ = np.linalg.lstsq(columns, f, rcond=None)
-    left = f - columns @ theta
-    noise = noise_of(left, np.arange(len(f)), 3)
-    gram = np.linalg.pinv(columns.T @ columns)
-    variance = noise.variance * len(f) / max(noise.effective, 4.0) * np.diag(gram)
-    curve = abs(float(theta[2]))
-    return float(theta[1] / reach), float(variance[1] / reach**2), curve / reach
+@dataclass(frozen=True)
+class Parabola:
+    """Force over depth in least squares: of u, the depth from its middle [m] over its reach [m], to the second power.
+
+    Args:
+        middle, reach: mean and range of the depth [m].
+        theta: coefficients [N], shape (3,), of 1, u and u^2 less its mean.
+        square: the mean of u^2.
+        cov: of the coefficients, under coloured noise, shape (3, 3).
+    """
+
+    middle: float
+    reach: float
+    theta: Array
+    square: float
+    cov: Array
+
+    @classmethod
+    def of(cls, depth: Array, force: Array) -> Parabola:
+        """Through some points, each of shape (n,)."""
+        middle, reach = float(depth.mean()), float(np.ptp(depth))
+        u = (depth - middle) / reach
+        square = float((u**2).mean())
+        columns = np.column_stack([np.ones_like(u), u, u**2 - square])
+        theta = np.asarray(np.linalg.lstsq(columns, force, rcond=None)[0], np.float64)
+        noise = noise_of(force - columns @ theta, np.arange(len(force)), 3)
+        gram = np.asarray(np.linalg.pinv(columns.T @ columns), np.float64)
+        scale = noise.variance * len(force) / max(noise.effective, 4.0)
+        return cls(middle, reach, theta, square, scale * gram)
+
+    @property
+    def change(self) -> float:
+        """Half of what the slope changes by over the range [N/m]."""
+        return abs(float(self.theta[2])) / self.reach
+
+    def where(self, force: float) -> float:
+        """Depth of a force, over the reach from the middle: the root next to that of the line, within the range."""
+        offset, slope, bend = self.theta - np.array([force + self.theta[2] * self.square, 0.0, 0.0])
+        root = np.sqrt(max(slope**2 - 4 * bend * offset, 0.0))
+        return float(np.clip(-2 * offset / (slope + np.copysign(root, slope) or np.inf), -1.0, 1.0))
+
+    def slope_at(self, u: float) -> tuple[float, float]:
+        """Slope [N/m] and its variance at a depth over the reach from the middle."""
+        gradient = np.array([0.0, 1.0, 2 * u]) / self.reach
+        return float(gradient @ self.theta), float(gradient @ self.cov @ gradient)
+
+
+def _line(depth: Array, force: Array) -> tuple[float, float, float]:
+    """Slope in the middle, its variance under coloured noise, and half of what it changes by over the range."""
+    curve = Parabola.of(depth, force)
+    return *curve.slope_at(0.0), curve.change
 
 
 def _at_rest(loading: Loading) -> float:
@@ -234,7 +343,7 @@ def _at_rest(loading: Loading) -> float:
     Of the whole loading: within one advance that dies out the speed is the depth over again, and only rests between
     advances tell the two apart.
     """
-    rows = _rows(loading.force, None)
+    rows = _upper(loading.force)
     columns = np.column_stack([np.ones(len(rows)), loading.speed[rows], loading.depth[rows]])
     return _last_of(columns, loading.force[rows])
 

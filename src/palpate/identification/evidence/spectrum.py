@@ -7,8 +7,6 @@ from other octaves leaks into all channels alike. The variance between blocks, w
 number, makes the interval, so that whatever differs from block to block, known or not, widens it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,17 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
+from palpate.identification.estimators import octaves
 from palpate.identification.estimators.budget import HIDDEN_SHARE
-from palpate.identification.estimators.octaves import (
-    LINES,
-    OVERLAP,
-    PERIODS,
-    SHORTEST,
-    Segment,
-    longest_of,
-    segments_of,
-    transform_of,
-)
+from palpate.identification.estimators.octaves import Segment
 from palpate.identification.evidence.slope import slope_in, unseen
 from palpate.identification.in_series import SeriesSpring
 from palpate.identification.options import Options
@@ -104,8 +94,8 @@ def dynamic_stiffness(
     channels = position, problem.motion.moved(1, lag), problem.force, *besides
     variance = float(np.concatenate([position[s.first : s.last] for s in segments]).var()) or 1e-300
     found = []
-    length = longest_of(segments)
-    while length >= SHORTEST:
+    length = octaves.longest_of(segments)
+    while length >= octaves.SHORTEST:
         blocks = _blocks(problem, channels, segments, length, len(friction))
         octave = _octave(blocks, length, dt, variance, lag_std)
         if _LOWEST <= octave.frequency * length * dt <= _HIGHEST:
@@ -119,8 +109,8 @@ def storage_near(problem: Problem, segments: list[Segment], frequency: float) ->
     motion, lag = problem.motion, problem.lag.value
     dt = float(np.median(np.diff(problem.time)))
     channels = motion.moved(0, lag), motion.moved(1, lag), problem.force
-    length = longest_of(segments)
-    while length >= SHORTEST:
+    length = octaves.longest_of(segments)
+    while length >= octaves.SHORTEST:
         if _LOWEST < np.sqrt(2) * frequency * length * dt < 2 * _HIGHEST:
             line = _fit(_blocks(problem, channels, segments, length, 0))
             own = line.omega / (2 * np.pi)
@@ -153,7 +143,7 @@ def _blocks(
     problem: Problem, channels: tuple[Array, ...], segments: list[Segment], length: int, besides: int
 ) -> _Blocks:
     """Of all segments that hold one; half overlapping, without their mean and their mean slope."""
-    seen, count = transform_of(length, LINES), len(LINES)
+    seen, count = octaves.transform_of(length, octaves.LINES), len(octaves.LINES)
 
     def lines(values: Array) -> Complex:
         parts = [values[s.first : s.last] for s in segments if s.length >= length]
@@ -163,7 +153,7 @@ def _blocks(
         return np.asarray(real[:, :count] + 1j * real[:, count:])
 
     chain, dt = problem.motion.chain, float(np.median(np.diff(problem.time)))
-    frequency = np.array([PERIODS / (length * dt)])
+    frequency = np.array([octaves.PERIODS / (length * dt)])
     line = problem.motion.noise.power(frequency, chain.dt) * chain.position_gain(frequency) ** 2
     x, v, f, *others = (lines(values) for values in channels)
     rounded, friction = tuple(others[besides:]), tuple(others[:besides])
@@ -203,7 +193,7 @@ def _fit(blocks: _Blocks) -> _Line:
     power = np.abs(x) ** 2
     total = float(power.sum()) or 1e-300
     omega = float(np.sqrt((np.abs(v) ** 2).sum() / total)) or 1e-300
-    u = np.array(LINES) - float((power @ LINES).sum()) / total
+    u = np.array(octaves.LINES) - float((power @ octaves.LINES).sum()) / total
     spread = float((power @ u**2).sum()) / total
     slope = spread > _FLAT
     columns = np.stack([x, v / omega, u * x, u * v / omega] if slope else [x, v / omega], axis=-1)
@@ -212,12 +202,12 @@ def _fit(blocks: _Blocks) -> _Line:
     theta = bread @ (flat.conj().T @ f.ravel()).real
     left = f - columns @ theta
     own = power.sum(axis=1)
-    independent = max(OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
+    independent = max(octaves.OVERLAP * total**2 / float((own**2).sum() or 1e-300), 1.0)
     tied = bread @ (flat.conj().T @ (_TIED @ columns).reshape(flat.shape)).real
     noise = float((np.abs(left) ** 2).sum()) / max(3 * len(x) - float(np.trace(tied)) / 2, 1e-3)
-    within = noise / 2 * np.diag(tied @ bread)[:2] / OVERLAP
+    within = noise / 2 * np.diag(tied @ bread)[:2] / octaves.OVERLAP
     moved = np.einsum("blp,bl->bp", columns.conj(), left).real @ bread[:, :2]
-    grown = independent / max(independent - 1, 0.5) / OVERLAP
+    grown = independent / max(independent - 1, 0.5) / octaves.OVERLAP
     freedom = max(independent - 1, 2.0 * min(1.0, 2 / independent))
     change = theta[2:] * np.sqrt(spread) if slope else np.zeros(2)
     variance = np.maximum((moved**2).sum(axis=0) * grown, within)
@@ -244,7 +234,7 @@ def working_point(
     bounces, is at every frequency at once: as much of it as is seen may be at the octave's own.
     """
     tolerance, bonded = options.tolerance, problem.contacts.bonded
-    segments = segments_of(problem.motion.rows, problem.spans)
+    segments = octaves.segments_of(problem.motion.rows, problem.spans)
     press, octave = slope_in(problem, segments), _octave_point(spectrum, tolerance)
     series = SeriesSpring.of(options)
     if press is not None and series is not None:

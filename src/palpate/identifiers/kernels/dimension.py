@@ -1,21 +1,19 @@
 """How many parameters there are: a part for each way to hold them, which reads and writes them in flat arrays.
 
 Kernels are handed one of these and are compiled for it: three and four parameters by value, which makes no arrays,
-other numbers of them as arrays. Four are a `Vec3` and one more, and the `Mat3` with a border that maps them: a
-surface with mass, damping, stiffness and an offset has four. Vectors and matrices of any size have the operators of
+other numbers of them as arrays. Four are a `Vec3` and one more: a surface with mass, damping, stiffness and an offset
+has four. Vectors and matrices of any size have the operators of
 `Vec3` and `Mat3`: NumPy's own do the same where laws run as they stand, but compiled, each expression of theirs costs
 half a second to compile, and several arrays each time it runs; one of these makes one array, and all of them compile
 in the time of three of those.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
 
 from palpate._jit import law, part
-from palpate._vector import Mat3, Vec3, outer
+from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 
 
@@ -144,13 +142,16 @@ Vector.__array_ufunc__ = Matrix.__array_ufunc__ = None  # type: ignore[attr-defi
 
 @part
 class Vec4(NamedTuple):
-    """Four components; `+` and `/` work element by element, `@` is the dot product."""
+    """Four components; `+ - /` work element by element, `@` is the dot product."""
 
     v: Vec3
     w: float
 
     def __add__(a, b):
         return Vec4(a.v + b.v, a.w + b.w)
+
+    def __sub__(a, b):
+        return Vec4(a.v - b.v, a.w - b.w)
 
     def __rmul__(a, k):
         return Vec4(k * a.v, k * a.w)
@@ -163,56 +164,58 @@ class Vec4(NamedTuple):
 
     def map_left(b, A):
         """The matrix product from the left."""
-        return Vec4(A.inner @ b.v + b.w * A.column, A.row @ b.v + A.corner * b.w)
+        return Vec4(Vec3(A.r1 @ b, A.r2 @ b, A.r3 @ b), A.r4 @ b)
 
     def map_outer(a, b):
         """The outer product a b^T."""
-        return Mat4(outer(a.v, b.v), b.w * a.v, a.w * b.v, a.w * b.w)
+        return Mat4(a.v.x * b, a.v.y * b, a.v.z * b, a.w * b)
 
 
 @part
 class Mat4(NamedTuple):
-    """Four rows: [[inner, column], [row, corner]]; `+ -` work element by element, `@` takes a `Vec4` or a `Mat4`."""
+    """Four rows; `+ -` work element by element, `@` takes a `Vec4` or a `Mat4`."""
 
-    inner: Mat3
-    column: Vec3
-    row: Vec3
-    corner: float
+    r1: Vec4
+    r2: Vec4
+    r3: Vec4
+    r4: Vec4
 
     def __add__(A, B):
-        return Mat4(A.inner + B.inner, A.column + B.column, A.row + B.row, A.corner + B.corner)
+        return Mat4(A.r1 + B.r1, A.r2 + B.r2, A.r3 + B.r3, A.r4 + B.r4)
 
     def __sub__(A, B):
-        return Mat4(A.inner - B.inner, A.column - B.column, A.row - B.row, A.corner - B.corner)
+        return Mat4(A.r1 - B.r1, A.r2 - B.r2, A.r3 - B.r3, A.r4 - B.r4)
 
     def __rmul__(A, k):
-        return Mat4(k * A.inner, k * A.column, k * A.row, k * A.corner)
+        return Mat4(k * A.r1, k * A.r2, k * A.r3, k * A.r4)
 
     def __matmul__(A, b):
         return b.map_left(A)
 
     def map_left(B, A):
         """The matrix product from the left."""
-        return Mat4(
-            A.inner @ B.inner + outer(A.column, B.row),
-            A.inner @ B.column + B.corner * A.column,
-            B.inner.T @ A.row + A.corner * B.row,
-            A.row @ B.column + A.corner * B.corner,
-        )
+        C = B.T
+        return Mat4(C @ A.r1, C @ A.r2, C @ A.r3, C @ A.r4)
 
     @property
     def T(A):
         """The transpose of the matrix."""
-        return Mat4(A.inner.T, A.row, A.column, A.corner)
+        a, b, c, d = A.r1, A.r2, A.r3, A.r4
+        return Mat4(
+            Vec4(Vec3(a.v.x, b.v.x, c.v.x), d.v.x),
+            Vec4(Vec3(a.v.y, b.v.y, c.v.y), d.v.y),
+            Vec4(Vec3(a.v.z, b.v.z, c.v.z), d.v.z),
+            Vec4(Vec3(a.w, b.w, c.w), d.w),
+        )
 
     def map_solve(A, b):
         """x with A x = b."""
         numbers, right = np.empty((4, 4)), np.empty(4)
-        for i in range(3):
-            numbers[i, 3], numbers[3, i], right[i] = A.column[i], A.row[i], b.v[i]
-            for j in range(3):
-                numbers[i, j] = A.inner[i][j]
-        numbers[3, 3], right[3] = A.corner, b.w
+        numbers[0, 0], numbers[0, 1], numbers[0, 2], numbers[0, 3] = A.r1.v.x, A.r1.v.y, A.r1.v.z, A.r1.w
+        numbers[1, 0], numbers[1, 1], numbers[1, 2], numbers[1, 3] = A.r2.v.x, A.r2.v.y, A.r2.v.z, A.r2.w
+        numbers[2, 0], numbers[2, 1], numbers[2, 2], numbers[2, 3] = A.r3.v.x, A.r3.v.y, A.r3.v.z, A.r3.w
+        numbers[3, 0], numbers[3, 1], numbers[3, 2], numbers[3, 3] = A.r4.v.x, A.r4.v.y, A.r4.v.z, A.r4.w
+        right[0], right[1], right[2], right[3] = b.v.x, b.v.y, b.v.z, b.w
         x = eliminate(numbers, right)
         return Vec4(Vec3(x[0], x[1], x[2]), x[3])
 
@@ -283,9 +286,8 @@ class Four(NamedTuple):
 
     def matrix(self, numbers, k):
         """Sixteen numbers from k on, row by row."""
-        a, b, c = self.vector(numbers, k), self.vector(numbers, k + 4), self.vector(numbers, k + 8)
-        d = self.vector(numbers, k + 12)
-        return Mat4(Mat3(a.v, b.v, c.v), Vec3(a.w, b.w, c.w), d.v, d.w)
+        a, b = self.vector(numbers, k), self.vector(numbers, k + 4)
+        return Mat4(a, b, self.vector(numbers, k + 8), self.vector(numbers, k + 12))
 
     def put_vector(self, numbers, k, v):
         """Writes a vector from k on."""
@@ -293,10 +295,10 @@ class Four(NamedTuple):
 
     def put_matrix(self, numbers, k, A):
         """Writes a matrix from k on, row by row."""
-        self.put_vector(numbers, k, Vec4(A.inner.r1, A.column.x))
-        self.put_vector(numbers, k + 4, Vec4(A.inner.r2, A.column.y))
-        self.put_vector(numbers, k + 8, Vec4(A.inner.r3, A.column.z))
-        self.put_vector(numbers, k + 12, Vec4(A.row, A.corner))
+        self.put_vector(numbers, k, A.r1)
+        self.put_vector(numbers, k + 4, A.r2)
+        self.put_vector(numbers, k + 8, A.r3)
+        self.put_vector(numbers, k + 12, A.r4)
 
     def axis(self, i):
         """The unit vector of parameter i."""
@@ -304,13 +306,11 @@ class Four(NamedTuple):
 
     def identity(self):
         """The unit matrix of this size."""
-        return Mat4(_AXES, _NONE, _NONE, 1.0)
+        return Mat4(self.axis(0), self.axis(1), self.axis(2), self.axis(3))
 
     def variances(self, S):
         """The diagonal of S S^T."""
-        a, b, c = S.inner
-        p = Vec3(a @ a + S.column.x**2, b @ b + S.column.y**2, c @ c + S.column.z**2)
-        return Vec4(p, S.row @ S.row + S.corner**2)
+        return Vec4(Vec3(S.r1 @ S.r1, S.r2 @ S.r2, S.r3 @ S.r3), S.r4 @ S.r4)
 
 
 @part

@@ -1,6 +1,7 @@
 """Columns or topics, units and frames of the recorders that come with usual robots, a TOML file each."""
 
 import tomllib
+from collections.abc import Container
 from importlib.resources import files
 from typing import Any
 
@@ -21,3 +22,18 @@ def preset(name: str) -> dict[str, Any]:
     if name not in presets():
         raise unknown("preset", name, presets())
     return tomllib.loads(files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def preset_among(names: Container[str]) -> str | None:
+    """The preset all of whose columns or topics are among some names; None if there is no such one."""
+    for name in presets():
+        options = preset(name)
+        needed = [
+            column
+            for key in ("time", "wrench", "pose")
+            for column in str(options.get(key, "")).split(",")
+            if column
+        ]
+        if all(column in names for column in needed):
+            return name
+    return None

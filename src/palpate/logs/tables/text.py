@@ -1,7 +1,5 @@
 """Columns of a text log in any of its dialects, read with polars and only where they are asked for."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Sequence

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.arrays import AnyArray, Array, Mask
-from palpate.identification.filters.state_variable import ORDER
+from palpate.identification.filters import ORDER
 from palpate.identification.result import Identification, Traces
 from palpate.signals.samples import GAUSSIAN
 

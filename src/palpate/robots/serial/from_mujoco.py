@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Counts
 from palpate.errors import InputError, unknown
 from palpate.robots.serial.chain import KinematicChain, spread_of
 from palpate.robots.serial.loading import load_mjcf, mujoco, refusals
@@ -218,12 +217,12 @@ def _torques(model: Any, joints: list[int]) -> Array:
     return np.array(found)
 
 
-def _home(model: Any, positions: NDArray[np.int64]) -> Array:
+def _home(model: Any, positions: Counts) -> Array:
     """The first keyframe, or where every joint displaces nothing."""
     return np.array(model.key_qpos[0] if model.nkey else model.qpos0, dtype=float)[positions]
 
 
-def _left_out(model: Any, joints: list[int], dofs: NDArray[np.int64]) -> list[str]:
+def _left_out(model: Any, joints: list[int], dofs: Counts) -> list[str]:
     """Parts of the model that the arm's own laws do not include."""
     notes = []
     others = [model.joint(j).name or str(j) for j in range(model.njnt) if j not in joints]

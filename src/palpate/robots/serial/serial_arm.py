@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
-from palpate.arrays import Array
+from palpate.arrays import Array, Counts
 from palpate.errors import InputError
 from palpate.records import Readable
 from palpate.robots.serial.chain import KinematicChain, Room, Tip, chain_model, jacobian_rate, room_for
@@ -81,8 +81,8 @@ class Scene:
     model: Any
     site: int
     body: int
-    dofs: NDArray[np.int64]
-    positions: NDArray[np.int64]
+    dofs: Counts
+    positions: Counts
 
     def tip(self, data: Any) -> tuple[Array, Array]:
         """Place [m] and axes of the tip in the world."""
