@@ -112,7 +112,7 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class _OutputFiles:
-    """Paths of the files of an identification, None for those not wanted, and the figure's dots per inch."""
+    """Paths of the files of an identification, None for those not asked for, and the figure's dots per inch."""
 
     figure: Path | None
     page: Path | None
@@ -120,7 +120,7 @@ class _OutputFiles:
     dpi: int | None
 
     @property
-    def wanted(self) -> list[Path]:
+    def paths(self) -> list[Path]:
         """Paths of those that are written."""
         return [path for path in (self.figure, self.page, self.table) if path is not None]
 
@@ -163,7 +163,7 @@ def many(
         from palpate.report.many.table import answer_of
 
         _write(rows, pooled, files)
-        written = [(f"{kind_of(path)}:", path) for path in files.wanted]
+        written = [(f"{kind_of(path)}:", path) for path in files.paths]
         print_result(answer_of(rows, pooled), json=json, files=written)
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
@@ -373,7 +373,7 @@ def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
     from palpate.report.identification.answer import answer_of
 
     more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
-    written = [f"{kind_of(path)}: {path}" for path in files.wanted]
+    written = [f"{kind_of(path)}: {path}" for path in files.paths]
     answer = answer_of(found, origin, written, more, verbose=output.verbose, budget=output.budget)
     print_result(answer, json=output.json)
     return 0 if has_number(found) else 1

@@ -24,7 +24,9 @@ from palpate.signals.samples import convolve
 _FROM = 0.2
 """Share of the sampling rate above which there is no motion."""
 _STEPS = 256
+"""Samples of a spectrum of the increments."""
 _IN_BAND = 0.5
+"""Share of the jumps' power that counts at the frequencies of a motion: `PositionNoise.variance` says why."""
 _FEWEST = 10
 """Single counts that show what one is worth."""
 
@@ -262,7 +264,9 @@ _DERIVATIVES = 5
 _NEAR = 0.25
 """Steps of time within which a lag is reached by Taylor's series from one that was read before."""
 _FORGOTTEN = 10.0
+"""Time constants of the slowest pole after which exp(-10) is left of what was before."""
 _MOST_KEPT = 6
+"""Readings of signals that are kept beside the newest."""
 
 
 @dataclass
