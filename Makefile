@@ -1,19 +1,22 @@
 # A machine with Python >= 3.11 (with venv) and make is enough. `make` alone lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-long test-all lint format check bench live attack soak figures figures-fast trust laboratory claims docs pictures lock clean
+.PHONY: help demo test test-long test-real-time test-all lint format check bench live attack soak figures figures-fast trust claims answers docs pictures lock clean
 
 BIN := .venv/bin
 OUT := runs/foam-hybrid
 THESIS := packages/palpate-thesis
-LABORATORY := packages/palpate-laboratory
 # The distributions beside palpate, which add commands to it.
 BESIDE := $(wildcard packages/*)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PIP_INSTALL := $(PIP) install --only-binary :all: --no-warn-script-location
 # Bytecode is kept whatever the environment says: tests start many processes, which would compile the sources each.
 # One thread for algebra and tables: the tests take all cores already, and threads without a core of their own wait spinning.
-PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 POLARS_MAX_THREADS=1 \
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+TEST_PYTHON := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 POLARS_MAX_THREADS=1 $(BIN)/python
+PYTEST := $(TEST_PYTHON) -m pytest
+# Kernels that many tests use are compiled before the tests start: else all processes wait for the one that compiles.
+SHARED := $(TEST_PYTHON) tests/warm_up.py && $(PYTEST) --numprocesses auto --dist worksteal
+# A process of its own, too: a test that hangs ends that one, and fails by its name.
+ONE_AT_A_TIME := $(PYTEST) --numprocesses 1
 # The Python to build .venv with; `make test PYTHON=python3.13` picks another.
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11 python3.14 python; do \
 	if $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then echo $$p; break; fi; done)
@@ -28,13 +31,16 @@ demo: .venv/run.stamp ## set up, identify a small log, press on foam, and say wh
 	@echo "The report is $(CURDIR)/$(OUT)/report.html"
 
 test: .venv/dev.stamp ## set up and run the tests, on all cores
-	$(PYTEST)
+	$(SHARED)
 
 test-long: .venv/dev.stamp ## run the tests that take long: Monte-Carlo, whole figures of the thesis
-	$(PYTEST) -m long
+	$(SHARED) -m "long and not real_time"
 
-test-all: .venv/dev.stamp ## run the tests of `make test` and of `make test-long`, in one go
-	$(PYTEST) -m "long or not long"
+test-real-time: .venv/dev.stamp ## run what has to keep up with a clock: sockets, processes, signals; one test at a time
+	$(ONE_AT_A_TIME) -m real_time
+
+test-all: .venv/dev.stamp ## run all tests: those that may share the cores in one go, then those of real time
+	$(SHARED) -m "not real_time"; parallel=$$?; $(ONE_AT_A_TIME) -m real_time && exit $$parallel
 
 lint: .venv/dev.stamp ## lint, format, types, direction of imports
 	$(BIN)/ruff check
@@ -49,12 +55,10 @@ format: .venv/dev.stamp ## wrap the code, sort the imports, mend what ruff can m
 
 check: lint test ## everything that has to pass before a commit
 
-bench: .venv/dev.stamp ## measure what a tick, an update, many runs and a cold start cost here
+bench: .venv/dev.stamp ## measure what a tick and a cold start cost here
 	$(BIN)/palpate speed
 	$(BIN)/python benchmarks/c_yardstick/compare.py
 	$(BIN)/python benchmarks/side_by_side.py
-	$(BIN)/python benchmarks/many_runs.py
-	$(BIN)/python benchmarks/least_squares.py
 	$(BIN)/python benchmarks/cold_start.py
 	$(BIN)/python benchmarks/arms/tick.py
 
@@ -77,15 +81,12 @@ figures-fast: .venv/dev.stamp ## run the small run of every figure, and compare 
 trust: .venv/dev.stamp ## judge identify on a foreign simulator's logs and put the figures into docs/trust.md; a quarter of an hour
 	$(BIN)/python benchmarks/figures.py --only trust plain-presses cases
 
-laboratory: .venv/dev.stamp ## infer the thesis' laboratory again, ship it, and put what was found into docs/laboratory.md; resumable
-	$(BIN)/palpate laboratory --particles 128 --seed 1 --out runs/laboratory
-	cp runs/laboratory/inferred.toml $(LABORATORY)/src/palpate_laboratory/shipped/inferred.toml
-	$(BIN)/palpate thesis --laboratory inferred --out runs/thesis-inferred --replace
-	$(BIN)/python $(LABORATORY)/benchmarks/document.py runs/laboratory --thesis runs/thesis-inferred --markdown docs/laboratory.md
-
 claims: .venv/dev.stamp ## measure the whole thesis again, say which claims changed, and keep what they are now for the tests
 	$(BIN)/palpate thesis --out runs/claims --replace
 	$(BIN)/python $(THESIS)/tests/frozen.py runs/claims
+
+answers: .venv/dev.stamp ## record what palpate answers, to compare before and after a restructuring; an hour, resumable
+	$(BIN)/python benchmarks/answers.py build/answers
 
 docs: .venv/dev.stamp ## build the documentation into site/
 	$(BIN)/zensical build --clean --strict

@@ -42,26 +42,10 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """One process more than there are cores: what waits for a wire, a page or a clock leaves a core to the others."""
-    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1) + 1
-
-
-REAL_TIME = ROOT / "packages" / "palpate-wires" / "tests" / "wires"
-"""A press over a wire runs against a clock: a machine that halts for half a second makes an arm late in truth, and the
-press ends as it should. So these may try again; a fault of ours fails each time. All others wait for a condition."""
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let the tests that run against a clock begin first, and again, twice.
-
-    They wait for most of their time: the process that has them leaves the cores to the others, as long as those have
-    something to do.
-    """
-    items.sort(key=lambda item: REAL_TIME not in item.path.parents)
-    for item in items:
-        if REAL_TIME in item.path.parents:
-            item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=2))
+    """One process for each core: each collects all tests and imports all libraries for itself, and none waits long."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from compiling import LISTED, SPENT, listed
-
 import palpate.bench
 
 COLD, WARM, RUN = 10.0, 0.6, 2.0
@@ -20,9 +18,9 @@ FIRST_PRESS, NEXT_PRESS = 12.0, 1.0
 """Budgets of a press [s]."""
 PRESS = """
 import time
-from palpate.press.prepare import Question, prepared, surface_of
+from palpate.press.prepare import PressSpec, prepare_press, surface_of
 wall, cpu = time.perf_counter(), time.process_time()
-prepared(Question(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
+prepare_press(PressSpec(arm="fr3", force=20.0, surface=surface_of("K=5000,B=50"), seconds=0.1)).run()
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
 FIRST_CALL = """
@@ -33,16 +31,6 @@ wall, cpu = time.perf_counter(), time.process_time()
 bench.run(0.01)
 print(time.perf_counter() - wall, time.process_time() - cpu)
 """
-WHERE = (
-    SPENT
-    + """
-from palpate.bench import build, load
-bench = build(load("foam-neural"))
-begin = time.process_time()
-bench.run(0.01)
-"""
-    + LISTED
-)
 TEN_SECONDS = r"""
 import sys, time
 from pathlib import Path
@@ -61,21 +49,18 @@ print(time.perf_counter() - wall, time.process_time() - cpu, file=sys.stderr)
 """
 
 
-def ran(code: str, *arguments: str, **environment: str) -> str:
-    """What a process of its own printed."""
+def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]:
+    """Wall and processor seconds that a process of its own reports last."""
     done = subprocess.run(  # noqa: S603 - our own interpreter
         [sys.executable, "-c", code, *arguments],
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    return done.stdout + done.stderr
-
-
-def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]:
-    """Wall and processor seconds that a process of its own reports last."""
-    wall, cpu = ran(code, *arguments, **environment).split()[-2:]
+    if done.returncode:
+        sys.exit(done.stderr)
+    wall, cpu = (done.stdout + done.stderr).split()[-2:]
     return float(wall), float(cpu)
 
 
@@ -87,32 +72,19 @@ def row(title: str, seconds: tuple[float, float], budget: float) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="of what is not compiled")
-    parser.add_argument(
-        "--where", action="store_true", help="print the causes by stage and by function instead"
-    )
-    parser.add_argument("--brief", action="store_true", help="one loop, compiled and from the cache")
+    parser.add_argument("--loops", nargs="+", default=["foam-hybrid", "foam-neural"], help="by experiment")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         cache = {"NUMBA_CACHE_DIR": str(Path(folder) / "cache"), "MPLBACKEND": "Agg"}
-        if given.where:
-            print(listed(ran(WHERE, **cache), "the loop of foam-neural"))
-            return
         print("| | clock | processor | wanted |\n|---|---|---|---|")
-        for name in ("foam-hybrid", "foam-neural")[: 1 if given.brief else 2]:
+        for name in given.loops:
             code = FIRST_CALL.format(name=name)
             print(row(f"{name}, compiled", child(code, **cache), COLD))
             again = min(child(code, **cache) for _ in range(given.repeats))
             print(row(f"{name}, from the cache", again, WARM))
-        if given.brief:
-            return
         for title, budget, repeats in (("first", FIRST_PRESS, 1), ("next", NEXT_PRESS, given.repeats)):
-            print(
-                row(
-                    f"`palpate press`, the {title}",
-                    min(child(PRESS, **cache) for _ in range(repeats)),
-                    budget,
-                )
-            )
+            seconds = min(child(PRESS, **cache) for _ in range(repeats))
+            print(row(f"`palpate press`, the {title}", seconds, budget))
         experiment = Path(palpate.bench.__file__).parent / "experiments" / "foam-hybrid.toml"
         ten = min(child(TEN_SECONDS, str(experiment), folder, **cache) for _ in range(given.repeats))
         print(row("`palpate run`, ten seconds on the bench, with figures and report", ten, RUN))

@@ -16,10 +16,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.excitation import Budget, Design, DesignProblem, KnownBandwidth, Sensors, SurfaceRange, design
+from palpate.excitation.sensors import ForceChain
 from palpate.identifiers import ContactIdentifier
-from palpate.references import Multisine
-from palpate_excitation import Budget, Design, DesignProblem, KnownBandwidth, Sensors, SurfaceRange, design
-from palpate_excitation.spectra import ForceChain
 
 Array = NDArray[np.float64]
 
@@ -42,8 +41,6 @@ def designed(surface: tuple[float, float, float], step: float) -> Design:
 def signals(made: Design, begin: float) -> tuple[Array, Array]:
     """Position [m] and force through the sensor's low-pass [N], from an instant of the wave on."""
     wave, problem = made.wave, made.problem
-    if not isinstance(wave, Multisine):
-        raise TypeError("the wave must be a multisine")
     omega = 2 * np.pi * np.array(wave.frequencies)
     force = problem.forces(omega, np.array(wave.amplitudes))[0] * np.exp(1j * np.array(wave.phases))
     surface, t = made.predictions[0].surface, begin + np.arange(round(SECONDS * RATE)) / RATE
@@ -74,7 +71,7 @@ def main() -> None:
     print("|---|" + "---|" * len(NAMES))
     for (name, surface), step in product(SURFACES.items(), STEPS):
         made = designed(surface, step)
-        predicted = np.array([made.made.worst(made.seconds)[n] for n in NAMES]) / 1.96
+        predicted = np.array([made.worst()[n] for n in NAMES]) / 1.96
         rms = np.sqrt(np.mean([np.square(errors(made, step, seed)) for seed in range(runs)], axis=0))
         cells = [f"{p:.2%}, {r / p:.3g}" for p, r in zip(predicted, rms, strict=True)]
         print(f"| {name}, {1e6 * step:g} um | {' | '.join(cells)} |", flush=True)

@@ -9,8 +9,9 @@
 decide its numbers. A command prints the figure; here it is put between its marks, with the version of palpate and a
 digest of the sources: of their syntax, so that comments, docstrings and layout change nothing. Where only the digest
 has changed and the small run still prints what it printed when the figure was made, the figure stands, and gets the new
-digest. A figure of times is made again; its small run is compared by its words alone. Exit code 1 if a command fails,
-or, with `--smoke`, if a small run prints anything else than it did.
+digest. A figure of times is made again; its small run is compared by its words alone. A script without a page makes no
+figure: its small run alone is kept and compared. Exit code 1 if a command fails, or, with `--smoke`, if a small run
+prints anything else than it did.
 """
 
 from __future__ import annotations
@@ -49,21 +50,22 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         name: between its marks, and of the file of its small run.
-        page: that it stands in, from the project's root.
+        page: that it stands in, from the project's root; empty for a script that makes no figure.
         command: that prints it; a Python script and its arguments, from the project's root.
         smoke: arguments of the small run of the same script.
         sources: files and folders that decide its numbers, from the project's root. The script is one, too. None: the
             figure is of a day, and no digest tells when it is of the past.
         fenced: whether it is text with columns, rather than Markdown.
         times: whether it holds times, which no second run prints again.
-        needs: programs without which the small run is left out, and the figure not made.
+        needs: programs, and files from the project's root, without which the small run is left out, and the figure not
+            made.
     """
 
     name: str
     page: str
     command: str
     smoke: str
-    sources: tuple[str, ...]
+    sources: tuple[str, ...] = ()
     fenced: bool = False
     times: bool = False
     needs: tuple[str, ...] = ()
@@ -77,6 +79,11 @@ class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def script(self) -> str:
         """File of the script, from the project's root."""
         return shlex.split(self.command)[0]
+
+    @property
+    def lacking(self) -> list[str]:
+        """Needed programs and files that are not on this machine."""
+        return [need for need in self.needs if not shutil.which(need) and not (ROOT / need).exists()]
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -167,7 +174,7 @@ def stamp_of(figure: Figure) -> str:
 
 
 def is_fresh(figure: Figure) -> bool:
-    """Whether a figure is of today's sources."""
+    """Whether a figure is of today's sources; a script without a page has none to be older."""
     return not figure.sources or stamp_of(figure) == digest(figure)
 
 
@@ -236,13 +243,14 @@ def renew(figure: Figure, forced: bool) -> str:
     Raises:
         RuntimeError: where a program is lacking, without which the figure would lose a row.
     """
-    if lacking := [program for program in figure.needs if not shutil.which(program)]:
-        raise RuntimeError(f"needs {', '.join(lacking)}: install what is lacking, then make it again")
+    if figure.lacking:
+        raise RuntimeError(f"needs {', '.join(figure.lacking)}: install what is lacking, then make it again")
     today = smoke(figure)
-    if not forced and not figure.times and stamp_of(figure) and today == kept(figure):
+    if figure.page and not forced and not figure.times and stamp_of(figure) and today == kept(figure):
         write(figure, body_of(figure).replace(f"sources {stamp_of(figure)}", f"sources {digest(figure)}"))
         return "stands: the small run prints what it printed"
-    put(figure, output(figure.command))
+    if figure.page:
+        put(figure, output(figure.command))
     SMOKES.mkdir(exist_ok=True)
     smoke_file(figure).write_text(today + "\n", encoding="utf-8")
     return "made"
@@ -250,7 +258,7 @@ def renew(figure: Figure, forced: bool) -> str:
 
 def difference(figure: Figure) -> str:
     """How the small run differs from what it printed; empty if it does not, or if its programs are not here."""
-    if not all(map(shutil.which, figure.needs)):
+    if figure.lacking:
         return ""
     lines = difflib.unified_diff(
         kept(figure).splitlines(), smoke(figure).splitlines(), "kept", "now", lineterm="", n=0
@@ -295,9 +303,8 @@ def try_all(chosen: list[Figure], jobs: int) -> int:
         answers = list(track(found, "figures", total=len(chosen), transient=True))
     for figure, answer in zip(chosen, answers, strict=True):
         if answer:
-            print(
-                f"{figure.name} of {figure.page}: {answer}\n  python benchmarks/figures.py --only {figure.name}"
-            )
+            print(f"{figure.name} of {figure.page or figure.script}: {answer}")
+            print(f"  python benchmarks/figures.py --only {figure.name}")
     print(
         f"{sum(not answer for answer in answers)} of {len(chosen)} figures: their small runs print what they printed"
     )
@@ -309,7 +316,7 @@ def make(chosen: list[Figure], forced: bool) -> int:
     code = 0
     for figure in [f for f in chosen if forced or not is_fresh(f)]:
         answer = caught(partial(renew, figure, forced))
-        print(f"{figure.name} of {figure.page}: {answer}", flush=True)
+        print(f"{figure.name} of {figure.page or figure.script}: {answer}", flush=True)
         code |= isinstance(answer, RuntimeError)
     return code
 

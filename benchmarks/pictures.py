@@ -1,8 +1,9 @@
 """Draws the film and the pictures of the README and of the first page of the documentation.
 
-Run from the project's root by `make pictures`; a Chromium takes the pictures of the pages.
+`make pictures` runs it; a Chromium takes the pictures of the pages.
 """
 
+import argparse
 import shutil
 import subprocess
 import sys
@@ -29,40 +30,30 @@ def palpate(folder: Path, *words: str) -> str:
     return run.stdout
 
 
-def picture(page: Page, address: str, name: str, seconds: float) -> None:
+def picture(page: Page, address: str, path: Path, seconds: float) -> None:
     """The top of a page, after some seconds."""
     page.goto(address)
     page.wait_for_timeout(1e3 * seconds)
-    page.screenshot(path=DOCS / f"{name}.png", clip={"x": 0, "y": 0, "width": WIDTH, "height": HEIGHT})
-    print(f"{name}.png: {(DOCS / f'{name}.png').stat().st_size // 1024} kB")
+    page.screenshot(path=path, clip={"x": 0, "y": 0, "width": WIDTH, "height": HEIGHT})
+    print(f"{path.name}: {path.stat().st_size // 1024} kB")
 
 
 def main() -> None:
     """Draw them all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=DOCS, help="folder for them")
+    out = parser.parse_args().out
     with tempfile.TemporaryDirectory() as place, sync_playwright() as browsers:
         folder = Path(place)
         palpate(folder, "identify", *LOG, "--report", "identify.html")
         (folder / "found.json").write_text(palpate(folder, "identify", *LOG, "--json"))
-        palpate(
-            folder,
-            *[
-                "tune",
-                "found.json",
-                "--arm",
-                "ur5e",
-                "--force",
-                "15",
-                "--out",
-                "gains.toml",
-                "--report",
-                "tune.html",
-            ],
-        )
+        gains = ["--arm", "ur5e", "--force", "15", "--out", "gains.toml", "--report", "tune.html"]
+        palpate(folder, "tune", "found.json", *gains)
         palpate(
             folder,
             *["press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50", "--out", "press"],
         )
-        shutil.copy(folder / "press/film.svg", DOCS / "film.svg")
+        shutil.copy(folder / "press/film.svg", out / "film.svg")
         browser = browsers.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         for name, file in (
@@ -70,11 +61,11 @@ def main() -> None:
             ("tune", "tune.html"),
             ("press", "press/report.html"),
         ):
-            picture(page, (folder / file).as_uri(), name, 2.0)
+            picture(page, (folder / file).as_uri(), out / f"{name}.png", 2.0)
         live = subprocess.Popen([PALPATE, "live", "--arm", "fr3"], stdout=subprocess.PIPE, text=True)  # noqa: S603
         assert live.stdout is not None
         try:
-            picture(page, live.stdout.readline().strip(), "live", 8.0)
+            picture(page, live.stdout.readline().strip(), out / "live.png", 8.0)
         finally:
             live.terminate()
             live.wait()

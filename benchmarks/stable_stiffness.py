@@ -13,7 +13,7 @@ from itertools import product
 
 from palpate.bench import load
 from palpate.bench.tables import Experiment, with_values
-from palpate_studies.analysis import stable_stiffness
+from palpate.studies.analysis import stable_stiffness
 
 AT, LOW, HIGH = 0.469, 1e3, 3e6  # m, N/m
 DAMPING, GAINS = (60.0, 480.0), ((1.0, 0.003), (0.25, 0.0015))

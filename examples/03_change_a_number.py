@@ -2,8 +2,7 @@
 
 import msgspec
 
-from palpate.bench import build, load
-from palpate.bench.tables import Run
+from palpate.bench import Run, build, load
 from palpate.environments import KelvinVoigtSurface
 
 foam = load("foam-hybrid")

@@ -7,7 +7,7 @@ compilation takes some ten seconds: once for a part in an imported module, at ea
 from typing import NamedTuple
 
 from palpate.bench import build, load, part, with_values
-from palpate.environments.surface import UNTOUCHED, SurfaceState
+from palpate.environments import UNTOUCHED, SurfaceState
 
 
 @part

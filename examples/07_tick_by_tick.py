@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from palpate.bench import build, load, march, start_at, with_values
-from palpate.bench.force_input import COLUMNS
+from palpate.bench import COLUMNS, build, load, march, start_at, with_values
 
 near = {
     "robot.start": (0.4635, 0.0, 0.0),

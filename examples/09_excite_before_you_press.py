@@ -6,12 +6,10 @@ gives additional information about K.
 """
 
 import palpate
-from palpate.bench import build
-from palpate.bench.tables import parse
+from palpate.bench import build, parse
+from palpate.excitation import Budget, DesignProblem, SurfaceRange, design, experiment
 from palpate.records import Record
-from palpate.signals.low_pass import LowPass
-from palpate_excitation import Budget, DesignProblem, SurfaceRange, design
-from palpate_excitation.report.table import experiment
+from palpate.signals import LowPass
 
 truth = {"K": 5200.0, "B": 200.0, "M": 0.3}
 surfaces = SurfaceRange(*((value, value) for value in truth.values()))
@@ -31,7 +29,7 @@ told = palpate.identify(
     lag=sensor.lag + run.meta["instruments"]["force"]["delay_s"],
     bonded=True,
 )
-for name, predicted in found.made.worst(found.seconds).items():
+for name, predicted in found.worst().items():
     p = told.parameters[name]
     half = (p.ci95[1] - p.ci95[0]) / 2 / truth[name]
     print(

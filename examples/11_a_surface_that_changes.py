@@ -6,10 +6,10 @@ low-pass. `RestartingLeastSquares` detects the change of the surface and dates i
 
 import numpy as np
 
-from palpate.bench.tip_on_path import given_motion
+from palpate.bench import given_motion
 from palpate.environments import KelvinVoigt
 from palpate.identifiers import ContactIdentifier, RestartingLeastSquares
-from palpate.signals.low_pass import LowPass
+from palpate.signals import LowPass
 
 SOFT, HARD, CHANGE = KelvinVoigt(7e3, 60, 0.1), KelvinVoigt(62e3, 150, 0.1), 2.0
 

@@ -2,7 +2,7 @@
 
 import polars
 
-from palpate_studies import run
+from palpate.studies import run
 
 STUDY = """
 title = "Force gain and noise"

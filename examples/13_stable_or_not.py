@@ -4,9 +4,8 @@ The model is the derivative of the bench's own tick about a press at rest: three
 480 Hz under a loop of 1 kHz. Friction is left out; with it (friction=True) an oscillation may turn into sticking.
 """
 
-from palpate.bench import load
-from palpate.bench.tables import with_values
-from palpate_studies.analysis import linearise, margins, stable_intervals, stable_stiffness
+from palpate.bench import load, with_values
+from palpate.studies.analysis import linearise, margins, stable_intervals, stable_stiffness
 
 foam = load("foam-hybrid")
 loop = linearise(foam)

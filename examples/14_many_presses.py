@@ -7,8 +7,7 @@ same with a folder of logs.
 import numpy as np
 
 import palpate
-from palpate.identification import pool
-from palpate.identification.indenter import Indenter, with_modulus
+from palpate.identification import Indenter, pool, with_modulus
 from palpate.records import Record
 
 rng = np.random.default_rng(1)

@@ -35,7 +35,8 @@ def palpate(command: str, into: str | None = None) -> int:
     return code
 
 
-controller = [sys.executable, "-m", "palpate_rehearsal.rtde_arm", "--address", ADDRESS, "--arm", "cell.toml"]
+simulated = Path(__file__).resolve().parents[1] / "tests" / "rehearsal" / "rtde_arm.py"
+controller = [sys.executable, str(simulated), "--address", ADDRESS, "--arm", "cell.toml"]
 with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()

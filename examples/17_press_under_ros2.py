@@ -14,7 +14,7 @@ from pathlib import Path
 from palpate.cli import main
 
 if find_spec("cyclonedds") is None:
-    sys.exit(print("this example needs cyclonedds: pip install 'palpate[ros2]'"))
+    sys.exit(print("this example needs cyclonedds: pip install '.[ros2]' in palpate's sources"))
 
 DOMAIN = 30 + os.getpid() % 150
 # Nothing of this example leaves the machine: DDS is kept on the loopback.
@@ -37,16 +37,8 @@ def palpate(command: str) -> int:
     return main(shlex.split(command))
 
 
-node = [
-    sys.executable,
-    "-m",
-    "palpate_rehearsal.ros2_arm",
-    "--domain",
-    str(DOMAIN),
-    "--joints",
-    "--arm",
-    "cell.toml",
-]
+simulated = Path(__file__).resolve().parents[1] / "tests" / "rehearsal" / "ros2_arm.py"
+node = [sys.executable, str(simulated), "--domain", str(DOMAIN), "--joints", "--arm", "cell.toml"]
 with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     arm.stdout.readline()

@@ -31,15 +31,8 @@ def palpate(command: str) -> int:
     return main(shlex.split(command))
 
 
-controller = [
-    sys.executable,
-    "-m",
-    "palpate_rehearsal.franka_arm",
-    "--address",
-    ADDRESS,
-    "--arm",
-    "cell.toml",
-]
+simulated = Path(__file__).resolve().parents[1] / "tests" / "rehearsal" / "franka_arm.py"
+controller = [sys.executable, str(simulated), "--address", ADDRESS, "--arm", "cell.toml"]
 with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
     assert arm.stdout is not None
     wire = arm.stdout.readline().strip()

@@ -7,11 +7,8 @@ finds the module beside that file. A study is data: code that it names runs only
 from student import Damped
 
 from palpate.plugins import permit
-from palpate_checks import controller_checks, outcomes
-from palpate_studies import run
-from palpate_studies.pairing import comparisons
-from palpate_studies.plan import plan
-from palpate_studies.study import parse
+from palpate.studies import comparisons, parse, plan_runs, run
+from palpate.testing import controller_checks, outcomes
 
 STUDY = """
 title = "Damped push or PI, on random foam"
@@ -40,7 +37,7 @@ for check in outcomes(controller_checks(Damped())):
     print(f"{check.sentence:36} {check.failed or 'holds'}")
 
 frame = run(STUDY, "a-study")  # tried before the first run; killed half-way, it goes on from there
-for found in comparisons(frame, plan(parse(STUDY, "study"))):
+for found in comparisons(frame, plan_runs(parse(STUDY, "study"))):
     best, other = found.entrants
     pair = found.behind[1]
     print(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate_maps import StiffnessMap
+from palpate.maps import StiffnessMap
 
 rng = np.random.default_rng(1)
 
@@ -19,7 +19,7 @@ places = np.stack(np.meshgrid(np.linspace(0.0, 0.06, 4), np.linspace(0.0, 0.06, 
 surface = StiffnessMap()
 surface.update(places, *press(places))
 while len(surface) < 40:
-    places = np.asarray(surface.next(3, goal="edge", stiffer_than=1700.0))
+    places = np.asarray(surface.next(3, stiffer_than=1700.0))
     surface.update(places, *press(places))
 
 at = np.array([[0.035, 0.02], [0.01, 0.05]])

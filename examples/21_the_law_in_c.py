@@ -6,9 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from palpate.force import load_arm
-from palpate.force.gains import gains_for
-from palpate_native.exporting import LawRequest, exported_law
+from palpate.force import gains_for, load_arm
+from palpate.native import exported_law
 
 compiler = next((name for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
 if compiler is None:
@@ -19,7 +18,7 @@ with tempfile.TemporaryDirectory() as place:
     gains = Path(place) / "gains.toml"
     gains.write_text(gains_for(load_arm("ur5e"), 20.0).to_toml(), encoding="utf-8")
     folder = Path(place) / "force_loop"
-    exported_law(LawRequest(gains=gains)).write(folder, "example", replace=False)
+    exported_law(gains_file=gains).write(folder, replace=False)
     build = [
         compiler,
         "-O2",

@@ -3,9 +3,7 @@
 import numpy as np
 from msgspec.structs import replace
 
-from palpate.force import SlidingLoop, load_arm
-from palpate.force.gains import gains_for
-from palpate.force.slide_table import Slide
+from palpate.force import Slide, SlidingLoop, gains_for, load_arm
 
 RADIUS, STIFFNESS, FRICTION, TICK = 0.15, 5e3, 0.3, 0.002
 gains = gains_for(load_arm("ur5e"), 10.0, cap=2e4)

@@ -3,13 +3,10 @@
 import os
 import shlex
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from palpate.cli import main
 
-if find_spec("palpate_rehearsal") is None:
-    sys.exit(print("this example needs simulated arms: pip install 'palpate[rehearsal]'"))
 if os.name != "posix":
     sys.exit(print("a class of your own runs in a process beside palpate, which needs Linux or macOS"))
 

@@ -12,8 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from palpate.bench import build, load
-from palpate.bench.tables import DesiredForce, Run
+from palpate.bench import DesiredForce, Run, build, load
 
 
 def main(path: Path) -> None:

@@ -4,13 +4,16 @@ The robot is a stand-in: an arm of one direction, a clock of its own, a force se
 the calls of your robot's library.
 """
 
+import sys
 import threading
 import time
+from pathlib import Path
 
-from palpate.force import load_arm
-from palpate.force.simulated_press import surface
-from palpate.wires import SILENCE, ArmReading, Command, LostError, SilentError
-from palpate_rehearsal.rehearsal import REST, ToolAxisArm, ticks
+from palpate.force import load_arm, surface
+from palpate.wires import SILENCE, ArmReading, Command, ConnectionLostError, NoReadingError
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "rehearsal"))
+from tool_axis_arm import REST, ToolAxisArm, ticks
 
 
 class OurWire:
@@ -46,9 +49,9 @@ class OurWire:
     def read(self, timeout: float) -> ArmReading:
         """The next fresh reading."""
         if self._closed:
-            raise LostError("the wire is closed")
+            raise ConnectionLostError("the wire is closed")
         if not self._fresh.wait(timeout):
-            raise SilentError("", timeout)
+            raise NoReadingError("", timeout)
         self._fresh.clear()
         return self._newest
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.bench import Vec3, law
-from palpate_studies import Metric
+from palpate.studies import Metric
 
 
 @law

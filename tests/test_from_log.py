@@ -50,7 +50,9 @@ def test_a_log_of_a_ur_leads_to_its_preset_and_is_read_alone(tmp_path, capsys):
     assert "4.4 mm along z" in proposal.facts[0]
     found = palpate.identify_log(path)
     assert found.working_point.stiffness.value == pytest.approx(K, rel=0.02)
-    assert main(["identify", str(path), "--json"]) == 0
+    assert (
+        main(["identify", str(path), "--json"]) == 1
+    )  # K is a lower bound: the arm's own compliance is in it
     own = json.loads(capsys.readouterr().out)
     assert own["parameters"] == json.loads(json.dumps(found.to_json()["parameters"]))
 
@@ -75,8 +77,13 @@ def franka_log(path, name="{}[{}]", unit=1e-3, start=5000.0):
     ("name", "unit", "words"),
     [
         ("{}[{}]", 1e-3, "--preset franka --time time:ms"),
-        ("state.{}[{}]", 1.0, "--preset franka --time time --wrench 'state.O_F_ext_hat_K[0],"),
-        ("{}_{}", 1e-3, "--preset franka --time time:ms --wrench O_F_ext_hat_K_0,O_F_ext_hat_K_1"),
+        *(
+            pytest.param(*one, marks=pytest.mark.long)
+            for one in (
+                ("state.{}[{}]", 1.0, "--preset franka --time time --wrench 'state.O_F_ext_hat_K[0],"),
+                ("{}_{}", 1e-3, "--preset franka --time time:ms --wrench O_F_ext_hat_K_0,O_F_ext_hat_K_1"),
+            )
+        ),
     ],
 )
 def test_a_log_of_a_franka_leads_to_its_preset_and_is_read_alone(tmp_path, name, unit, words):
@@ -105,11 +112,12 @@ def test_a_position_of_fewer_than_twenty_counts_is_never_proposed(tmp_path, step
     assert (list_log(tmp_path / "log.csv").proposal.options is not None) == proposed
 
 
+@pytest.mark.long
 def test_what_was_measured_can_be_pressed_though_its_damping_has_no_number(tmp_path, capsys, monkeypatch):
     """An unknown damping counts at the upper end of its interval, and the tuning says so."""
     monkeypatch.chdir(tmp_path)
     ur_log(tmp_path / "robot_data.csv")
-    assert main(["identify", "robot_data.csv", "--json"]) == 0
+    assert main(["identify", "robot_data.csv", "--json"]) == 1  # K is a lower bound
     printed = capsys.readouterr().out
     damping = json.loads(printed)["parameters"]["B"]
     assert damping["value"] is None

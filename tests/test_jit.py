@@ -245,6 +245,7 @@ def workshop(tmp_path_factory):
     return Workshop(tmp_path_factory.mktemp("workshop"))
 
 
+@pytest.mark.long
 def test_of_processes_that_start_together_one_compiles(workshop):
     """And each lets the next one in, also one that lives on."""
     workshop.write(factor=3.0, offset=0.0, more=0.0)
@@ -279,6 +280,7 @@ print(1.0, False)
 """
 
 
+@pytest.mark.long
 def test_who_fails_to_compile_keeps_nobody_waiting(workshop):
     (workshop.user / "leaving.py").write_text(LEAVING)
     failed = workshop.started("leaving.py")

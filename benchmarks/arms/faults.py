@@ -32,12 +32,12 @@ from faulty_press import FAULTS as OF_THE_LAW
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-TESTS = ROOT / "packages" / "palpate-wires" / "tests" / "wires"
+TESTS = ROOT / "tests" / "wires"
 sys.path.insert(0, str(TESTS))
 from slow_cell import ALONE, WORDS, child, rows_came, slower_cell  # noqa: E402
 
 from palpate.logs import read_record  # noqa: E402
-from palpate_wires.outcome import UNITS  # noqa: E402
+from palpate.wires.outcome import UNITS  # noqa: E402
 
 STATE = ROOT / "build" / "wire-faults.json"
 WIRES = ("sim", "rtde", "franka", "ros2")
@@ -416,30 +416,6 @@ def summary(found: dict[str, dict]) -> list[str]:
     return lines
 
 
-def kinds(found: dict[str, dict]) -> list[str]:
-    """A row for each kind: the exit code, and the time from the fault to rest, on each wire."""
-    lines = ["| fault | " + " | ".join(WIRES) + " | the press ended |", "|" + "---|" * (len(WIRES) + 2)]
-    for fault in FAULTS:
-        own = {kind: found.get(f"{kind}: {fault.name}") for kind in WIRES}
-        cells = [_cell(own[kind], kind in fault.wires) for kind in WIRES]
-        ended = next((r["ended"] for r in own.values() if r is not None), "")
-        lines.append(f"| {fault.group}: {fault.name} | {' | '.join(cells)} | {_short(ended)} |")
-    return lines
-
-
-def _cell(result: dict | None, possible: bool) -> str:
-    if result is None:
-        return "" if possible else "-"
-    code = "none" if result["code"] is None else str(result["code"])
-    rest = "" if result["rest"] is None or result["code"] == 0 else f", {result['rest']:.2f} s"
-    return f"{code}{rest}" + (" **moves**" if result["moves"] else "")
-
-
-def _short(text: str) -> str:
-    """The first part of a reason, without a bar that would end the cell."""
-    return re.split(r"[;:(?]| as | longer ", text.replace("|", "/"))[0].strip()
-
-
 def main() -> int:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--wire", choices=WIRES, action="append", help="some of them")
@@ -468,8 +444,7 @@ def main() -> int:
         words.state.write_text(json.dumps(kept, indent=1))
         print(f"{kind}: {fault.name}: {result}", file=sys.stderr)
     found = made(words.state)
-    lines = [*summary(found), "", *kinds(found)]
-    print("\n".join(lines))
+    print("\n".join(summary(found)))
     return int(any(r["moves"] for r in found.values()))
 
 

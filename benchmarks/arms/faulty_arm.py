@@ -1,6 +1,6 @@
-"""A simulated arm of `palpate_rehearsal` that lies from SIGUSR1 on, and keeps a trace of what it is commanded.
+"""A simulated arm of `tests/rehearsal` that lies from SIGUSR1 on, and keeps a trace of what it is commanded.
 
-`python faulty_arm.py FAULT TRACE MODULE WORDS...` runs `palpate_rehearsal.MODULE`. Each tick of the trace is four
+`python faulty_arm.py FAULT TRACE MODULE WORDS...` runs `tests/rehearsal/MODULE.py`. Each tick of the trace is four
 numbers: the time of this computer, the commanded position [m], the tip's position [m] and the force on the surface [N].
 """
 
@@ -14,7 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate_rehearsal import rehearsal
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "rehearsal"))
+
+import tool_axis_arm
 
 HUGE = 1e30
 """A number that libfranka's floats hold, and no force or position is."""
@@ -105,7 +107,7 @@ CLOCKS = {
 
 def install(fault: Fault, trace) -> None:
     """Put the fault between the arm and its protocol, and keep what the arm is commanded."""
-    arm = rehearsal.ToolAxisArm
+    arm = tool_axis_arm.ToolAxisArm
     tick, reading = arm.tick, arm.reading
 
     def traced(self, velocity):
@@ -124,12 +126,12 @@ def install(fault: Fault, trace) -> None:
 def stamped(module: str, fault: Fault) -> None:
     """Put the fault between the arm's clock and its protocol."""
     if module == "sim_arm":
-        from palpate_wires import sim
+        from palpate.wires import sim
 
         state = sim.state
         sim.state = lambda number, now, values: state(number, fault.stamp(now), values)
     if module == "rtde_arm":
-        from palpate_rehearsal.rtde_controller import Controller
+        from rtde_controller import Controller
 
         value = Controller.value
 
@@ -146,8 +148,9 @@ def stamped(module: str, fault: Fault) -> None:
 
         Controller.value = shown
     if module == "ros2_arm":
-        from palpate_rehearsal import ros2_arm
-        from palpate_wires import ros2_messages
+        import ros2_arm
+
+        from palpate.wires import ros2_messages
 
         header, publish = ros2_messages.header, ros2_arm.Node.publish
 
@@ -186,7 +189,7 @@ def main() -> None:
     with Path(trace).open("ab", buffering=0) as file:
         install(fault, file)
         stamped(module, fault)
-        importlib.import_module(f"palpate_rehearsal.{module}").main()
+        importlib.import_module(module).main()
 
 
 if __name__ == "__main__":

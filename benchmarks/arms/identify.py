@@ -8,8 +8,8 @@ import argparse
 from itertools import product
 
 from palpate.press.engines import MODES
-from palpate.press.prepare import Question, prepare_press, surface_of
-from palpate.press.pressing import summarise
+from palpate.press.prepare import PressSpec, prepare_press, surface_of
+from palpate.press.summary import summarise
 from palpate.robots.serial.from_toml import names
 from palpate.units import with_half
 
@@ -22,8 +22,8 @@ HEAD = (
 
 def pressed(arm: str, mode: str, stiffness: float, seed: int) -> dict:
     surface = surface_of(f"K={stiffness},B={DAMPING}")
-    pressing = prepare_press(Question(arm=arm, force=FORCE, surface=surface, mode=mode, seed=seed))
-    return summarise(pressing.run(), pressing.asked)
+    pressing = prepare_press(PressSpec(arm=arm, force=FORCE, surface=surface, mode=mode, seed=seed))
+    return summarise(pressing.run(), pressing.request)
 
 
 def row(arm: str, mode: str, stiffness: float, seeds: int) -> str:

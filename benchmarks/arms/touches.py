@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.bench.summary import CONTACT
 from palpate.force import gains
-from palpate.press.prepare import Question, prepare_press, surface_of
+from palpate.press.prepare import PressSpec, prepare_press, surface_of
 from palpate.robots.serial.from_toml import names
 
 STIFFNESSES, DAMPING, FORCE, SECONDS = (5e3, 2e4, 6e4, 1e5, 2e5, 5e5), 50.0, 20.0, 1.0
@@ -18,7 +18,7 @@ STIFFNESSES, DAMPING, FORCE, SECONDS = (5e3, 2e4, 6e4, 1e5, 2e5, 5e5), 50.0, 20.
 def overshoot(arm: str, stiffness: float, seed: int) -> float:
     """Of the true force over what was asked for [N]."""
     surface = surface_of(f"K={stiffness},B={DAMPING}")
-    question = Question(
+    question = PressSpec(
         arm=arm, force=FORCE, surface=surface, mode="position", seconds=SECONDS, probe=0.0, seed=seed
     )
     record = prepare_press(question).run()
@@ -30,9 +30,9 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__)
     asked.add_argument("--seeds", type=int, default=20)
     asked.add_argument("--arms", nargs="*", default=names())
-    asked.add_argument("--swing", type=float, default=gains.SWING)
+    asked.add_argument("--swing", type=float, default=gains.SWING_FRACTION)
     words = asked.parse_args()
-    gains.SWING = words.swing
+    gains.SWING_FRACTION = words.swing
     print("| arm | " + " | ".join(f"{k:g} N/m" for k in STIFFNESSES) + " |", "|---" * 7 + "|", sep="\n")
     for arm in words.arms:
         worst = [max(overshoot(arm, k, seed) for seed in range(words.seeds)) for k in STIFFNESSES]

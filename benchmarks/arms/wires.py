@@ -19,6 +19,7 @@ from palpate.cli import main as palpate
 from palpate.force import load_arm
 from palpate.press.engines import gains_for
 
+REHEARSAL = Path(__file__).resolve().parents[2] / "tests" / "rehearsal"
 STIFFNESS, SERIES, FORCE = 6000.0, 5e4, 20.0
 HEAD = (
     "| wire | readings [Hz] | late by 50 % [ms] | 99 % | 99.9 % | most | missed of | force [N] | K found, 6000 N/m |"
@@ -65,7 +66,7 @@ def row(name: str, seconds: float, folder: Path, kind: str) -> str:
     inner = INNER[kind].format(delay=0.1 if rate == 1000 else 0.05)
     (own / "arm.toml").write_text(ARM.format(rate=rate, inner=inner))
     (own / "gains.toml").write_text(gains_for(load_arm(str(own / "arm.toml")), FORCE).to_toml())
-    words = [sys.executable, "-m", f"palpate_rehearsal.{module}", "--arm", str(own / "arm.toml"), *where]
+    words = [sys.executable, str(REHEARSAL / f"{module}.py"), "--arm", str(own / "arm.toml"), *where]
     with subprocess.Popen([*words, "--stiffness", str(STIFFNESS)], stdout=subprocess.PIPE, text=True) as arm:  # noqa: S603
         assert arm.stdout is not None
         at = address.format(line=arm.stdout.readline().strip())

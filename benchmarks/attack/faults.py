@@ -79,32 +79,25 @@ def _turning(folder: Path) -> None:
     write_record(Record(record.columns, named), folder / "turning.parquet")
 
 
-_TRIED = ("laboratory", "--particles=8", "--moves=1", "--half", "--cores=1", "--out=out")
+_SEARCH = ("laboratory", "--tries=16", "--half", "--cores=1", "--out=out")
 
 
 def _inference(folder: Path) -> None:
-    """An inference that was stopped before its end: of each of its archives one laboratory is lacking."""
+    """A search that has tried and judged all its laboratories, and has not written its result."""
     kept = ROOT / "build" / f"attack-laboratory-{sources()}"
     if not kept.is_dir():
         with tempfile.TemporaryDirectory(dir=ROOT / "build") as place:
             subprocess.run(
-                [sys.executable, "-m", "palpate", *_TRIED], cwd=place, check=True, capture_output=True
+                [sys.executable, "-m", "palpate", *_SEARCH], cwd=place, check=True, capture_output=True
             )
-            for path in Path(place, "out").iterdir():
-                if path.suffix == ".sqlite":
-                    with closing(sqlite3.connect(path)) as table, table:
-                        table.execute(
-                            "DELETE FROM kept WHERE key = (SELECT max(key) FROM kept WHERE key != 'head')"
-                        ) if path.stem != "judged" else None
-                elif path.name != "inference.json":
-                    path.unlink()
+            Path(place, "out", "inferred.toml").unlink()
             Path(place, "out").rename(kept)
     shutil.copytree(kept, folder / "out")
 
 
 _RUN = ("run", "e.toml", "--out=out", "--replace")
 _IDENTIFY = ("identify", "whole.csv", *COLUMNS, "--report=r.html", "--figure=f.png", "--save-options=o.toml")
-_MANY = ("identify", "whole.csv", "other.csv", *COLUMNS, "--report=r.html", "--table=t.tex")
+_MANY = ("identify", "whole.csv", "other.csv", *COLUMNS, "--report=r.html", "--table=t.csv")
 _EXCITE = (
     "excite",
     "--stiffness=5000",
@@ -128,7 +121,7 @@ COMMANDS = {
     "identify, many": Command(_MANY, prepare=lambda f: _copy(f / "whole.csv", f / "other.csv")),
     "payload": Command((*_PAYLOAD, "--replace"), prepare=_turning),
     "tune": Command((*_TUNE, "--replace")),
-    "excite": Command((*_EXCITE, "--report=x.html", "--figure=x.png", "--experiment=x.toml", "--replace")),
+    "excite": Command((*_EXCITE, "--figure=x.png", "--experiment=x.toml", "--replace")),
     "run": Command((*_RUN, "--seed=2"), (*_RUN, "--seed=1"), kept="the record is in out"),
     "press": Command((*_PRESS, "--replace")),
     "press --record": Command(
@@ -138,9 +131,9 @@ COMMANDS = {
         broken="rec/rows.f64",
         record=("rec/record.parquet", "rec/press.json"),
     ),
-    "study": Command(("study", "study.toml", "--out=out", "--yes")),
+    "study": Command(("study", "study.toml", "--out=out")),
     "thesis": Command(("thesis", "2.2", "--out=out")),
-    "laboratory": Command(_TRIED, prepare=_inference),
+    "laboratory": Command(_SEARCH, prepare=_inference),
 }
 """Every command that writes a file; palpate live writes none."""
 OPTIONAL = {"thesis", "laboratory"}

@@ -135,9 +135,9 @@ def _read(kind: str, path: Path) -> str:
         if f"@{kind}" in LOADED:
             LOADED[f"@{kind}"](str(path))
         elif kind == "journal":
-            from palpate_studies import run_study
+            from palpate.studies.journal import open_journal
 
-            with run_study.open_journal(path, HEAD()) as book:
+            with open_journal(path, HEAD()) as book:
                 list(book.rows())
         elif kind == "gains":
             _press(path)
@@ -205,10 +205,10 @@ def _load_experiment(path: str) -> None:
 
 
 def _load_study(path: str) -> None:
-    from palpate_studies.plan import plan
-    from palpate_studies.study import load
+    from palpate.studies.plan import plan_runs
+    from palpate.studies.study import load
 
-    plan(load(path), path)
+    plan_runs(load(path), path)
 
 
 LOADED = {"@arm": _load_arm, "@experiment": _load_experiment, "@study": _load_study}

@@ -228,33 +228,67 @@ def lasting(found: Found) -> tuple[list[str], list[str]]:
     return rows, [f"{one}" for one in found.lasted.values() if not one.good]
 
 
+def total_inputs(found: Found) -> str:
+    """Sentence with the sums over all kinds of input."""
+    counts = sum((told.counts for told in found.read.values()), Counter[str]())
+    read, refused = (counts[word] for word in GOOD)
+    names = {name.rpartition(" ")[0] for name in found.read}
+    return (
+        f"{counts.total()} inputs of {len(names)} kinds: {read} read, {refused} refused in one line, "
+        f"{counts.total() - read - refused} neither; the slowest took "
+        f"{max(told.worst for told in found.read.values()):.1f} s of processor time."
+    )
+
+
+def total_events(events: dict[str, Counter[str]], template: str) -> str:
+    """Sentence with the number of faults or kills, and of the kinds of them."""
+    names = {name.rpartition(" ")[0] for name in events}
+    return template.format(sum(told["times"] for told in events.values()), len(names))
+
+
+def total_runs(found: Found) -> str:
+    """Sentence with the extremes of the long runs."""
+    runs = found.lasted.values()
+    return (
+        f"{len(runs)} experiments of {max(one.seconds for one in runs):g} s each: largest torque "
+        f"{100 * max(one.over for one in runs):.2f} % of its limit, memory grown by at most "
+        f"{max(one.grown for one in runs):.1f} MB."
+    )
+
+
 SECTIONS = {
-    "inputs": ("read", reading),
-    "faults": ("faulted", faulting),
-    "kills": ("killed", killing),
-    "long runs": ("lasted", lasting),
+    "inputs": ("read", reading, total_inputs),
+    "faults": (
+        "faulted",
+        faulting,
+        lambda found: total_events(found.faulted, "{} failed changes in {} commands."),
+    ),
+    "kills": ("killed", killing, lambda found: total_events(found.killed, "{} events of {} kinds.")),
+    "long runs": ("lasted", lasting, total_runs),
 }
-"""Of the page: what each is made of."""
+"""Attribute of `Found`, the table that is printed, and the sentence that stands in the page, by section."""
 
 
-def told(found: Found, command: str) -> tuple[dict[str, list[str]], int]:
-    """The lines of each section that something was found for, and how many promises were broken."""
-    sections: dict[str, list[str]] = {}
+def report(found: Found, command: str) -> tuple[dict[str, list[str]], dict[str, list[str]], int]:
+    """Tables and short texts of the sections that have results, and the number of broken promises."""
+    tables: dict[str, list[str]] = {}
+    texts: dict[str, list[str]] = {}
     total = 0
-    for title, (kept, of) in SECTIONS.items():
-        if not getattr(found, kept):
+    for title, (attribute, table, sentence) in SECTIONS.items():
+        if not getattr(found, attribute):
             continue
-        rows, broken = of(found)
+        rows, broken = table(found)
         total += len(broken)
         last = f"`{command}`, {datetime.now(UTC):%Y-%m-%d}; {len(broken)} promises broken."
-        sections[title] = [*rows, "", last, *(f"- {defect}" for defect in broken[:40])]
-    return sections, total
+        end = [last, *(f"- {defect}" for defect in broken[:40])]
+        tables[title], texts[title] = [*rows, "", *end], [sentence(found), *end]
+    return tables, texts, total
 
 
-def write(sections: dict[str, list[str]]) -> None:
-    """Puts each section into the page, and leaves the others as they are."""
+def write(texts: dict[str, list[str]]) -> None:
+    """Put the short text of each section into the page, and leave the others as they are."""
     page = PAGE.read_text(encoding="utf-8")
-    for title, lines in sections.items():
+    for title, lines in texts.items():
         begin, end = f"<!-- attack, {title}: begin -->", f"<!-- attack, {title}: end -->"
         head, _, rest = page.partition(begin)
         _, _, tail = rest.partition(end)
@@ -303,14 +337,14 @@ def main() -> int:
     except KeyboardInterrupt:
         print("interrupted; the same command resumes")
     missing = sum(part.name not in getattr(found, part.kept) for part in wanted)
-    sections, broken = told(
+    tables, texts, broken = report(
         found, command + (f", {missing} of {len(wanted)} parts not run" if missing else "")
     )
-    for title, lines in sections.items():
+    for title, lines in tables.items():
         print("\n".join([f"### {title}", "", *lines, ""]))
     print(f"{broken} promises broken; {command} --minutes 1e9 repeats it" if broken else "0 promises broken")
     if asked.write:
-        write(sections)
+        write(texts)
     return 1 if broken else 0
 
 

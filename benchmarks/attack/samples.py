@@ -93,10 +93,9 @@ def study(path: Path) -> None:
 
 def journal(path: Path) -> None:
     """Finished runs of a study."""
-    from palpate_studies import run_study as journals
-    from palpate_studies.run_one import Row
+    from palpate.studies.journal import Row, open_journal
 
-    with journals.open_journal(path, HEAD()) as book:
+    with open_journal(path, HEAD()) as book:
         for run in range(10):
             book.append(
                 Row(run, {"a": 0.1 * run, "seed": 0}, "done", "as asked for", (1.0 / (run + 1),), 0.01)
@@ -126,9 +125,9 @@ def _wrote(path: Path, *words: str) -> None:
 
 def HEAD() -> object:
     """Of the journal."""
-    from palpate_studies.run_study import JournalHead
+    from palpate.studies.journal import JournalHead
 
-    return JournalHead("T", "study", "0.1.0", "sources", 10)
+    return JournalHead("T", "study", "0.1.0", {"numpy": "2.2.0"}, 10)
 
 
 SAMPLES: dict[str, tuple[str, Callable[[Path], None]]] = {

@@ -28,8 +28,8 @@ from palpate.bench.force_input import COLUMNS
 from palpate.bench.plant import Loop, compiled_march
 from palpate.controllers import alone
 from palpate.environments.surface import alone as alone_surface
-from palpate_studies.analysis.linear_loop import vector
-from palpate_studies.analysis.linear_model import exact
+from palpate.studies.analysis.linear_loop import vector
+from palpate.studies.analysis.linear_model import exact
 
 HERE = Path(__file__).parent
 FLAGS = "-O3 -march=native -ffp-contract=off -fno-math-errno -std=c11 -shared -fPIC"
@@ -177,12 +177,11 @@ def pointer(array: Array):
 
 
 @contextmanager
-def library(compiler: str, source: list[str] | None = None) -> Iterator[ctypes.CDLL]:
-    """The C, or another source with its flags, as a compiler of the machine makes it."""
+def library(compiler: str) -> Iterator[ctypes.CDLL]:
+    """The C as a compiler of the machine makes it."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "tick.so"
-        source = [*shlex.split(FLAGS), str(HERE / "tick.c")] if source is None else source
-        command = [compiler, *source, "-o", str(target), "-lm"]
+        command = [compiler, *shlex.split(FLAGS), str(HERE / "tick.c"), "-o", str(target), "-lm"]
         try:
             subprocess.run(command, check=True)  # noqa: S603 - the machine's compiler on our own source
         except FileNotFoundError:

@@ -1,9 +1,8 @@
-"""What the law does when what it was told is wrong, and when the surface changes, moves or curves.
+"""What the law does when the surface changes, moves or curves; wrong priors are in beyond.py.
 
     python benchmarks/force/disturbed.py [--touches 200] [--arms ur5e fr3] [--seed 0]
 
-Wrong priors: the stiffness cap and theta divided or multiplied. Changes in mid-press and sways of the surface as in the
-rows; an hour is in hours.py.
+Changes in mid-press and sways of the surface as in the rows; an hour is in hours.py.
 """
 
 from __future__ import annotations
@@ -16,8 +15,6 @@ from touches import Draw, Rig, share
 
 from palpate.force.expected import OVERSHOOT, STIFFENING_AT, step_of, stiffening
 
-PRIORS = (("as told", 1.0, 1.0), ("cap x 20", 20.0, 1.0), ("cap / 20", 0.05, 1.0), ("theta x 2", 1.0, 2.0),
-          ("theta / 2", 1.0, 0.5), ("cap / 10, theta / 2", 0.1, 0.5))  # fmt: skip
 CHANGES = ((7e3, 62e3), (62e3, 7e3), (1e3, 1e6), (1e6, 1e3))
 SWAYS = ((1e-3, 0.5), (1e-4, 2.0))
 STIFFNESSES = (1e3, 7e3, 62e3)
@@ -32,30 +29,10 @@ def main() -> None:
     for name in told.arms:
         rig = Rig(name)
         print(f"\n{rig.arm.title}")
-        priors(rig, told)
         changes(rig, told.seed)
         stiffening_surfaces(rig, told.seed)
         sways(rig, told.seed)
         curved(rig, told)
-
-
-def priors(rig: Rig, told: argparse.Namespace) -> None:
-    print(
-        f"  wrong priors, {told.touches} first touches each: settled, p99 settling, largest overshoot, lost"
-    )
-    for name, cap, lag in PRIORS:
-        found = []
-        for i in track(range(told.touches), name, transient=True):
-            draw = rig.draw(np.random.default_rng([told.seed, i]))
-            gains = rig.gains(draw.F, draw.noise, cap * rig.arm.limits.stiffness, lag * rig.theta)
-            judged = rig.judge(
-                draw, rig.run(draw, gains.cautious(), [told.seed, i, 1], 8.0, approach=gains.approach)
-            )
-            found.append((judged.settling, judged.overshoot, judged.lost))
-        settling, over, lost = np.array(found).T
-        done = np.isfinite(settling).sum()
-        late = np.nanpercentile(settling, 99) if done else np.nan
-        print(f"    {name:<22}{done:>5}  {late:6.2f} s  {share(over.max()):>10}  {(lost > 0).sum()}")
 
 
 def changes(rig: Rig, seed: int) -> None:

@@ -123,7 +123,7 @@ def wandering(gains, claim, rng, told) -> int:
     grown = 0
     for _ in track(range(told.runs), "redrawn surfaces", transient=True):
         cell = claim.cells[rng.integers(len(claim.cells))]
-        L = cell.cell.L
+        L = cell.L
         x = rng.standard_normal(len(L))
         before = np.linalg.norm(L.T @ x)
         K, B = surfaces(gains, cell, rng, 50, cell.low, cell.high)

@@ -20,6 +20,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from palpate.certify.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force.arm import Arm, Limits, PositionLoop, Sensor, ServoLoop, TorqueLoop
 from palpate.force.boundary import radius
@@ -28,7 +29,6 @@ from palpate.force.certifying import proved_claim
 from palpate.force.claims import Claim, adapting_claims, held_claim, one_sided_claim
 from palpate.force.gains import Gains, gains_for
 from palpate.force.sampled_loop import SampledLoop, law_for
-from palpate_certify.force_certificate import RefusedError, check
 
 FORGERIES, LOOPS = 8, 10
 """Of each certificate, and drawn within each claim that passes."""
@@ -73,7 +73,8 @@ def random_claim(rng: np.random.Generator, gains: Gains) -> Claim:
         lists = adapting_claims(gains, low, most if gains.arm.kind == "position" else 0.0)
         claim = lists[0][-1]
         return claim if gains.arm.kind == "position" else msgspec.structs.replace(claim, high=high)
-    return held_claim(gains, low, high, most, float(rng.choice([1.0, 1.5])))
+    shares = 1.0, float(rng.choice([1.0, 1.5]))
+    return msgspec.structs.replace(held_claim(gains, low, high, most), shares=shares)
 
 
 def certificate(rng: np.random.Generator) -> File | None:

@@ -15,8 +15,7 @@ from rich.progress import track
 from touches import Rig
 
 from palpate.force import ForceLoop
-from palpate.force.flat import STATE
-from palpate.force.guard import FARTHEST
+from palpate.force.guard import FARTHEST, STATE
 from palpate.force.simulated_press import ENCODER
 
 SECONDS = 2.0

@@ -9,8 +9,7 @@ noise 0.05 to 0.2 N, on spheres, bowls, cylinders, saddles, waves and egg boxes,
 each. The given normal is off by up to 22 degrees (`far`), or by 3 degrees (standard deviation, `near`); with
 `touches` it is as far off, and three touches 10 mm apart measure it first. `obeys`: after
 0.5 s the true normal force is within 3 % rms and 10 %, contact kept. `domain`: the slides that the closed form of
-palpate tune admits. `joints`: an arm with its joints, moved by MuJoCo, along paths of at most 60 mm. `rivals` begin
-where the force is first held, with the same K_u; `leaderboard` has a row for each.
+palpate tune admits.
 `dither`: stiffness along the path. `faults`: steps of 1 mm over 2 mm, up or down, with and without
 `step` in the gains, and no faster than the speed that `palpate tune --slide` prints for a step on the cap (here for K);
 friction that is 1.5 times as high at rest, and friction above mu_max, from the near start.
@@ -24,17 +23,15 @@ from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
-from sliding_rivals import RIVALS
 
 from palpate.force.arm import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
 from palpate.force.sliding.slide_domain import edge_speed, obeys, slide_terms
-from palpate_slide.dither import dither_frequency, stiffness_along
-from palpate_slide.ground import ground_of
-from palpate_slide.jointed_arm import jointed_arm
-from palpate_slide.world import figures_of, simulate
+from palpate.slide.dither import dither_frequency, stiffness_along
+from palpate.slide.ground import ground_of
+from palpate.slide.world import figures_of, simulate
 
 SECONDS = 4.0
 FAR, NEAR = np.radians(22.0), np.radians(3.0)
@@ -51,7 +48,7 @@ def even(rng, low, high):
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def drawn(arm, rng, start, fault=None, widest=np.inf):
+def drawn(arm, rng, start, fault=None):
     """Gains, surface, directions, direction into the surface and seed of one slide of an arm."""
     K, speed, mu, R = even(rng, 1e3, 6e4), even(rng, 5e-3, 0.1), rng.uniform(0.0, 0.8), even(rng, 0.06, 0.5)
     force, noise = rng.uniform(8.0, 30.0), rng.uniform(0.05, 0.2)
@@ -70,7 +67,6 @@ def drawn(arm, rng, start, fault=None, widest=np.inf):
     shape, more = str(rng.choice(["sphere", "bowl", "cylinder", "saddle", "waves", "eggs"])), {}
     path, heading = str(rng.choice(["line", "back", "circle"])), rng.uniform(0.0, 2.0 * np.pi)
     extent = 0.35 * R if path == "circle" else 0.7 * R if path == "line" else 0.18 * R
-    extent = min(extent, widest)
     if path == "line":  # and back where a longer one would leave the surface
         path = "back"
     if fault in STEPS:
@@ -145,64 +141,6 @@ def slides(args):
     in_markdown(HEAD, rows)
 
 
-def joints(args):
-    """The law on an arm with joints, which MuJoCo moves; the paths are at most 60 mm wide."""
-    rows = []
-    for arm in args.arms:
-        rng, found, inside, tip = np.random.default_rng(args.seed), [], [], jointed_arm(arm)
-        for _ in range(args.slides):
-            gains, ground, ways, into, seed, terms = drawn(tip.inner, rng, "touches", widest=0.03)
-            found.append(figures_of(tip.slide(gains, ground, ways, into=into, seed=seed), gains, ground))
-            inside.append(obeys(terms))
-        rows.append([f"{TITLES[arm]}, {STARTS['touches']}", f"{len(found)}", *numbers_of(found, inside)])
-    in_markdown(HEAD, rows)
-
-
-def rivals(args):
-    """Other laws on the same slides."""
-    rows = {name: [name] for name in RIVALS}
-    for arm in args.arms:
-        better = {name: {} for name in RIVALS}
-        for start in STARTS:
-            rng, lower = np.random.default_rng(args.seed), {name: [] for name in RIVALS}
-            for _ in range(args.slides):
-                gains, ground, ways, into, seed, _ = drawn(load_arm(arm), rng, start)
-                run = lambda **law: figures_of(  # noqa: E731
-                    simulate(gains, ground, ways, into=into, seed=seed, **law), gains, ground  # noqa: B023
-                )  # fmt: skip
-                own = run()
-                for name, control in RIVALS.items():
-                    other = run(control=control)
-                    lower[name].append(own.rms < other.rms or not other.touched)
-            for name, values in lower.items():
-                better[name][start] = share(values)
-        for name, values in better.items():
-            rows[name].append("; ".join(values.values()))
-    in_markdown(["lower rms than: touches; far; near", *(TITLES[arm] for arm in args.arms)], rows.values())
-
-
-def leaderboard(args):
-    """A row for each law on the same slides, the better ones first."""
-    rows = []
-    for arm in args.arms:
-        rng, found = np.random.default_rng(args.seed), {name: [] for name in ("cautious slide", *RIVALS)}
-        for _ in range(args.slides):
-            gains, ground, ways, into, seed, _ = drawn(load_arm(arm), rng, "touches")
-            for name, results in found.items():
-                law = {"control": RIVALS[name]} if name in RIVALS else {}
-                results.append(
-                    figures_of(simulate(gains, ground, ways, into=into, seed=seed, **law), gains, ground)
-                )
-        order = sorted(found.items(), key=lambda item: -sum(f.obeys for f in item[1]))
-        for name, results in order:
-            cells = numbers_of(results)
-            tail = np.percentile([f.rms for f in results], 95)
-            rows.append(
-                [f"{TITLES[arm]}, {name}", cells[0], cells[1], f"{100 * tail:.3g} %", cells[2], cells[3]]
-            )
-    in_markdown(["slide", "obeys", "rms, median", "rms, 95 % below", "worst force (p99)", "lost"], rows)
-
-
 def dither(args):
     """Stiffness along the path of slides at 5 to 15 mm/s for 10 s, the force dithered by a tenth."""
     rows = []
@@ -246,7 +184,7 @@ def faults(args):
     in_markdown(["", "slides", "obeys", "worst force (p99)", "lost", "said, where beyond 10 %"], rows)
 
 
-PARTS = {part.__name__: part for part in (slides, joints, rivals, leaderboard, dither, faults)}
+PARTS = {part.__name__: part for part in (slides, dither, faults)}
 
 
 def main():

@@ -1,7 +1,7 @@
 """Friction, normal and stiffness from logs of slides that another simulator made: do the intervals hold?
 
 And of presses of several kinds, which are no slides: straight, oblique, by a hand, at several places, in a sine, and
-without free motion. A press counts twice, as `palpate identify` answers it and as it does without `palpate-slide`.
+without free motion. A press counts twice, as `palpate identify` answers it and as it does without the test for slides.
 
 The worlds are those of `tests/oracles/wiped_surface.py`, which has nothing of palpate. A friction that is given as a
 table counts with each row; a cone with the share of the path on which it holds the normal.
@@ -18,7 +18,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 from oracles.wiped_surface import PRESSES, WipeLog, any_press, any_wipe, press, wipe
-from palpate.contact_frame import ContactFrame, arm, identify_contact
+from palpate.contact_frame import ContactFrame, identify_contact, slide_friction
 from palpate.identification import Identification, Verdict
 from palpate.records import Record
 
@@ -81,16 +81,16 @@ def row_of(name: str, worlds: list[tuple[Identification, WipeLog]]) -> str:
 
 def presses(count: int) -> None:
     """Prints the table of presses: those read as slides, and those whose stiffness is identified, with and without."""
-    print("| presses | | read as slides | K identified | K holds | without `palpate-slide` | K holds |")
+    print("| presses | | read as slides | K identified | K holds | without the test for slides | K holds |")
     print("|" + " --- |" * 7)
     for i, kind in enumerate(PRESSES):
         logs = [
             press(any_press(FIRST + 1000 * i + k, kind=kind)) for k in range(max(count // len(PRESSES), 1))
         ]
-        own, reads = [found_in(log) for log in logs], arm.entry_points
-        arm.entry_points = lambda **_: ()
+        own, slide_in = [found_in(log) for log in logs], slide_friction.slide_in
+        slide_friction.slide_in = lambda *_: None
         alone = [found_in(log) for log in logs]
-        arm.entry_points = reads
+        slide_friction.slide_in = slide_in
         cells = [kind, f"{len(logs)}", f"{sum(f.slide is not None for f in own)}"]
         for answers in (own, alone):
             known = [

@@ -24,7 +24,7 @@ from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.lyapunov import single
 from palpate.force.slide_table import Slide
-from palpate.force.sliding.slide_proof import MISALIGNED, slide_proof
+from palpate.force.sliding.slide_proof import MAX_MISALIGNMENT, slide_proof
 
 MU_MAX = 0.9
 TITLES = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
@@ -32,10 +32,10 @@ TITLES = {"ur5e": "UR5e", "fr3": "FR3", "iiwa14": "iiwa 14"}
 
 def factors(rng, shape, ends):
     """Factors m of random angles and frictions, a share `ends` of them at the ends of both."""
-    phi = rng.uniform(-MISALIGNED, MISALIGNED, shape)
+    phi = rng.uniform(-MAX_MISALIGNMENT, MAX_MISALIGNMENT, shape)
     mu = rng.uniform(0.0, MU_MAX, shape)
     extreme = rng.random(shape) < ends
-    phi, mu = np.where(extreme, np.sign(phi) * MISALIGNED, phi), np.where(extreme, MU_MAX, mu)
+    phi, mu = np.where(extreme, np.sign(phi) * MAX_MISALIGNMENT, phi), np.where(extreme, MU_MAX, mu)
     return np.cos(phi) * (np.cos(phi) + mu * np.sin(phi))
 
 

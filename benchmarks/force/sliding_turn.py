@@ -17,9 +17,9 @@ from palpate._vector import Vec3
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
-from palpate_slide.ground import ground_of
-from palpate_slide.jointed_arm import HeldTip, jointed_arm
-from palpate_slide.report import summarise
+from palpate.slide.ground import ground_of
+from palpate.slide.jointed_arm import HeldTip, jointed_arm
+from palpate.slide.report import summarise
 
 SPEED, RADIUS, EXTENT = 0.03, 0.15, 0.04
 BEHIND, WEIGHT = 0.02, 12.0

@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import cProfile
 import pstats
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,10 +21,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from presses import log_of
 
 from palpate.bench import ForceSensorTable, given_motion, load
 from palpate.environments import KelvinVoigt
@@ -61,7 +56,9 @@ def press(rows: int, seed: int) -> tuple[Record, LowPass, float]:
     record = given_motion(surface, sensor=ForceSensorTable(phase=0.0011)).run(path(rows, surface), seed=seed)
     told = record.meta["instruments"]["force"]
     low_pass = LowPass.parse(told["filter"])
-    return log_of(record), low_pass, low_pass.lag + told["delay_s"]
+    columns = {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]}
+    log = Record(columns, {"time": "s", "position": "m", "force": "N"})
+    return log, low_pass, low_pass.lag + told["delay_s"]
 
 
 def tellings(low_pass: LowPass, lag: float) -> dict[str, dict[str, Any]]:

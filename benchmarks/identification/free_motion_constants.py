@@ -34,11 +34,11 @@ from palpate.identification.sampling import channels_of
 SURFACES = ("kelvin-voigt", "mass", "arms", "hunt-crossley", "stiffening", "friction", "plastic")
 NUISANCES = ("clean", "payload", "never-leaves")
 VALUES: dict[tuple[Any, str], tuple[Any, ...]] = {
-    (free_motion, "FLAT"): (0.1, 0.2, 0.4, 0.6, 0.8),
-    (free_motion, "_TWICE"): (1.0, 1.5, 2.0, 4.0),
-    (free_motion, "_OUTLYING"): (3.0, 5.0, 8.0),
-    (free_motion, "_EXPLAINED"): (0.3, 0.5, 0.7, 0.9),
-    (free_motion, "_OTHERS"): (1.0, 1.5, 2.0, 4.0),
+    (free_motion, "MAX_SLOPE_RATIO"): (0.1, 0.2, 0.4, 0.6, 0.8),
+    (free_motion, "_MIN_FRACTION_RATIO"): (1.0, 1.5, 2.0, 4.0),
+    (free_motion, "_MAX_NOISE_STDS"): (3.0, 5.0, 8.0),
+    (free_motion, "_MIN_EXPLAINED_POWER"): (0.3, 0.5, 0.7, 0.9),
+    (free_motion, "_MIN_ADVANTAGE"): (1.0, 1.5, 2.0, 4.0),
 }
 
 
@@ -87,8 +87,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--trials", type=int, default=2, help="logs of each surface and nuisance")
     parser.add_argument("--seed", type=int, default=40)
+    parser.add_argument("--surfaces", nargs="+", choices=SURFACES, default=SURFACES)
     asked = parser.parse_args()
-    cells = [Cell(surface, nuisance) for surface in SURFACES for nuisance in NUISANCES]
+    cells = [Cell(surface, nuisance) for surface in asked.surfaces for nuisance in NUISANCES]
     seeds = range(asked.seed, asked.seed + asked.trials)
     console = Console(stderr=True)
     logs = [make_log(c, s) for c in track(cells, "logs", console=console, transient=True) for s in seeds]

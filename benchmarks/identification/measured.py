@@ -1,12 +1,12 @@
 """What `palpate identify` says of measured logs, one row each: of a folder with the logs of four laboratories.
 
     python benchmarks/identification/measured.py FOLDER
-    python benchmarks/identification/measured.py FOLDER --pages PAGES
+    python benchmarks/identification/measured.py FOLDER --logs skin_indentation
 
 FOLDER holds lattice_probe/, mr_damper/, silverbox/ and skin_indentation/ as their authors published them; a log that is
-not there is left out, and said. With --pages the page of each is written there. There is no truth: the table shows what
-is said, and what limits it. Of the logs that hold the same press several times, each piece is then identified by
-itself: how the answers scatter over their own intervals is chi2/dof.
+not there is left out, and said. There is no truth: the table shows what is said, and what limits it. Of the logs that
+hold the same press several times, each piece is then identified by itself: how the answers scatter over their own
+intervals is chi2/dof.
 """
 
 from __future__ import annotations
@@ -20,11 +20,8 @@ from typing import Any
 import numpy as np
 
 from palpate.errors import InputError
-from palpate.files import write_text
 from palpate.identification import Identification, Parameter, identify
 from palpate.logs import read_log
-from palpate.report.identification.page import page
-from palpate.report.identification.words import Source, sha256_of
 
 
 @dataclass(frozen=True)
@@ -169,11 +166,11 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--pages", type=Path, help="folder for the pages")
+    parser.add_argument("--logs", default="", help="those alone whose path has this in it")
     asked = parser.parse_args()
     print("| " + " | ".join(HEAD) + " |", "|---" * len(HEAD) + "|", sep="\n")
     skin = []
-    for log in LOGS:
+    for log in (log for log in LOGS if asked.logs in log.path):
         path = asked.folder / log.path
         if not path.is_file():
             print(f"| {log.path} | not there" + " |" * (len(HEAD) - 1))
@@ -186,15 +183,11 @@ def main() -> None:
         print("| " + " | ".join(row(log, found)) + " |", flush=True)
         if path.parent.name == "skin_indentation":
             skin.append(found)
-        if asked.pages:
-            asked.pages.mkdir(exist_ok=True)
-            source = Source(str(path), sha256=sha256_of(path))
-            write_text(asked.pages / f"{path.stem}.html", page(found, source))
     print("\nrepeats, each piece of a log by itself:")
     for own in REPEATS:
-        if (asked.folder / own.log.path).is_file():
+        if asked.logs in own.log.path and (asked.folder / own.log.path).is_file():
             print(f"  {Path(own.log.path).name}: {chi2(own.found(asked.folder))}", flush=True)
-    if skin:
+    if len(skin) > 1:
         print(f"  skin, presses of different force, not the same again: {chi2(skin)}")
 
 

@@ -30,18 +30,18 @@ from plain_presses import World, world_of
 from palpate.errors import InputError
 from palpate.identification import steady_press, strokes
 from palpate.identification.contacts import Contacts, contacts_of
-from palpate.identification.options import NAMED, Options
+from palpate.identification.options import OPTION_NAMES, Options
 from palpate.identification.sampling import Channels, channels_of
 
 VALUES: dict[str, tuple[float, ...]] = {
-    "STROKE": (0.05, 0.1, 0.2, 0.4),
-    "_ENDS": (0.005, 0.01, 0.02, 0.05, 0.1),
-    "_SLOWEST": (0.1, 0.2, 0.4, 0.6, 0.8),
-    "_BULGE": (1.1, 1.3, 1.5, 1.8, 3.0),
-    "_STILL": (0.0, 0.05, 0.1, 0.3),
-    "_SHARE": (0.4, 0.6, 0.8, 0.95),
-    "_SEEN": (3.0, 5.0, 8.0, 16.0),
-    "NEAR": (0.1, 0.15, 0.2, 0.3),
+    "MIN_STROKE_REACH": (0.05, 0.1, 0.2, 0.4),
+    "_END_FRACTION": (0.005, 0.01, 0.02, 0.05, 0.1),
+    "_MIN_SPEED_RATIO": (0.1, 0.2, 0.4, 0.6, 0.8),
+    "_MAX_MIDDLE_SPEED_RATIO": (1.1, 1.3, 1.5, 1.8, 3.0),
+    "_REST_SPEED_RATIO": (0.0, 0.05, 0.1, 0.3),
+    "_MIN_STROKE_FRACTION": (0.4, 0.6, 0.8, 0.95),
+    "_MIN_TRAVEL_STDS": (3.0, 5.0, 8.0, 16.0),
+    "HALF_WINDOW": (0.1, 0.15, 0.2, 0.3),
 }
 Case = tuple[Channels, Options, Callable[[Contacts, float], tuple[float, float] | None]]
 
@@ -61,7 +61,7 @@ def pressed(world: World, seed: int) -> Case:
 
 def shaken(log: Log) -> Case:
     """A log of the foreign simulator, and its true tangent at a force."""
-    told = {name: value for name, value in log.options.items() if name in NAMED}
+    told = {name: value for name, value in log.options.items() if name in OPTION_NAMES}
 
     def truth(_: Contacts, force: float) -> tuple[float, float] | None:
         return working_truth(log, "press", None, force)
@@ -117,7 +117,7 @@ def main() -> None:
             for module in modules:
                 setattr(module, name, value)
             mark = "*" if np.isclose(value, own) else " "
-            (seen, hold), (taken, held) = (count(logs, name == "NEAR") for logs in (presses, others))
+            (seen, hold), (taken, held) = (count(logs, name == "HALF_WINDOW") for logs in (presses, others))
             print(
                 f"{mark} {name.strip('_').lower():8} {value:<5g} seen {seen:3d} hold {hold:3d}"
                 f"   taken {taken:3d} hold {held:3d}", flush=True,

@@ -15,11 +15,11 @@ import re
 
 import numpy as np
 
+from palpate.certified_logs import check
+from palpate.certified_logs.check import LINEAR, REQUIRED_DIGITS, SOLVERS, SolverResult, scores
+from palpate.certified_logs.models import FLOATS
+from palpate.certified_logs.problem import CertifiedProblem, motion_and_force, problems
 from palpate.identification.least_squares import solve
-from palpate_references import check
-from palpate_references.check import ENOUGH, LINEAR, SOLVERS, SolverResult, scores
-from palpate_references.models import FLOATS
-from palpate_references.problem import CertifiedProblem, motion_and_force, problems
 
 
 def mujoco_solver(problem: CertifiedProblem, start: dict[str, float]) -> SolverResult:
@@ -86,8 +86,10 @@ def main() -> None:
                         check.Score(problem, solver, k, 0.0, None) for k in range(2 if problem.starts else 1)
                     ]
         digits = sorted(one.digits for one in found)
-        few = dict.fromkeys(re.sub(r"-\d+$", "", one.problem.name) for one in found if one.digits < ENOUGH)
-        enough = sum(d >= ENOUGH for d in digits)
+        few = dict.fromkeys(
+            re.sub(r"-\d+$", "", one.problem.name) for one in found if one.digits < REQUIRED_DIGITS
+        )
+        enough = sum(d >= REQUIRED_DIGITS for d in digits)
         middle = digits[len(digits) // 2] if digits else float("nan")
         least = digits[0] if digits else float("nan")
         print(

@@ -3,13 +3,13 @@
     python benchmarks/identification/uncertainty.py --draws 60
     python benchmarks/identification/uncertainty.py --draws 60 --logs kelvin-voigt-2
 
-Of each certified log (palpate-references) whose model is linear the force is drawn again: the certified model's force,
+Of each certified log whose model is linear the force is drawn again: the certified model's force,
 with normal noise of the certified residual standard deviation; then also with a lag that errs by a normal deviate of
 1 ms, while the identification is given its mean and that standard deviation. A ratio is a standard uncertainty, root
 mean square over the draws, over the standard deviation of its estimates: 1 is exact, more is cautious. A cell has
-three: of least squares on the model alone (`ci95_if_model_holds`); of the budget by the sources that noise reaches,
-`noise` and `other forces`, and `lag` where it is drawn; and of the budget's combined standard uncertainty, in which is
-also what nobody drew. The standard error of a ratio is 1/sqrt(2 draws).
+two: of the budget by the sources that noise reaches, `noise` and `other forces`, and `lag` where it is drawn; and of
+the budget's combined standard uncertainty, in which is also what nobody drew. The standard error of a ratio is
+1/sqrt(2 draws).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from palpate.certified_logs.models import FLOATS
+from palpate.certified_logs.problem import CertifiedProblem, motion_and_force, problems
 from palpate.identification import Identification, identify
 from palpate.records import Record
-from palpate_references.models import FLOATS
-from palpate_references.problem import CertifiedProblem, motion_and_force, problems
 
 Array = NDArray[np.float64]
 
@@ -42,12 +42,10 @@ class Ratios(NamedTuple):
     """Standard uncertainties of one parameter of a log over the standard deviation of the estimates.
 
     Args:
-        fit: of least squares on the model alone.
         drawn: of the budget, by the sources that were drawn.
         combined: of the budget, by all.
     """
 
-    fit: float
     drawn: float
     combined: float
 
@@ -102,19 +100,12 @@ def ratios(found: list[Identification], sources: tuple[str, ...]) -> dict[str, R
     own: dict[str, Ratios] = {}
     for name in "KBM":
         parts = [one.parameters[name] for one in found if name in one.parameters]
-        fits = [one.estimate for one in found if one.estimate is not None and name in one.estimate.names]
-        if min(len(parts), len(fits)) < len(found) or any(
-            p.ci95 is None or not p.contributions for p in parts
-        ):
+        if len(parts) < len(found) or any(p.ci95 is None or not p.contributions for p in parts):
             continue
-        at = fits[0].names.index(name)
         spread = float(np.std([sum(p.ci95) / 2 for p in parts if p.ci95], ddof=1))
-        spread_of_fit = float(np.std([fit.theta[at] for fit in fits], ddof=1))
         by_drawn = [sum(p.contributions[c].std ** 2 for c in sources if c in p.contributions) for p in parts]
         whole = [sum(c.std**2 for c in p.contributions.values()) for p in parts]
-        by_fit = [fit.covariance[at, at] for fit in fits]
-        fit, *others = (float(np.sqrt(np.mean(variance))) for variance in (by_fit, by_drawn, whole))
-        own[name] = Ratios(fit / spread_of_fit, *(one / spread for one in others))
+        own[name] = Ratios(*(float(np.sqrt(np.mean(variance))) / spread for variance in (by_drawn, whole)))
     return own
 
 
@@ -153,7 +144,7 @@ def main() -> int:
     counts = [
         f"{sum(abs(one[i] - 1) <= CLOSE for one in every)} within {CLOSE:.0%},"
         f" {sum(one[i] >= 1 - CLOSE for one in every)} not below, by {name}"
-        for i, name in enumerate(("least squares", "the sources drawn", "all sources"))
+        for i, name in enumerate(("the sources drawn", "all sources"))
     ]
     print(
         f"\nOf {len(every)} ratios: {'; '.join(counts)}."

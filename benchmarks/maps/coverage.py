@@ -1,4 +1,4 @@
-"""Judge stiffness maps on surfaces that share nothing with the Gaussian process, and print the tables of docs/maps.md.
+"""Judge stiffness maps on surfaces that share nothing with the Gaussian process, and print tables of it.
 
     benchmarks/maps/coverage.py [--worlds 40] [--seed 1] [--parts coverage presses time]
 
@@ -20,7 +20,7 @@ from itertools import chain
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from palpate_maps import StiffnessMap
+from palpate.maps import StiffnessMap
 
 SIDE, PIXELS = 0.1, 100
 CENTRES = (np.arange(PIXELS) + 0.5) / PIXELS * SIDE
@@ -113,9 +113,8 @@ def growth(surface: World, count: int, rng: np.random.Generator, goal: str) -> I
         yield result
         if len(result) >= count:
             return
-        places = result.next(
-            min(5, count - len(result)), goal=goal, stiffer_than=float(np.exp(surface.edge))
-        ).places
+        threshold = float(np.exp(surface.edge)) if goal == "edge" else None
+        places = result.next(min(5, count - len(result)), stiffer_than=threshold).places
 
 
 CORNERS = np.array([[0.0, 0.0], [0.0, SIDE], [SIDE, 0.0], [SIDE, SIDE]])

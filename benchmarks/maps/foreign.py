@@ -19,7 +19,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.spatial.distance import cdist
 
-from palpate_maps import StiffnessMap
+from palpate.maps import StiffnessMap
 
 SIDE, PIXELS, FOLDS = 0.1, 200, 5
 Draw = Callable[[np.ndarray, np.random.Generator], np.ndarray]

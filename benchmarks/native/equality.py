@@ -27,12 +27,10 @@ from palpate.files import write_json
 from palpate.force import load_arm
 from palpate.force.gains import gains_for
 from palpate.force.slide_table import Slide
-from palpate_native.exporting import ExportedLaw, LawRequest, exported_law
-from palpate_native.replay import MARK, program, write_rows
+from palpate.native.exporting import ExportedLaw, exported_law
+from palpate.native.replay import MARK, program, write_rows
 
-LAWS = {
-    "force loop": "force", "sliding loop": "slide", "contact identifier": "identifier", "least squares of 3": "squares",
-}  # fmt: skip
+LAWS = {"force loop": "force", "sliding loop": "slide", "least squares of 3": "squares"}
 PLAIN = "-std=c99 -ffp-contract=off -Wall -Wextra -Wconversion -Wpedantic -Werror -I."
 LEVELS = ("-O0", "-O1", "-O2", "-O3")
 M7 = "-mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16"
@@ -63,38 +61,19 @@ TIMER = """
 #include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
-static double row[ROW]; static double *rows; static float *took, *once;
-static int order(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
+static double row[ROW]; static double *rows;
 static double now(void) {
     struct timespec t;
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
     return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
 }
-/* Fixed arithmetic, for a measure of the machine: the textbook's recursive least squares of four parameters. */
-static double P[4][4], theta[4];
-static void yardstick(double x) {
-    const double phi[4] = {1.0, x, x * x, x * x * x}; double g[4], a = 0.999, e = x;
-    for (int i = 0; i < 4; ++i) {
-        g[i] = 0;
-        for (int j = 0; j < 4; ++j) g[i] += P[i][j] * phi[j];
-        a += phi[i] * g[i]; e -= phi[i] * theta[i];
-    }
-    for (int i = 0; i < 4; ++i) {
-        theta[i] += e * g[i] / a;
-        for (int j = 0; j < 4; ++j) P[i][j] = (P[i][j] - g[i] * g[j] / a) / 0.999;
-    }
-}
 int main(int count, char **words) {
-    FILE *file = fopen(words[count - 1], "rb"); int sign = 0; long n = 0, most = 400000, blocks = 0;
-    double sum = 0, total = 0, fixed = 0, begun;
+    FILE *file = fopen(words[count - 1], "rb"); int sign = 0; long n = 0, most = 400000;
+    double sum = 0, total = 0, begun;
     NAME_state state; const NAME_gains *gains = &NAME_default_gains;
     if (!file) return 2;
     while (sign != '\\n') sign = fgetc(file);
-    rows = malloc(sizeof row * (size_t)most); took = malloc(sizeof *took * (size_t)most);
-    once = malloc(sizeof *once * (size_t)most);
+    rows = malloc(sizeof row * (size_t)most);
     while (n < most && fread(rows + ROW * n, sizeof row, 1, file) == 1) n++;
     for (long block = 0; block < n; block += 4000) { /* a press at a time, the least of ten repeats */
         double least = 0;
@@ -108,32 +87,9 @@ int main(int count, char **words) {
             begun = now() - begun;
             least = repeat && least < begun ? least : begun;
         }
-        total += least; least = 0;
-        for (int repeat = 0; repeat < 10; ++repeat) {
-            for (int i = 0; i < 16; ++i) P[i / 4][i % 4] = i % 5 ? 0 : 1;
-            theta[0] = theta[1] = theta[2] = theta[3] = 0;
-            begun = now();
-            for (int k = 0; k < 1000; ++k) yardstick(k % 7 - 3.0);
-            begun = now() - begun;
-            least = repeat && least < begun ? least : begun;
-        }
-        fixed += least * 1e-3; sum += theta[0]; blocks++;
+        total += least;
     }
-    printf("%.0f %.2f ", total / (double)n, total / (double)n / (fixed / blocks));
-    for (int repeat = 0; repeat < 5; ++repeat) {
-        for (long k = 0; k < n; ++k) {
-            const double *in = rows + ROW * k + 1; double a = now(); float t;
-            if (in[-1] > 0) NAME_init(gains, &state);
-            sum += CALL;
-            t = (float)(now() - a);
-            once[k] = repeat ? once[k] : t;
-            took[k] = repeat && took[k] < t ? took[k] : t;
-        }
-    }
-    qsort(took, (size_t)n, sizeof *took, order);
-    qsort(once, (size_t)n, sizeof *once, order);
-    n = (long)(0.9999 * (double)n);
-    printf("%.2f %.2f %g\\n", 1e-3 * (double)took[n], 1e-3 * (double)once[n], sum);
+    printf("%.0f %g\\n", total / (double)n, sum);
     return 0;
 }
 """
@@ -200,14 +156,12 @@ def exported(name: str, folder: Path) -> ExportedLaw:
     if name == "force":
         path = folder / "gains.toml"
         path.write_text(gains_for(load_arm("ur5e"), 20.0, limit=60.0).to_toml(), encoding="utf-8")
-        return exported_law(LawRequest(gains=path))
+        return exported_law(gains_file=path)
     if name == "slide":
         path, gains = folder / "slide.toml", gains_for(load_arm("ur5e"), 15.0, cap=4e4)
         path.write_text(replace(gains, slide=Slide(speed=0.03, mu_max=0.9)).to_toml(), encoding="utf-8")
-        return exported_law(LawRequest("sliding-loop", gains=path))
-    if name == "squares":
-        return exported_law(LawRequest("recursive-least-squares", forgetting=0.99))
-    return exported_law(LawRequest("contact-identifier", sampling=480.0))
+        return exported_law("sliding-loop", path)
+    return exported_law("recursive-least-squares", forgetting=0.99)
 
 
 def builds(given: argparse.Namespace) -> Iterator[tuple[str, str, list[str], list[str], int]]:
@@ -263,13 +217,9 @@ def of_law(bench: Bench, name: str, given: argparse.Namespace) -> dict[str, str]
     for compiler in ("gcc", "clang"):
         if shutil.which(compiler):
             took = bench.measured(
-                law,
-                f"a tick and a yardstick by {compiler} -O2",
-                400_000,
-                lambda c=compiler: ticked(bench, law, c),
+                law, f"a tick by {compiler} -O2", 400_000, lambda c=compiler: tick_time(bench, law, c)
             )
-            row = f"a tick by {compiler} -O2; times {YARDSTICK}; {WITHIN}"
-            rows[row] = f"{took[0]:.0f} ns; {took[1]:.1f}; {took[2]:.1f} us; {took[3]:.1f} us"
+            rows[f"a tick by {compiler} -O2, the least of ten repeats"] = f"{took[0]:.0f} ns"
     sizes = []
     for compiler, more in (
         ("gcc", ""),
@@ -286,20 +236,14 @@ def of_law(bench: Bench, name: str, given: argparse.Namespace) -> dict[str, str]
     return rows
 
 
-WITHIN = "99.99 % within, by the least of five repeats; by the first"
-YARDSTICK = "a textbook update of least squares of 4"
 FLAGS = ["-O2", "-std=gnu99", "-ffp-contract=off", "-fno-math-errno", "-I."]
 
 
-def ticked(bench: Bench, law: ExportedLaw, compiler: str) -> list[float]:
-    """A tick's time [ns], its ratio to the fixed arithmetic, and two 99.99th percentiles [us].
-
-    The first two take of each press the least of ten repeats; the percentiles of each tick the least of five, and the
-    first, which contains the machine's interrupts.
-    """
+def tick_time(bench: Bench, law: ExportedLaw, compiler: str) -> list[float]:
+    """Time of a tick [ns]: of each press the least of ten repeats."""
     rows = bench.rows(law, 400_000, 1).name
     command([compiler, *FLAGS, f"{law.module.name}.c", "timer.c", "-lm", "-o", "timer"], bench.folder)
-    return [float(word) for word in command(["./timer", rows], bench.folder).split()[:4]]
+    return [float(command(["./timer", rows], bench.folder).split()[0])]
 
 
 def code(bench: Bench, law: ExportedLaw, compiler: str, more: str) -> list[int]:

@@ -22,7 +22,6 @@ from palpate.bench import ForceSensorTable, given_motion
 from palpate.environments import KelvinVoigt
 from palpate.identifiers import (
     ContactIdentifier,
-    KalmanFilter,
     RecursiveLeastSquares,
     RestartingLeastSquares,
     SIFt,
@@ -38,7 +37,6 @@ ESTIMATORS: dict[str, Callable[[], Any]] = {
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
     "exponential 0.995": lambda: RecursiveLeastSquares(START, VAGUE, 0.995),
     "SIFt 0.99": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.99)),
-    "Kalman": lambda: KalmanFilter(START, VAGUE, DRIFT, 1.0 / RATE, NOISE),
     "padasip 0.995": lambda: Padasip(START, VAGUE, 0.995),
     "filterpy, Kalman": lambda: Filterpy(START, VAGUE, DRIFT, 1.0 / RATE, NOISE),
 }

@@ -16,16 +16,12 @@ from pressing import NOISE, Array
 from scipy.signal import lfilter
 from update import START, TRUTH, VAGUE, waves
 
-from palpate.identifiers import Directional, KalmanFilter, RecursiveLeastSquares, RestartingLeastSquares, SIFt
+from palpate.identifiers import RecursiveLeastSquares, RestartingLeastSquares, SIFt
 
-DRIFT = 1e-5 * np.sqrt(np.diag(VAGUE))
 MAKERS = {
     "least squares": lambda: RecursiveLeastSquares(START, VAGUE),
     "exponential 0.995": lambda: RecursiveLeastSquares(START, VAGUE, 0.995),
-    "directional 0.99": lambda: RecursiveLeastSquares(START, VAGUE, Directional(0.99)),
     "SIFt 0.99": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.99)),
-    "Kalman, noise given": lambda: KalmanFilter(START, VAGUE, DRIFT, noise=NOISE),
-    "Kalman, noise estimated": lambda: KalmanFilter(START, VAGUE, DRIFT),
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
 }
 

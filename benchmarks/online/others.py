@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from palpate.identifiers import NeuralProbe
-from palpate.identifiers.kernels.least_squares import rls
 
 Array = NDArray[np.float64]
 
@@ -79,7 +78,11 @@ class Thesis(Other):
 
     def update(self, regressor: ArrayLike, force: float) -> None:
         """Takes one sample in."""
-        self.theta, self._P, _ = rls(self.theta, self._P, np.asarray(regressor), force, self._forgetting)
+        phi = np.asarray(regressor)
+        seen = self._P @ phi
+        scale = 1.0 / (self._forgetting + phi @ seen)
+        self.theta = self.theta + seen * (scale * (force - phi @ self.theta))
+        self._P = (self._P - scale * np.outer(seen, seen)) / self._forgetting
 
 
 class Network(Other):

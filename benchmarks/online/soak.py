@@ -31,9 +31,7 @@ from pressing import NOISE, REST, START, VAGUE, motion, regressors
 from palpate.errors import InputError
 from palpate.identifiers import (
     ContactIdentifier,
-    Directional,
     Exponential,
-    KalmanFilter,
     RecursiveLeastSquares,
     RestartingLeastSquares,
     SIFt,
@@ -55,9 +53,7 @@ SURFACES = (7e3, 14e3)  # [N/m], in turn
 MAKERS: dict[str, Callable[[], Any]] = {
     "no forgetting": lambda: RecursiveLeastSquares(START, VAGUE),
     "exponential 0.998": lambda: RecursiveLeastSquares(START, VAGUE, Exponential(0.998)),
-    "directional 0.994": lambda: RecursiveLeastSquares(START, VAGUE, Directional(0.994)),
     "SIFt 0.994": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.994)),
-    "Kalman filter": lambda: KalmanFilter(START, VAGUE, [1.0, 30.0, 0.1]),
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
 }
 

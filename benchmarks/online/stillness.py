@@ -17,9 +17,7 @@ import numpy as np
 from pressing import NOISE, REST, START, STIFFEST, VAGUE, motion, press, regressors
 
 from palpate.identifiers import (
-    Directional,
     Exponential,
-    KalmanFilter,
     RecursiveLeastSquares,
     RestartingLeastSquares,
     SIFt,
@@ -31,9 +29,7 @@ CHUNK = 1_000_000
 PRESSES = 25
 MAKERS = {
     "exponential 0.998": lambda: RecursiveLeastSquares(START, VAGUE, Exponential(0.998)),
-    "directional 0.994": lambda: RecursiveLeastSquares(START, VAGUE, Directional(0.994)),
     "SIFt 0.994": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.994)),
-    "Kalman, K walks 30 N/m a second": lambda: KalmanFilter(START, VAGUE, [1.0, 30.0, 0.1]),
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
     "restarting, SIFt 0.994": lambda: RestartingLeastSquares(START, VAGUE, SIFt(0.994)),
     "no forgetting": lambda: RecursiveLeastSquares(START, VAGUE),

@@ -16,7 +16,7 @@ import numpy as np
 from others import Filterpy, Network, Padasip, Thesis
 from pressing import NOISE, TONES, Array
 
-from palpate.identifiers import Directional, KalmanFilter, RecursiveLeastSquares, RestartingLeastSquares, SIFt
+from palpate.identifiers import RecursiveLeastSquares, RestartingLeastSquares, SIFt
 
 TRUTH = np.array([0.1, 200.0, 5200.0])  # M [kg], B [N s/m], K [N/m]: the thesis' foam
 START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])
@@ -25,9 +25,7 @@ NONE = (0.0, 0.0, 0.0)
 MAKERS: dict[str, Callable[[], Any]] = {
     "RecursiveLeastSquares": lambda: RecursiveLeastSquares(START, VAGUE),
     "  exponential 0.999": lambda: RecursiveLeastSquares(START, VAGUE, 0.999),
-    "  directional 0.999": lambda: RecursiveLeastSquares(START, VAGUE, Directional(0.999)),
     "  SIFt 0.999": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.999)),
-    "KalmanFilter": lambda: KalmanFilter(START, VAGUE, NONE),
     "RestartingLeastSquares": lambda: RestartingLeastSquares(START, VAGUE),
     "padasip FilterRLS": lambda: Padasip(START, VAGUE, 1.0),
     "filterpy KalmanFilter": lambda: Filterpy(START, VAGUE, NONE, 1e-3, NOISE),

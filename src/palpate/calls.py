@@ -12,13 +12,13 @@ from palpate.from_log import identify_log as identify_log_file
 from palpate.identification import Identification, Pooled
 from palpate.identification import identify as identify_record
 from palpate.identification import pool as pool_found
-from palpate.identification.options import NAMED
+from palpate.identification.options import OPTION_NAMES
 from palpate.logs import read_log as read
 from palpate.records import Record
 from palpate.text import in_python
 
 _READ = {name for name, own in signature(read).parameters.items() if own.kind is own.KEYWORD_ONLY}
-_OPTIONS = {*NAMED}
+_OPTIONS = {*OPTION_NAMES}
 _WORDS = {"model", "force_filter", "bonded"}
 _PAIRS = {"mass", "series_mass"}
 
@@ -44,13 +44,13 @@ def identify(source: Record | Any, **options: Any) -> Identification:
 
 
 def identify_log(path: str | Path, **options: Any) -> Identification:
-    """As `palpate.from_log.identify_log`: what `palpate identify` does with a file, in one call."""
+    """Do what `palpate identify` does with a file, in one call; options of `palpate.from_log.identify_log`."""
     with _in_python():
         return identify_log_file(path, **options)
 
 
 def read_log(path: Any, **options: Any) -> Record:
-    """As `palpate.logs.read_log`; what is wrong is told in Python's words."""
+    """Read a log as `palpate.logs.read_log` does, with error messages in Python's words."""
     with _in_python():
         for name, value in options.items():
             if name not in _READ and not isinstance(value, str):
@@ -84,7 +84,7 @@ def pool(logs: Sequence[Any], covariates: Mapping[str, Any] | None = None, **opt
 
 def _fit(record: Record, options: dict[str, Any]) -> Identification:
     """Along the contact's normal where the record has a wrench and a pose."""
-    from palpate.contact_frame.arm import identify_contact
+    from palpate.contact_frame.press_or_slide import identify_contact
 
     return (
         identify_contact(record, **options)[0]
@@ -116,8 +116,8 @@ def _check(name: str, value: Any, *, pair: bool) -> None:
         or len(numbers) != 1 + pair
         or not all(map(_is_number, numbers))
     ):
-        wanted = "a pair, its value and its standard deviation" if pair else "a number in SI units"
-        raise InputError(f"{name} must be {wanted}, got {value!r}")
+        expected = "a pair, its value and its standard deviation" if pair else "a number in SI units"
+        raise InputError(f"{name} must be {expected}, got {value!r}")
 
 
 def _is_number(value: Any) -> bool:

@@ -1,5 +1,6 @@
 """Errors that palpate raises for wrong input."""
 
+import shlex
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -13,11 +14,13 @@ class PalpateError(Exception):
     """Base of every error that palpate raises on purpose.
 
     Args:
-        text: the fault, the place, and the remedy; its middle is left out beyond `LONGEST` letters.
+        text: the fault, the place, and the remedy; its middle is left out beyond `longest` letters.
     """
 
+    longest = LONGEST
+
     def __init__(self, text: object = ""):
-        super().__init__(shorten(str(text), LONGEST))
+        super().__init__(shorten(str(text), self.longest))
 
 
 class InputError(PalpateError, ValueError):
@@ -43,6 +46,17 @@ class PartError(PalpateError, TypeError):
     def __init__(self, text: str, compiler: str = ""):
         super().__init__(text)
         self.compiler = compiler
+
+
+def how_to_install(distribution: str) -> str:
+    """The command that installs a distribution from palpate's sources: nothing is published yet.
+
+    Args:
+        distribution: its name, with an extra if one is needed, as `palpate-thesis` or `palpate[arms]`.
+    """
+    name, bracket, extra = distribution.partition("[")
+    folder = "." if name == "palpate" else f"./packages/{name}"
+    return f"{shlex.join(['pip', 'install', folder + bracket + extra])} in palpate's sources"
 
 
 _LISTED = 60

@@ -5,13 +5,14 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from palpate.contact_frame.arm import ArmDynamics, identify_contact, robot_stiffness
-from palpate.contact_frame.load import Payload, load_payload
+from palpate.contact_frame.arm import ArmDynamics, robot_stiffness
+from palpate.contact_frame.payload import Payload, load_payload
+from palpate.contact_frame.press_or_slide import identify_contact
 from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
 from palpate.identification import Identification
 from palpate.identification.indenter import Indenter, with_modulus
-from palpate.identification.options import NAMED
+from palpate.identification.options import OPTION_NAMES
 from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, measured_by
@@ -54,45 +55,46 @@ class LogIdentifier:
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
-        own, words = self._complete(log)
-        known: dict[str, Any] = measured_by(log) if own.signals.plain and is_run(log) else {}
-        known |= self.options
-        samples = str(known.get("force_filter") or "none") != "none"
-        record = read_as(own.signals.read(log, samples=samples), words)
+        job, words = self._complete(log)
+        options: dict[str, Any] = measured_by(log) if job.signals.plain and is_run(log) else {}
+        options |= self.options
+        samples = str(options.get("force_filter") or "none") != "none"
+        record = read_as(job.signals.read(log, samples=samples), words)
         in_space = "force_x" in record.columns
         if not in_space:
             if replace(self.frame, force_sign=None) != ContactFrame():
                 raise InputError(
                     "--wrench-frame, --tcp, --normal and the like need a wrench and a pose; this log has one axis"
                 )
-            known["force_sign"] = _SIDES[self.frame.force_sign]
-        frame = replace(own.frame, payload=self.payload) if in_space else None
-        found, along = identify_contact(record, frame, _between(own, known, samples), **known)
+            options["force_sign"] = _SIDES[self.frame.force_sign]
+        frame = replace(job.frame, payload=self.payload) if in_space else None
+        result, along = identify_contact(record, frame, _between(job, options, samples), **options)
         if self.indenter is not None:
-            found = with_modulus(found, self.indenter, self.poisson, known.get("tolerance", 0.25))
-        return found, along
+            result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25))
+        return result, along
 
     def _complete(self, log: Path) -> "tuple[LogIdentifier, str]":
         """These with what the log's own names leave no doubt of; what is given goes first."""
-        signals, others = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
-        frame, arm = self.frame, self.arm
-        if frame.wrench_frame is None and "wrench_frame" in others:
-            frame = replace(frame, wrench_frame=others["wrench_frame"])
-        if others.get("gravity_compensated"):
+        signals, remaining = self.signals.complete(log, known_frame=self.frame.wrench_frame is not None)
+        frame = self.frame
+        arm = self.arm
+        if frame.wrench_frame is None and "wrench_frame" in remaining:
+            frame = replace(frame, wrench_frame=remaining["wrench_frame"])
+        if remaining.get("gravity_compensated"):
             frame = replace(frame, gravity_compensated=True)
-        if arm.position_from is None and "position_from" in others:
-            arm = replace(arm, position_from=others["position_from"])
-        return replace(self, signals=signals, frame=frame, arm=arm), others.get("read_as", "")
+        if arm.position_from is None and "position_from" in remaining:
+            arm = replace(arm, position_from=remaining["position_from"])
+        return replace(self, signals=signals, frame=frame, arm=arm), remaining.get("read_as", "")
 
 
-def _between(job: LogIdentifier, known: dict[str, Any], samples: bool) -> ArmDynamics:
+def _between(job: LogIdentifier, options: dict[str, Any], samples: bool) -> ArmDynamics:
     """The arm; with the stiffness from a press on a wall, if one is given."""
     if job.wall is None:
         return job.arm
-    whole = replace(job.signals, start=None, end=None).read(job.wall, samples=samples)
-    in_space = "force_x" in whole.columns
+    press = replace(job.signals, start=None, end=None).read(job.wall, samples=samples)
+    in_space = "force_x" in press.columns
     frame = replace(job.frame, payload=job.payload, free=None) if in_space else None
-    pressed, _ = identify_contact(whole, frame, replace(job.arm, position_from="tip"), **known)
+    pressed, _ = identify_contact(press, frame, replace(job.arm, position_from="tip"), **options)
     return replace(job.arm, stiffness=robot_stiffness(pressed, job.wall.name))
 
 
@@ -123,38 +125,39 @@ def identify_log(path: str | Path, **options: Any) -> Identification:
     Raises:
         InputError: the log or an option is wrong, or something would have to be guessed, in one line.
     """
-    known = {f.name for kind in (Signals, ContactFrame, ArmDynamics) for f in fields(kind)} - {"stiffness"}
-    known |= _OWN | {*NAMED}
+    names = {f.name for kind in (Signals, ContactFrame, ArmDynamics) for f in fields(kind)} - {"stiffness"}
+    names |= _OWN | {*OPTION_NAMES}
     for name in options:
-        if name not in known:
-            raise unknown("option", name, known)
+        if name not in names:
+            raise unknown("option", name, names)
     return log_identifier(options).identify(log_of(Path(path)))[0]
 
 
 def log_identifier(options: Mapping[str, Any]) -> LogIdentifier:
     """The options of `identify_log`, sorted by what they are of."""
-    given = dict(options)
-    if "preset" in given:
-        named = preset(given.pop("preset"))
-        given = {name.replace("-", "_"): value for name, value in named.items()} | given
+    settings = dict(options)
+    if "preset" in settings:
+        preset_options = preset(settings.pop("preset"))
+        settings = {name.replace("-", "_"): value for name, value in preset_options.items()} | settings
 
     def take(*names: str) -> dict[str, Any]:
-        return {name: given.pop(name) for name in names if name in given}
+        return {name: settings.pop(name) for name in names if name in settings}
 
     signals = Signals(**take(*Signals.__dataclass_fields__))
-    payload = given.pop("payload", None)
+    payload = settings.pop("payload", None)
     payload = load_payload(Path(payload)) if isinstance(payload, str | Path) else payload
     frame = ContactFrame(**take(*ContactFrame.__dataclass_fields__))
-    wall, shape = given.pop("robot_stiffness_from", None), given.pop("indenter", None)
+    wall = settings.pop("robot_stiffness_from", None)
+    shape = settings.pop("indenter", None)
     arm = ArmDynamics(
-        stiffness=given.pop("robot_stiffness", None),
-        mass=given.pop("robot_mass", None),
-        tool_mass=given.pop("tool_mass", payload.beyond if payload else None),
+        stiffness=settings.pop("robot_stiffness", None),
+        mass=settings.pop("robot_mass", None),
+        tool_mass=settings.pop("tool_mass", payload.beyond if payload else None),
         **take("position_from"),
     )
-    if isinstance(given.get("lag"), tuple):
-        given["lag"], given["lag_std"] = given["lag"]
+    if isinstance(settings.get("lag"), tuple):
+        settings["lag"], settings["lag_std"] = settings["lag"]
     return LogIdentifier(
         signals, frame, arm, payload, None if wall is None else Path(wall),
-        Indenter.parse(shape) if isinstance(shape, str) else shape, given.pop("poisson", None), given,
+        Indenter.parse(shape) if isinstance(shape, str) else shape, settings.pop("poisson", None), settings,
     )  # fmt: skip

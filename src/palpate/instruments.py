@@ -97,7 +97,7 @@ class Encoder(NamedTuple):
 
 
 class ForceSensorState(NamedTuple):
-    """Where the force is on its way."""
+    """State of a force sensor: low-pass, last sample and output."""
 
     analog: CascadeState
     computing: float  # sampled last, put out at the next sample [N]
@@ -135,12 +135,12 @@ class ForceSensor(NamedTuple):
         return ForceSensorState(self.analog.start(), 0.0, 0.0)
 
     def settled_at(self, force, noise, noise_before):
-        """The state after this force [N] for ever; the standard normal numbers are the last two samples' own."""
-        computing, held = (self.converter.convert(force + self.noise * n) for n in (noise, noise_before))
-        return ForceSensorState(self.analog.start_at(force), computing, held)
+        """The state under a constant force [N]; the standard normal numbers are the noise of the last two samples."""
+        computing, output = (self.converter.convert(force + self.noise * n) for n in (noise, noise_before))
+        return ForceSensorState(self.analog.start_at(force), computing, output)
 
     def samples_at(self, k):
-        """Whether step k is a sampling instant: the first step at or after a tick of the sampling clock."""
+        """True if step k is a sampling instant: the first step at or after a tick of the sampling clock."""
         return (k * self.sampling - self.shift) % self.rate < self.sampling
 
     def sample(self, state, force, k, noise):

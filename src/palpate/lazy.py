@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import Any
 
 report: Callable[[], Any]
-"""Imports the module that shows values (`line`, `html`, `view_of`, `write_figure`, `write_page`); set by `palpate`."""
+"""Imports the module that shows values (`line`, `text`, `html`, `plot`, `write_page`); set by `palpate`."""
 
 
 def importer(package: str, homes: Mapping[str, tuple[str, ...]]) -> Callable[[str], Any]:

@@ -23,7 +23,7 @@ from palpate._jit.cache import PACKAGE, foreign_files
 from palpate.errors import InputError, PluginError
 
 _FOLDERS: dict[Path, None] = {}
-"""Where the files lie that named plug-ins in this process; modules are the process' own, and so are these."""
+"""Folders of the files that named plug-ins in this process; modules are the process' own, and so are these."""
 _IMPORTING = threading.RLock()
 _STAMPS: dict[str, str] = {}
 """Sources of each module when it was imported."""
@@ -65,7 +65,7 @@ class Plugin:
 
 
 def is_plugin(name: object) -> bool:
-    """Whether a word names code of the user's rather than something that comes with palpate."""
+    """True if a word names the user's code rather than a part of palpate."""
     return isinstance(name, str) and ":" in name and not any(letter.isspace() for letter in name)
 
 
@@ -132,7 +132,7 @@ def where_it_fails(error: BaseException) -> str:
 
 
 def _of_the_user(file: Path) -> bool:
-    """Whether a file is neither palpate's nor an installed library's."""
+    """True if a file belongs neither to palpate nor to an installed library."""
     if file in foreign_files:
         return True
     libraries = {Path(path) for path in (sys.prefix, sys.base_prefix)}
@@ -141,10 +141,10 @@ def _of_the_user(file: Path) -> bool:
 
 def reason(error: BaseException) -> str:
     """An error of the user's code in one line: where, of which kind, and its own words."""
-    place = where_it_fails(error)
+    location = where_it_fails(error)
     words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
-    said = f"{type(error).__name__}: {words}" if words else type(error).__name__
-    return f"{place}: {said}" if place else said
+    message = f"{type(error).__name__}: {words}" if words else type(error).__name__
+    return f"{location}: {message}" if location else message
 
 
 def _parts(name: str) -> tuple[str, str]:
@@ -179,45 +179,51 @@ def _search() -> Sequence[Path]:
 def _import(module: str, name: str) -> ModuleType:
     before = set(sys.modules)
     top = module.partition(".")[0]
-    beside = [
+    candidates = [
         f for folder in _search() for f in (folder / f"{top}.py", folder / top / "__init__.py") if f.is_file()
     ]
     try:
         with redirect_stdout(sys.stderr):  # what it prints is no part of a command's output
-            found = importlib.import_module(module)
-    except (Exception, SystemExit) as error:  # whatever the user's own code raises
+            loaded = importlib.import_module(module)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         missing = str(error.name) if isinstance(error, ModuleNotFoundError) else ""
         if missing == module or (missing and module.startswith(f"{missing}.")):
             raise InputError(_not_there(module, name)) from None
-        foreign_files.update(f.resolve() for f in beside)
+        foreign_files.update(f.resolve() for f in candidates)
         raise InputError(f"{name} cannot be imported: {reason(error)}") from error
-    _check_place(top, beside)
+    _check_place(top, candidates)
     if module not in _STAMPS:
-        files = _sources(module, found, before)
+        files = _sources(module, loaded, before)
         foreign_files.update(files)
         _STAMPS[module] = _hash(files)
-    return found
+    return loaded
 
 
-def _check_place(top: str, beside: Sequence[Path]) -> None:
+def _check_place(top: str, candidates: Sequence[Path]) -> None:
     """Refuses a module that another one of its name has taken the place of."""
     got = Path(getattr(sys.modules[top], "__file__", None) or "").resolve()
-    if beside and got not in {f.resolve() for f in beside}:
-        raise InputError(f"{beside[0]} is hidden by another module of its name, {got}; give it another name")
-    if len(beside) > 1 and got != beside[0].resolve():
-        raise InputError(f"{beside[0]} is hidden by {got}, imported before it; give one of them another name")
+    if candidates and got not in {f.resolve() for f in candidates}:
+        raise InputError(
+            f"{candidates[0]} is hidden by another module of its name, {got}; give it another name"
+        )
+    if len(candidates) > 1 and got != candidates[0].resolve():
+        raise InputError(
+            f"{candidates[0]} is hidden by {got}, imported before it; give one of them another name"
+        )
 
 
-def _sources(module: str, found: ModuleType, before: set[str]) -> list[Path]:
+def _sources(module: str, plugin: ModuleType, before: set[str]) -> list[Path]:
     """The file of a module, and those beside it that it imported."""
-    own = getattr(found, "__file__", None)
-    if own is None:
+    main_file = getattr(plugin, "__file__", None)
+    if main_file is None:
         return []
-    folder = Path(own).resolve().parent
+    folder = Path(main_file).resolve().parent
     top = module.partition(".")[0]
-    files = {Path(own).resolve()}
-    for name, one in list(sys.modules.items()):
-        file = getattr(one, "__file__", None)
+    files = {Path(main_file).resolve()}
+    for name, imported in list(sys.modules.items()):
+        file = getattr(imported, "__file__", None)
         if file is None or (name in before and name.partition(".")[0] != top):
             continue
         if folder in Path(file).resolve().parents:
@@ -240,13 +246,13 @@ def _top(module: str, file: Path) -> Path | str:
 
 
 def _attribute(module: str, attribute: str) -> Any:
-    found = sys.modules[module]
+    loaded = sys.modules[module]
     try:
-        return getattr(found, attribute)
+        return getattr(loaded, attribute)
     except AttributeError:
-        own = sorted(k for k in vars(found) if not k.startswith("_"))
-        near = get_close_matches(attribute, own, n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(own) or 'nothing'}"
+        names = sorted(k for k in vars(loaded) if not k.startswith("_"))
+        near = get_close_matches(attribute, names, n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"it has: {', '.join(names) or 'nothing'}"
         raise InputError(f"the module {module!r} has no {attribute!r}; {hint}") from None
 
 

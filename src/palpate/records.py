@@ -12,51 +12,47 @@ import numpy as np
 from palpate import lazy
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.text import in_python
 
 if TYPE_CHECKING:
     from polars import DataFrame
 
 
-def same(one: object, other: object) -> bool:
-    """Whether two values are equal, arrays by their elements, and no number equal to no number."""
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return _same_arrays(one, other)
-    if type(one) is not type(other):
-        return bool(one == other)
-    if is_dataclass(one):
+def same(first: object, second: object) -> bool:
+    """True if two values are equal, arrays by their elements, and NaN equal to NaN."""
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        return _same_arrays(first, second)
+    if type(first) is not type(second):
+        return bool(first == second)
+    if is_dataclass(first):
         return all(
-            same(getattr(one, own.name), getattr(other, own.name)) for own in fields(one) if own.compare
+            same(getattr(first, item.name), getattr(second, item.name))
+            for item in fields(first)
+            if item.compare
         )
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
-    if isinstance(one, Sequence) and isinstance(other, Sequence) and not isinstance(one, str | bytes):
-        return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, float) and one != one:  # noqa: PLR0124 - not a number
-        return bool(other != other)  # noqa: PLR0124
-    return bool(one == other)
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        return first.keys() == second.keys() and all(same(first[key], second[key]) for key in first)
+    if isinstance(first, Sequence) and isinstance(second, Sequence) and not isinstance(first, str | bytes):
+        return len(first) == len(second) and all(map(same, first, second))
+    if isinstance(first, float) and first != first:  # noqa: PLR0124 - not a number
+        return bool(second != second)  # noqa: PLR0124
+    return bool(first == second)
 
 
-def _same_arrays(one: object, other: object) -> bool:
-    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+def _same_arrays(first: object, second: object) -> bool:
+    if not (isinstance(first, np.ndarray) and isinstance(second, np.ndarray)):
         return False
-    return np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
+    return np.array_equal(first, second, equal_nan=first.dtype.kind in "fc" and second.dtype.kind in "fc")
 
 
 class Readable:
-    """A value with a `repr` of one line and a view for notebooks; the report has the facts of each (`lazy.report`)."""
+    """A value with a `repr` of one line, which the report writes (`lazy.report`)."""
 
     def __init_subclass__(cls, **others: Any) -> None:
         super().__init_subclass__(**others)
-        for name in ("__repr__", "_repr_html_"):  # a dataclass writes a repr where its own class has none
-            setattr(cls, name, getattr(cls, name))
+        cls.__repr__ = cls.__repr__  # type: ignore[method-assign]  # a dataclass writes one where its class has none
 
     def __repr__(self) -> str:
         return str(lazy.report().line(self))
-
-    def _repr_html_(self) -> str:
-        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return str(lazy.report().html(self))
 
 
 class Compared(Readable):
@@ -69,23 +65,14 @@ class Compared(Readable):
 
 
 class Result(Compared):
-    """A result that can be read, drawn and written.
-
-    The report has a view of each class: a module with `line`, `text`, `html`, `draw` and `page`, each of one result.
-    """
-
-    def _view(self) -> Any:
-        return lazy.report().view_of(self)
+    """A result that can be printed, drawn and written as a page."""
 
     def __str__(self) -> str:
-        return in_python(str(self._view().text(self)))
-
-    def __repr__(self) -> str:
-        return in_python(f"<{type(self).__name__}: {self._view().line(self)}>")
+        return str(lazy.report().text(self))
 
     def _repr_html_(self) -> str:
         """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
-        return in_python(str(self._view().html(self)))
+        return str(lazy.report().html(self))
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw it.
@@ -99,9 +86,7 @@ class Result(Compared):
         Raises:
             InputError: it holds nothing that can be drawn; palpate may not write there.
         """
-        if path is None:
-            return self._view().draw(self)
-        return lazy.report().write_figure(self, self._view().draw, Path(path))
+        return lazy.report().plot(self, None if path is None else Path(path))
 
     def report(self, path: str | Path) -> Path:
         """Write a page with everything, an HTML file that opens without a network.
@@ -109,7 +94,7 @@ class Result(Compared):
         Raises:
             InputError: palpate may not write there, or the name has another ending.
         """
-        return Path(lazy.report().write_page(self, self._view().page, Path(path)))
+        return Path(lazy.report().write_page(self, Path(path)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -43,15 +43,15 @@ _COMMAND = re.compile(r"palpate identify ((?:'[^']*'|[^\s'-]\S*)(?: --[\w-]+ (?:
 
 
 def _call(words: list[str]) -> str:
-    given = zip(words[1::2], words[2::2], strict=True)
-    options = [f"{name.removeprefix('--').replace('-', '_')}={value!r}" for name, value in given]
+    pairs = zip(words[1::2], words[2::2], strict=True)
+    options = [f"{name.removeprefix('--').replace('-', '_')}={value!r}" for name, value in pairs]
     return f"palpate.identify_log({', '.join([repr(words[0]), *options])})"
 
 
 def in_python(text: str) -> str:
     """Advice for the command line in Python's words: `--force-filter` is `force_filter=`, a whole command a call."""
-    text = _COMMAND.sub(lambda found: _call(shlex.split(found[1])), text)
-    return OPTION.sub(lambda found: f"{_KEYWORDS[found[1]]}=", text)
+    text = _COMMAND.sub(lambda match: _call(shlex.split(match[1])), text)
+    return OPTION.sub(lambda match: f"{_KEYWORDS[match[1]]}=", text)
 
 
 def printable(text: str) -> str:
@@ -65,11 +65,11 @@ def printable(text: str) -> str:
 
 
 def shorten(text: str, most: int) -> str:
-    """The text with its middle left out where it has more letters: its beginning says the fault, its end the remedy."""
+    """Leave out the middle of a text that is too long: the beginning states the fault, the end the remedy."""
     if len(text) <= most:
         return text
-    kept = most - len(_GAP)
-    return text[: kept - kept // 3] + _GAP + text[-(kept // 3) :]
+    letters = most - len(_GAP)
+    return text[: letters - letters // 3] + _GAP + text[-(letters // 3) :]
 
 
 def print_hanging(lines: Iterable[Text], console: Console) -> None:

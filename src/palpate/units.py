@@ -60,7 +60,7 @@ UNITS: dict[str, Unit] = {
     "deg/s": Unit("angular velocity", "rad/s", math.pi / 180),
     "m/s^2": Unit("acceleration", "m/s^2", 1.0),
 }
-"""By symbol. `g` and `kg` are what a scale shows, so they are forces here (standard gravity)."""
+"""Units by symbol. `g` and `kg` are what a scale shows, so they are forces here (standard gravity)."""
 
 _ALIASES = {
     "\u00b5m": "um",
@@ -101,7 +101,7 @@ def unit(symbol: str) -> Unit:
 
 
 def known_unit(symbol: str) -> bool:
-    """Whether a symbol is that of a unit; none at all is not."""
+    """True if a symbol names a unit; False for an empty symbol."""
     symbol = symbol.strip()
     return bool(symbol) and _ALIASES.get(symbol, symbol) in UNITS
 
@@ -128,8 +128,8 @@ def unit_in_name(name: str, quantity: str) -> str | None:
     if len(tail) < 2:
         return None
     symbol = _ALIASES.get(tail[1].strip(), tail[1].strip())
-    found = UNITS.get(symbol)
-    return symbol if found and found.quantity == quantity else None
+    match = UNITS.get(symbol)
+    return symbol if match and match.quantity == quantity else None
 
 
 _PRODUCTS = {
@@ -141,9 +141,9 @@ _PRODUCTS = {
 
 def impedance_units(force: str, position: str) -> dict[str, str]:
     """The units of stiffness K, damping B and mass M for a force and a position in SI units."""
-    known = _PRODUCTS.get((force, position))
-    if known:
-        return dict(known)
+    units = _PRODUCTS.get((force, position))
+    if units:
+        return dict(units)
     ratio = "1" if force == position else f"{force}/({position})"
     return {"K": ratio, "B": f"{ratio} s", "M": f"{ratio} s^2"}
 
@@ -171,7 +171,8 @@ def with_half(value: float, half: float) -> str:
     if not (half > 0 and math.isfinite(half)):
         return f"{plain(value)} ± ?"
     power = _power(max(abs(value), half))
-    value, half = value / 10.0**power, half / 10.0**power
+    value = value / 10.0**power
+    half = half / 10.0**power
     decimals = _decimals(half)
     text = " ± ".join(f"{round(number, decimals):.{max(0, decimals)}f}" for number in (value, half))
     return f"({text})·10{_superscript(power)}" if power else text
@@ -232,9 +233,9 @@ def si_prefix(value: float, unit: str) -> tuple[float, str]:
     """The factor and the letter of the SI prefix that keeps a number short."""
     size = abs(value)
     if unit in _PREFIXED:
-        found = next(((f, p) for f, p in _PREFIXES if size >= 9.9995 * f), None)
-        if found:
-            return found
+        prefix = next(((f, p) for f, p in _PREFIXES if size >= 9.9995 * f), None)
+        if prefix:
+            return prefix
     if unit in _SMALL_PREFIXED and 0 < size < 0.1:
         return (1e-3, "m") if size >= 1e-4 else (1e-6, "µ")
     return 1.0, ""

@@ -58,8 +58,3 @@ def test_the_last_joint_is_left_out_of_x_and_y():
     rates = np.array([0.1, -0.3, 0.7])
     rates[2] = -rates[0] - rates[1]  # the last link keeps its angle: J_w is then J
     np.testing.assert_allclose(J_w @ rates, J @ rates, atol=1e-15)
-
-
-def test_experiments_come_with_it():
-    for name in ("foam-cautious", "rubber-cautious"):
-        assert type(load(name).controller).__name__ == "CautiousController"

@@ -154,18 +154,3 @@ def test_self_tuning_improves_on_the_gains_it_starts_from(surface):
     gains = np.array([tuned[f"adapted{i}"] for i in (1, 2, 3)])
     assert (gains > 0.0).all()
     assert (gains < 2.0 * np.array([[0.25], [5.0], [0.004]])).all()
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "foam-pi",
-        "foam-impedance",
-        "foam-decoupled",
-        "foam-decoupled-printed",
-        "foam-raibert-craig",
-        "foam-self-tuning",
-    ],
-)
-def test_the_experiments_that_come_along_can_be_built(name):
-    assert build(load(name)).loop.tick == 0.001

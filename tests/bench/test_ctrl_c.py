@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from palpate.bench import build, load
 
 SCRIPT = """
@@ -20,6 +22,7 @@ assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 """
 
 
+@pytest.mark.long
 def test_the_rows_so_far_are_kept():
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], check=False, capture_output=True, text=True, timeout=300

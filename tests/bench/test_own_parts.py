@@ -79,7 +79,7 @@ def test_its_numbers_change_as_any_other_and_it_goes_to_another_process():
 
 
 def test_identifiers_of_palpate_are_named_by_their_kind():
-    for kind in ("least-squares", "restarting-least-squares", "kalman-filter"):
+    for kind in ("least-squares", "restarting-least-squares"):
         experiment = with_values(quick("foam-hybrid"), {"identifier": {"kind": kind}})
         record = build(experiment).run(0.5, seed=1, press=0.2)
         assert np.isfinite(record["K_identifier"][-1])
@@ -201,6 +201,7 @@ def test_keys_are_the_parts_own_fields():
             parse(EXPERIMENT.replace("ki = 2", text), "mine")
 
 
+@pytest.mark.long
 def test_a_record_that_names_a_part_imports_nothing(module, tmp_path):
     """A log is a stranger's: the names in it are texts."""
     name = module("raise RuntimeError('imported')")

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from bench.quick import quick
-from palpate._vector import Vec3
 from palpate.bench import build, march, start_at
-from palpate.bench.force_input import COLUMNS, put
+from palpate.bench.force_input import COLUMNS
 from palpate.robots import Planar3R
 
 UNITS = {"1", "s", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "N m/s", "kg", "N s/m", "N/m"}
@@ -27,12 +26,6 @@ def test_every_column_is_written_at_every_tick(name):
     ]
     assert np.isnan(out[:, -3:]).all(), "write() goes beyond COLUMNS"
     assert {0.0, 1.0} <= set(out[:, 1]), "both phases were looked at"
-
-
-def test_put_writes_three_and_tells_where_to_go_on():
-    out = np.zeros(5)
-    assert put(out, 1, Vec3(1.0, 2.0, 3.0)) == 4
-    np.testing.assert_array_equal(out, [0, 1, 2, 3, 0])
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.quick import DURATION, PRESS, changed, quick
+from bench.quick import DURATION, PRESS, quick
 from own_parts import Spring
-from palpate._vector import Vec3
 from palpate.bench import bench as running
 from palpate.bench import build, load, names, part, simulation
 from palpate.environments import KelvinVoigt
@@ -258,16 +257,6 @@ def test_no_gain_makes_a_motor_exceed_its_limit(kp, kv, kf, ki, limits):
         assert np.abs(record[f"torque{i}"]).max() <= min(limit, peak)
 
 
-def test_the_output_is_rounded_to_a_code_within_the_limit():
-    """16 N m lie between two codes of the output; the upper one, 16.02, is never sent."""
-    loop = build(quick("foam-hybrid")).loop
-    limits, step = loop.conditioning.arm.limits, loop.output.resolution
-    sent = loop.output.convert_within(Vec3(1e3, 1e3, 1e3), limits)
-    for value, limit, code in zip(sent, limits, step, strict=True):
-        assert limit - code < value <= limit
-    assert loop.output.convert_within(-1e3 * limits, limits) == -sent
-
-
 def test_faster_ticks_and_coarser_physics_are_the_same_press():
     """The bench's rates are choices: half the physics step changes the force by little."""
     coarse = build(quick("foam-hybrid", force_sensor={"noise": 0.0}))
@@ -275,9 +264,3 @@ def test_faster_ticks_and_coarser_physics_are_the_same_press():
     a, b = coarse.run(DURATION, press=0.5), fine.run(DURATION, press=0.5)
     last = slice(-100, None)
     assert np.mean(a["force"][last]) == pytest.approx(np.mean(b["force"][last]), abs=0.3)
-
-
-def test_changed_replaces_only_what_it_names():
-    e = changed(load("foam-hybrid"), run={"press": 1.0})
-    assert e.run.press == 1.0
-    assert e.run.duration == load("foam-hybrid").run.duration

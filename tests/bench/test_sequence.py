@@ -8,7 +8,7 @@ import pytest
 from bench.quick import quick
 from palpate.bench import build
 from palpate.bench.force_input import Sequence
-from palpate.bench.summary import APPROACH, CONTACT, LOST, PHASES
+from palpate.bench.summary import APPROACH, CONTACT, LOST, PHASES, RETREAT
 from palpate.references import Approach
 
 TICK = 0.001
@@ -60,7 +60,7 @@ def test_a_touch_while_waiting_is_a_contact():
 
 
 def test_every_phase_has_a_name():
-    assert set(PHASES) == {APPROACH, CONTACT, LOST}
+    assert set(PHASES) == {APPROACH, CONTACT, LOST, RETREAT}
 
 
 def test_a_surface_that_yields_is_lost_and_looked_for_again():

@@ -68,6 +68,13 @@ def test_a_defect_keeps_its_traceback_and_is_not_mistaken_for_an_answer(capsys):
     assert "ZeroDivisionError: in a law" in error
 
 
+def test_a_defect_prints_nothing_that_a_terminal_obeys(capsys):
+    assert run_guarded(raising(ZeroDivisionError("a\x1b[31mb"))) == 70
+    error = capsys.readouterr().err
+    assert "\x1b" not in error
+    assert "\nZeroDivisionError: a\\x1b[31mb\n" in error
+
+
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["-h"], ["identify", "--help"]])
 def test_help_and_version_ask_no_file_of_options(words, capsys):
     assert main([*words, "--options=there-is-none.toml"]) == 0
@@ -90,16 +97,6 @@ def test_misspelt_words_are_answered_with_the_right_one(capsys, words, said):
     line = one_line(capsys)
     assert said in line.lower()
     assert "--help" in line
-
-
-def test_help_lists_the_commands(capsys):
-    assert main(["--help"]) == 0
-    text = capsys.readouterr().out
-    assert [name for name in ("identify", "run", "speed") if f" {name} " in text] == [
-        "identify",
-        "run",
-        "speed",
-    ]
 
 
 def test_every_module_of_a_command_is_a_command(root):

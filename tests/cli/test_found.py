@@ -4,7 +4,7 @@ import pytest
 
 from palpate.cli.options.common import read_found
 from palpate.errors import InputError
-from palpate_export.contact import contact_from
+from palpate.export.contact import contact_from
 
 
 @pytest.mark.parametrize("digits", [18, 19, 400, 5000])

@@ -1,18 +1,14 @@
-"""The help of every command: an example that can be typed, options in groups, lines that end between phrases."""
+"""The help of every command: an example that can be typed, options in groups."""
 
-import json
 import re
 import shlex
 import subprocess
 import sys
-from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from palpate.cli import main
-from palpate.cli._help import example, page, wrap
+from palpate.cli._help import example, page
 from palpate.cli._program import COMMANDS, added_commands, program
 from palpate.cli.options.common import MODELS
 from palpate.identification.models import NAMES
@@ -65,7 +61,7 @@ def test_options_are_in_groups(help_of, command):
     for line in help_of(command).splitlines():
         if (title := PANEL.match(line)) is not None:
             name = title[1]
-        elif re.match(r"│ (?:\*  )?--", line):
+        elif re.match(r"│ +(?:\*  )?--", line):
             groups[name] = groups.get(name, 0) + 1
     assert groups or command == "completion"
     assert "Parameters" not in groups
@@ -76,32 +72,6 @@ def test_options_are_in_groups(help_of, command):
 def test_no_line_is_longer_than_the_terminal(help_of, command):
     for line in help_of(*[command] if command else []).splitlines():
         assert len(line) <= WIDTH or " " not in line.strip(), line
-
-
-@pytest.mark.parametrize("command", ALL)
-def test_no_text_is_broken_where_its_source_was(help_of, command):
-    """A line in a panel is short only where the next word would not fit, or a phrase ends."""
-    lines = [line.strip("│ ").rstrip() for line in help_of(command).splitlines() if line.startswith("│")]
-    inner = WIDTH - 4
-    for this, following in pairwise(lines):
-        if following.startswith(("-", "*")) or not this or not following:
-            continue
-        phrase = this.endswith((".", ",", ";", ":", ")", "]"))
-        assert phrase or len(this) > 0.3 * inner - len(following.split()[0]), this
-
-
-@given(
-    st.lists(st.text(st.characters(categories=["L", "P"]), min_size=1, max_size=12), min_size=1, max_size=40)
-)
-def test_wrapping_loses_no_word_and_fits(words):
-    lines = wrap(" ".join(words), 30)
-    assert " ".join(lines).split() == " ".join(words).split()
-    assert all(len(line) <= 30 for line in lines)
-
-
-def test_a_phrase_is_kept_whole_where_that_costs_little():
-    text = "Text in columns, Parquet, a spreadsheet, a bag; or the record of a run."
-    assert wrap(text, 44) == ["Text in columns, Parquet, a spreadsheet,", "a bag; or the record of a run."]
 
 
 def test_an_example_is_continued_as_a_shell_continues_it():
@@ -118,8 +88,8 @@ def test_an_example_is_continued_as_a_shell_continues_it():
     "words",
     [
         ("run", "foam-hybrid", "--replac"),
-        ("study", "learning-rate", "--yess"),
-        ("export", "found.json", "--to", "newton", "--replce"),
+        ("press", "--wire", "ur:192.0.2.1", "--yess"),
+        ("export", "found.json", "--to", "drake", "--replce"),
     ],
 )
 def test_no_suggestion_is_a_flag_that_loses_something(capsys, words):
@@ -153,19 +123,6 @@ def test_completion_imports_nothing_heavy():
     assert not loaded & {"numba", "scipy", "matplotlib", "polars", "mujoco"}
 
 
-@pytest.mark.parametrize("command", ALL)
-def test_the_short_help_is_usage_examples_and_eight_options(capsys, command):
-    assert main([command, "-h"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith(f"Usage: palpate {command}")
-    assert lines[-1] == f"all options: palpate {command} --help"
-    assert 1 <= sum(line.startswith("    palpate ") for line in lines) <= 2
-    options = [line for line in lines if line.startswith("  --")]
-    assert len(options) <= 8
-    assert all(len(line.split()) > 1 for line in options), options
-    assert len(lines) <= 40
-
-
 def test_the_commands_are_in_groups(capsys):
     assert main(["--help"]) == 0
     titles = [title[1] for line in capsys.readouterr().out.splitlines() if (title := PANEL.match(line))]
@@ -174,31 +131,6 @@ def test_the_commands_are_in_groups(capsys):
 
 def test_completed_models_are_those_of_the_library():
     assert MODELS == NAMES
-
-
-def test_json_of_identify_is_complete(capsys, root):
-    log = root / "examples" / "data" / "press.csv"
-    said = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N", "lag": 0.0, "bonded": False}
-    words = [
-        "--time",
-        "time_s",
-        "--position",
-        "position_mm:mm",
-        "--force",
-        "force_N:N",
-        "--lag",
-        "0",
-        "--no-bonded",
-    ]
-    assert main(["identify", str(log), *words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["file"] == str(log)
-    assert len(told["sha256"]) == 64
-    assert told["version"]
-    assert said.items() <= told["options"].items()
-    assert told["models"]
-    assert all({"model", "r2", "note"} <= set(one) for one in told["models"])
-    assert [one["model"] for one in told["models"] if one["chosen"]] == [told["model"]]
 
 
 def test_a_word_too_many_is_said(capsys):

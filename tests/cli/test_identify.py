@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import shutil
 from pathlib import Path
@@ -18,7 +19,6 @@ from palpate.cli import main
 from palpate.identification.causes import Code
 
 SKIN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_mN:mN")
-FIELDS = {"value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verdict", "reason"}
 
 
 def ask(capsys, *words):
@@ -63,15 +63,22 @@ OWN = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N
 
 
 @pytest.mark.parametrize(
-    ("load", "softest", "stiffest"),
-    [(400, 80, 330), pytest.param(600, 120, 400, marks=pytest.mark.long), (800, 120, 450)],
+    ("load", "softest", "stiffest", "exit_code"),
+    [
+        (400, 80, 330, 0),
+        pytest.param(600, 120, 400, 0, marks=pytest.mark.long),
+        pytest.param(800, 120, 450, 1, marks=pytest.mark.long),
+    ],
 )
 def test_skin_has_a_stiffness_at_its_working_point_and_no_damping_or_mass(
-    measured, capsys, load, softest, stiffest
+    measured, capsys, load, softest, stiffest, exit_code
 ):
-    """The tangents of these presses lie between the two; the tissue stiffens and relaxes: no number but a slope."""
+    """The tangents of these presses lie between the two; the tissue stiffens and relaxes: no number but a slope.
+
+    That of 800 mN is known to more than the tolerance: a number to read, and not identified.
+    """
     code, found = ask(capsys, measured / f"skin_indentation/press_{load}mN.csv", *SKIN)
-    assert code == 0
+    assert code == exit_code
     assert found["working_point"]["source"] == "press"
     assert softest < found["working_point"]["stiffness"]["value"] < stiffest
     told = {name: p for name, p in found["parameters"].items() if p["verdict"] == "identified"}
@@ -114,40 +121,18 @@ def test_lattice(measured, capsys):
     assert len(found["contacts"]) == 10
 
 
-def test_the_contract_of_json(log, capsys):
+def test_json_is_that_of_the_identification_and_says_where_it_is_from(log, capsys):
     code, found = ask(capsys, log, *OWN)
     assert code == 0
-    assert set(found) >= {"file", "model", "models", "parameters", "contacts", "lag_s", "fit", "warnings"}
-    assert set(found) >= {"working_point", "dynamic_stiffness", "press", "options", "version", "sha256"}
     assert found["file"] == str(log)
     assert found["version"] == palpate.__version__
     assert found["sha256"] == hashlib.sha256(log.read_bytes()).hexdigest()
     assert found["options"]["position"] == "position_mm:mm"
-    assert set(found["fit"]) == {"r2", "rmse_N", "n"}
-    assert set(found["lag_s"]) == {"value", "std", "bound", "kind"}
-    assert set(found["working_point"]) == {
-        "stiffness",
-        "force_N",
-        "depth_m",
-        "frequency_Hz",
-        "source",
-        "each",
-    }
-    assert set(found["working_point"]["stiffness"]) == FIELDS | {"prediction95"}
-    assert set(found["dynamic_stiffness"][0]) == {
-        "Hz",
-        "storage",
-        "storage_half",
-        "loss",
-        "loss_half",
-        "blocks",
-    }
-    assert set(found["press"]) == {"tangent", "hysteresis_loss", "relaxation"}
-    for p in found["parameters"].values():
-        assert set(p) == FIELDS
-        assert p["reason"]
-        assert p["verdict"] in {"identified", "not identifiable", "rejected"}
     assert found["parameters"]["K"]["unit"] == "N/m"
+    own = json.loads(json.dumps(identify(read_log(log, **COLUMNS)).to_json()))
+    assert own.keys() <= found.keys()
+    assert found["parameters"] == own["parameters"]
+    assert found["working_point"] == own["working_point"]
     assert list(log.parent.iterdir()) == [log]
 
 
@@ -175,7 +160,7 @@ def test_all_evidence_is_a_flag_away(log, capsys):
     assert main(["identify", str(log), *OWN, "--no-figure", "--verbose"]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert printed.startswith("By the model kelvin-voigt the stiffness is ")
-    order = ("its uncertainty is mostly due to", "working point:", "value ± 95 %", "low-excitation:")
+    order = ("its uncertainty is mostly due to", "1 contact:", "limited by", "low-excitation:")
     assert sorted(order, key=printed.index) == [*order]
 
 
@@ -259,11 +244,6 @@ def test_a_column_by_its_number_is_not_doubted_by_its_name(log, capsys):
     assert "!" not in capsys.readouterr().out
 
 
-def test_a_rate_stands_for_the_time(log, capsys):
-    _, found = ask(capsys, log, "--rate", "1000", *OWN[2:])
-    assert found["parameters"]["K"]["value"] == pytest.approx(5000, rel=0.02)
-
-
 def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
     rows = np.loadtxt(log, delimiter=",", skiprows=1)
     rows[:, 2] = np.random.default_rng(0).normal(0, 0.05, len(rows))
@@ -274,21 +254,9 @@ def test_no_contact_is_an_answer_and_the_answer_is_no(log, capsys):
     assert all(p["value"] is None for p in found["parameters"].values())
 
 
-def test_a_time_in_ms_that_is_taken_for_seconds_is_suspected(log, capsys):
-    rows = np.loadtxt(log, delimiter=",", skiprows=1)
-    rows[:, 0] *= 1e3
-    np.savetxt(log, rows, delimiter=",", header="t,position_mm,force_N", comments="", fmt="%.7g")
-    _, found = ask(capsys, log, "--time", "t", *OWN[2:])
-    doubts = [w["text"] for w in found["warnings"] if w["code"] == "time-doubtful"]
-    assert any("is the time in ms? then say NAME:ms" in text for text in doubts)
-
-
 WRONG = {
     "unknown column": ([*OWN[:-1], "f:N"], "unknown column 'f'.*position_mm"),
-    "unknown unit": ([*OWN[:-1], "force_N:stone"], "unknown unit 'stone'"),
     "one column": (OWN[2:4], "name the columns of .*--time, --force.*time_s"),
-    "unknown model": ([*OWN, "--model", "hooke"], "unknown model 'hooke'"),
-    "tolerance": ([*OWN, "--tolerance", "2"], r"tolerance must be in \(0, 1\]"),
     "lag in what": ([*OWN, "--lag", "7.6"], "is 7.6 ms meant.*--lag 7.6:ms"),
     "lag in N": ([*OWN, "--lag", "7.6:N"], "needs one of time"),
     "lag": ([*OWN, "--lag", "late"], "--lag needs VALUE or VALUE:STD"),
@@ -304,13 +272,7 @@ WRONG = {
     "no size": ([*OWN, "--indenter", "sphere"], "needs sphere:RADIUS"),
     "size of another kind": ([*OWN, "--indenter", "cone:5:mm"], "unit of length; a cone needs one of angle"),
     "size is none": ([*OWN, "--indenter", "sphere:5e:mm"], "needs sphere:RADIUS"),
-    "no radius": ([*OWN, "--indenter", "punch:0:mm"], "radius of a punch must be more than 0"),
-    "flat cone": ([*OWN, "--indenter", "cone:95:deg"], "under 90 deg"),
     "poisson alone": ([*OWN, "--poisson", "0.3"], "add --indenter"),
-    "poisson": (
-        [*OWN, "--indenter", "cone:70:deg", "--poisson", "0.7"],
-        r"Poisson's ratio must be in \(-1, 0.5\]",
-    ),
     "sign": ([*OWN, "--force-sign", "2"], "force-sign"),
     "frame of one axis": ([*OWN, "--wrench-frame", "tool"], "this log has one axis"),
     "twice": (["./press.csv", *OWN], "is named twice; a log counts once"),
@@ -319,7 +281,6 @@ WRONG = {
     "figure kind": ([*OWN, "--figure", "a.gif"], "name it a.png"),
     "figure folder": ([*OWN, "--figure", "none/a.png"], "no folder none"),
     "rate and time": ([*OWN, "--rate", "100"], "not both"),
-    "empty cut": ([*OWN, "--start", "99"], "no row of"),
 }
 
 

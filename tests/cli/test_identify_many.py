@@ -58,17 +58,17 @@ def test_a_folder_is_its_logs_and_what_they_say_together(presses, capsys):
 
 @pytest.mark.long
 def test_the_dependence_on_a_temperature_is_pooled(presses, capsys):
-    table = presses.parent / "conditions.csv"
-    table.write_text("log,temperature_C\npress_2.csv,30\npress_10,20.5\npress_9.csv,10\n")
-    _, found = ask(capsys, presses, "--covariate", "temperature_C", "--covariates", table)
+    temperatures = {"press_2.csv": 30, "press_10.csv": 20.5, "press_9.csv": 10}
+    for name, temperature in temperatures.items():
+        head, *rows = (presses / name).read_text().splitlines()
+        lines = [f"{head},temperature_C", *(f"{row},{temperature}" for row in rows)]
+        (presses / name).write_text("\n".join(lines))
+    _, found = ask(capsys, presses, "--covariate", "temperature_C")
     slope = found["pooled"]["parameters"]["K"]["covariates"]["temperature_C"]
     low, high = slope["ci95"]
     assert low < -55 < high
     assert slope["at"] == pytest.approx(20.17, abs=0.01)
-    assert (
-        main(["identify", str(presses), *OWN, "--covariate", "temperature_C", "--covariates", str(table)])
-        == 0
-    )
+    assert main(["identify", str(presses), *OWN, "--covariate", "temperature_C"]) == 0
     printed = capsys.readouterr().out
     assert "N/m per temperature_C" in " ".join(printed.split())
     assert "temperature_C 20.17" in " ".join(printed.split())
@@ -161,22 +161,12 @@ def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):
         (["presses/press_2.csv", "presses"], "press_2.csv is named twice"),
         (["empty"], "holds no log"),
         (["presses", "--covariate", "temp"], "unknown column 'temp'"),
-        (["presses", "--covariates", "conditions.csv"], "name its columns, too"),
-        (["presses", "--covariate", "t", "--covariates", "none.csv"], "none.csv: no table of covariates"),
-        (
-            ["presses", "--covariate", "t", "--covariates", "conditions.csv"],
-            "unknown column 't'; there are: .*temp",
-        ),
-        (["presses", "--covariate", "temp", "--covariates", "conditions.csv"], "unknown log 'press_10.csv'"),
-        (["presses", "--covariate", "dew", "--covariates", "conditions.csv"], "dew of press_2.csv is 'wet'"),
         (["presses", "--covariate", "time_s"], "time_s is the same in all 3 logs"),
         (["presses/press_2.csv", "--covariate", "temp"], "--covariate is of several logs"),
     ],
 )
 def test_wrong_input_is_one_line_and_code_2(presses, capsys, words, pattern):
     (presses.parent / "empty").mkdir()
-    dew = "wet" if "dew" in words else "9"
-    (presses.parent / "conditions.csv").write_text(f"log,temp,dew\npress_2.csv,18,{dew}\npress_9.csv,20,9\n")
     assert main(["identify", *words, *OWN]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""

@@ -14,7 +14,6 @@ from palpate.cli._streams import notice_signals
 from palpate.logs import read_record
 from palpate.press import prepare
 from palpate.press.prepare import prepare_press
-from palpate.report.run import figures
 from palpate.report.run import page as pages
 
 PRELUDE = """
@@ -72,13 +71,13 @@ def test_within_noticed_nothing_is_raised_and_it_is_told():
 def test_results_that_are_being_written_are_written(tmp_path, monkeypatch):
     """It comes while the page is made: everything is there, and the code says that it came."""
     (tmp_path / "mine.toml").write_text(text_of(), encoding="utf-8")
-    page = pages.run_page
+    page = pages.page
 
     def interrupted(*words):
         os.kill(os.getpid(), signal.SIGINT)
         return page(*words)
 
-    monkeypatch.setattr(pages, "run_page", interrupted)
+    monkeypatch.setattr(pages, "page", interrupted)
     assert main(["run", "mine.toml", "--out", "results"]) == 130
     assert (tmp_path / "results" / "report.html").is_file()
     assert read_record(tmp_path / "results" / "record.parquet").meta["end"] == "done"
@@ -92,7 +91,7 @@ def test_what_cannot_be_drawn_does_not_lose_what_was_simulated(tmp_path, monkeyp
     def full(*words):
         raise error
 
-    monkeypatch.setattr(figures, "draw", full)
+    monkeypatch.setattr(pages, "build_figure", full)
     assert main(["run", "mine.toml", "--out", "results"]) == 2
     line = capsys.readouterr().err
     assert line.count("\n") == 1

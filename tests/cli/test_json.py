@@ -37,7 +37,7 @@ CASES = {
     ],
     "tune": ["tune --stiffness 1e3:1e5 --arm ur5e --force 20"],
     "certify": ["certify gains.toml --held-only --out certificate.json"],
-    "export": ["export found.json --to newton --geom foam"],
+    "export": ["export found.json --to drake --geom foam"],
     "press": ["press --arm fr3 --force 20 --surface K=5000,B=50 --seconds 1 --out pressed"],
     "slide": ["slide --arm ur5e --seconds 1 --out slid"],
     "run": ["run mine.toml --seed 3 --out ran"],

@@ -107,7 +107,7 @@ def turning(elsewhere):
 
 
 def test_load_files_are_written_as_their_controllers_read_them(turning, elsewhere, capsys):
-    """By readers of their own: a script's call, JSON, and YAML; each then agrees with its log."""
+    """By readers of their own: a script's call, JSON, and YAML."""
     from ruamel.yaml import YAML
 
     tool = Tool()
@@ -117,7 +117,6 @@ def test_load_files_are_written_as_their_controllers_read_them(turning, elsewher
     )
     for ending in ("script", "json", "yaml"):
         assert main([*turning, "--out", f"tool.{ending}", "--json"]) == 0
-        assert main([*turning, "--check", f"tool.{ending}", "--json"]) == 0
         capsys.readouterr()
     taken = {}
     script = "\n".join(
@@ -136,53 +135,10 @@ def test_load_files_are_written_as_their_controllers_read_them(turning, elsewher
     assert ros["gravity_compensation"]["CoG"]["force"] == pytest.approx(-9.81 * tool.mass, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "code", "said"),
-    [
-        ("a.script", "def p():\n  set_target_payload(m=0.80, cog=[0.01, -0.02, 0.12])\nend\n", 0, "agrees"),
-        ("b.script", "set_payload(0.9)", 1, "mass 0.9 kg, 0.8"),
-        ("c.script", "# set_target_payload(0.8)\n", 2, "no load of a tool"),
-        ("d.script", "set_payload(0.8)\nset_payload(0.4)\n", 2, "2 loads that differ"),
-        ("e.script", "set_target_payload(mass, cog)", 2, "needs a mass and three numbers"),
-        ("f.json", '{"mass": 0.8, "centerOfMass": [0.01, -0.02, 0.07]}', 1, "centre, z 0.07 m, 0.12"),
-        ("g.json", '{"mass": "heavy"}', 2, "needs a number and three"),
-        ("h.json", "[", 2, "is no JSON file"),
-        (
-            "i.yaml",
-            "a: {tool: {mass: 0.8, pos: [0.01, -0.02, 0.12], gravity_field: [0, 0, -9.81]}}",
-            0,
-            "agrees",
-        ),
-        (
-            "j.yaml",
-            "gravity_compensation: {CoG: {pos: [0.01, -0.02, 0.12], force: 9.3}}",
-            1,
-            "mass 0.9483 kg",
-        ),
-        ("k.yaml", "a: &a {b: *a}", 2, "no load of a tool"),
-        ("l.yaml", "gravity_compensation: {CoG: {pos: [1, 2], force: 9.3}}", 2, "needs a number and three"),
-        ("m.xml", "<load/>", 2, "a load file ends with"),
-        ("o.json", '{"mass": NaN}', 2, "is no JSON file"),
-    ],
-)
-def test_a_load_file_is_compared_with_the_log(turning, elsewhere, capsys, name, text, code, said):
-    (elsewhere / name).write_text(text)
-    assert main([*turning, "--check", name]) == code
-    printed = capsys.readouterr()
-    assert said in " ".join((printed.err if code == 2 else printed.out).split())
-    if code == 2:
-        assert printed.err.count("\n") == 1
-
-
-def test_a_load_that_the_controller_subtracts_is_checked_by_the_rest(elsewhere, capsys):
-    """The log then shows no weight where the load is right; no load file can be made of such a log."""
-    (elsewhere / "set.script").write_text("set_target_payload(0.8, [0.01, -0.02, 0.12])")
-    words = ["--wrench-frame", "tool", "--gravity-compensated", "--check", "set.script", "--tolerance", "1"]
-    for left, code in ((0.0, 0), (0.1, 1)):
-        write(log_of(Tool(mass=left), six(), np.random.default_rng(0)), f"{left}.parquet")
-        assert main(["payload", f"{left}.parquet", *words]) == code, left
-    capsys.readouterr()
-    assert main(["payload", "0.0.parquet", *words[:2], "--tolerance", "1", "--out", "tool.script"]) in {1, 2}
+def test_no_load_file_is_made_of_a_log_without_weight(elsewhere, capsys):
+    write(log_of(Tool(mass=0.0), six(), np.random.default_rng(0)), "weightless.parquet")
+    words = ["--wrench-frame", "tool", "--gravity-compensated", "--tolerance", "1", "--out", "tool.script"]
+    assert main(["payload", "weightless.parquet", *words]) in {1, 2}
     assert not (elsewhere / "tool.script").exists()
 
 
@@ -193,21 +149,3 @@ def test_a_centre_is_turned_into_the_axes_of_the_sensor(elsewhere, capsys):
     words = ["payload", "turned.parquet", "--wrench-frame", "sensor", "--sensor-rpy", "0,0,90"]
     assert main([*words, "--out", "tool.yaml", "--json"]) == 0
     assert "CoG: [-0.0199" in (elsewhere / "tool.yaml").read_text()
-    assert main([*words, "--check", "tool.yaml"]) == 0
-
-
-@pytest.mark.long
-def test_a_right_load_file_agrees_with_95_percent_of_logs(monkeypatch):
-    from palpate.contact_frame import ContactFrame, compare, weigh
-    from palpate.contact_frame.load_files import ToolLoad
-
-    tool, frame = Tool(uneven=0.05), ContactFrame(wrench_frame="tool")
-    right = ToolLoad(tool.mass, np.array(tool.centre))
-    held = 0
-    for seed in range(40):
-        found = weigh(log_of(tool, six(), np.random.default_rng(seed)), frame)
-        rows = compare(found, right, (0.0, 0.0, 0.0), compensated=False)
-        held += all(row.agrees for row in rows)
-        # Of four numbers together (Sidak): 2.49 deviations of each, not 1.96.
-        assert rows[0].half == pytest.approx(2.4909 / 1.96 * found.parameters["mass"].half, rel=1e-3)
-    assert held >= 33  # of 40 of 95 %; less is one case in a thousand

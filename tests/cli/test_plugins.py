@@ -65,7 +65,7 @@ def test_a_file_runs_no_code_without_a_word(words, role, traitor, tmp_path, caps
 def test_a_study_runs_no_code_without_a_word(parameters, more, traitor, tmp_path, capsys):
     source = text(parameters.format(traitor), **{key: value.format(traitor) for key, value in more.items()})
     (tmp_path / "s.toml").write_text(source.replace("a = [1.0]", '"surface.stiffness" = [1000.0]'))
-    assert main(["study", "s.toml", "--yes"]) == 2
+    assert main(["study", "s.toml"]) == 2
     said = capsys.readouterr().err
     assert "--plugins" in said
     assert not (tmp_path / "ran").exists()
@@ -90,7 +90,7 @@ def test_an_experiment_that_a_study_names_runs_no_code_either(traitor, tmp_path,
         'title = "S"\nexperiment = "e.toml"\nmetrics = ["force_rms"]\n'
         '[parameters]\n"surface.stiffness" = [1000.0]\n'
     )
-    assert main(["study", "s.toml", "--yes"]) == 2
+    assert main(["study", "s.toml"]) == 2
     assert "--plugins" in capsys.readouterr().err
     assert not (tmp_path / "ran").exists()
 
@@ -109,6 +109,7 @@ def test_a_script_permits_names(traitor, tmp_path):
         plugin(f"{traitor}:Name")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("answer", "runs"), [(b"y\n", True), (b"n\n", False), (b"\n", False), (b"\x04", False)]
 )
@@ -142,3 +143,27 @@ def _heard(terminal, until):
             break
         said += piece
     return said
+
+
+RAISES = {
+    "where it is imported": 'class Evil(BaseException):\n    pass\n\n\nraise Evil("a\\x1b[31mb\\nc")\n',
+    "where its name is looked up": (
+        "class Evil(BaseException):\n    pass\n\n\ndef __getattr__(name):\n"
+        '    if name == "Name":\n        raise Evil("a\\x1b[31mb\\nc")\n    raise AttributeError\n'
+    ),
+}
+
+
+@pytest.mark.parametrize("where", RAISES)
+def test_what_is_raised_beside_exceptions_is_one_line_without_escapes(where, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    name = f"evil_{where.split()[-1]}"
+    (tmp_path / f"{name}.py").write_text(RAISES[where])
+    write(tmp_path, name, "surface")
+    assert main(["run", "e.toml", "--plugins"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "\x1b" not in said
+    line = RAISES[where][: RAISES[where].index("raise Evil")].count("\n") + 1
+    assert f"{name}.py, line {line}: Evil: a\\x1b[31mb c" in said
+    assert not (tmp_path / "runs" / "e-0").exists()

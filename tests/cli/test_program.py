@@ -6,6 +6,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.cli._program import COMPANIONS, program
+from palpate.errors import how_to_install
 
 MODULE = '''
 """A module that must not be imported for a list of commands."""
@@ -99,24 +100,4 @@ def test_a_command_whose_distribution_is_missing_says_how_to_get_it(monkeypatch,
     told = capsys.readouterr()
     assert told.out == ""
     assert told.err.count("\n") == 1
-    assert told.err.endswith(f"which is not installed: pip install {COMPANIONS[command]}\n")
-
-
-def test_a_scene_without_the_distribution_of_simulators_says_how_to_get_it(monkeypatch, capsys):
-    monkeypatch.setattr("palpate.cli.export.entry_points", lambda **_: ())
-    assert main(["export", "found.json", "--to", "newton"]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    assert printed.err.endswith("which is not installed: pip install palpate-export\n")
-
-
-@pytest.mark.parametrize("option", ["map", "wire"])
-def test_an_option_whose_distribution_is_missing_says_how_to_get_it(monkeypatch, capsys, option):
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: ())
-    words = ["--arm", "ur5e", "--force", "5:N"] if option == "map" else []
-    assert main(["press", f"--{option}", "there", *words]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    assert printed.err.endswith(f"which is not installed: pip install palpate[{option}s]\n")
+    assert told.err.endswith(f"which is not installed: {how_to_install(COMPANIONS[command])}\n")

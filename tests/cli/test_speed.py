@@ -1,6 +1,5 @@
 """The speed that is printed is the speed that was measured."""
 
-import json
 from itertools import count
 
 import pytest
@@ -10,17 +9,6 @@ from palpate.bench.force_input import COLUMNS
 from palpate.bench.summary import CONTACT
 from palpate.bench.tables import with_values
 from palpate.cli import main
-
-
-@pytest.mark.long
-def test_json_is_one_object_that_agrees_with_itself(program):
-    ran = program("speed", "--json")
-    assert ran.returncode == 0, ran.stderr
-    found = json.loads(ran.stdout)
-    assert set(found) >= {"ns_per_tick", "ticks_per_s", "cores", "times_real_time"}
-    assert found["cores"] >= 1
-    # A tick is a millisecond, 1e6 ns.
-    assert found["times_real_time"] * found["ns_per_tick"] == pytest.approx(1e6, rel=1e-9)
 
 
 def test_the_figures_follow_from_a_clock_and_the_ticks_that_were_run(monkeypatch):

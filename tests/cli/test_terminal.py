@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from palpate.cli import _terminal, main
 from palpate.report import style
 from palpate.report.page import Table
+from palpate.report.terminal import head, show_table
 from palpate.text import printable
 
 EVIL = "\x1b]0;owned\x07\x1b[2J[bold]$x^{$\u202egnp.\udcff"
@@ -38,8 +39,8 @@ def test_letters_of_any_script_stay():
 
 def test_a_console_obeys_neither_markup_nor_escapes(capsys):
     screen = _terminal.console()
-    _terminal.head(screen, EVIL, EVIL)
-    _terminal.show_table(screen, Table(EVIL, (EVIL, "value"), [(EVIL, EVIL)]))
+    head(screen, EVIL, EVIL)
+    show_table(screen, Table(EVIL, (EVIL, "value"), [(EVIL, EVIL)]))
     _terminal.place(screen, "report:", EVIL)
     screen.print(EVIL, style="yellow")
     _terminal.print_lines(EVIL)

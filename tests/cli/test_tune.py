@@ -87,7 +87,7 @@ def test_gains_certificate_and_check(capsys, elsewhere):
     assert gains_of(cap=2e4).arm.surface(high) > 1e9, "as much as the arm alone has: the surface may be rigid"
     assert f" {quantity(low, 'N/m')} up; B/K" in constant
     assert main(["certify", "gains.toml", "--check", "proof.json", "--verbose"]) == 0
-    assert "not covered: " in capsys.readouterr().out
+    assert "Not covered: " in capsys.readouterr().out
     (elsewhere / "other.toml").write_text(gains_of(cap=1e4).to_toml())
     assert "another cap" in refused(capsys, "certify", "other.toml", "--check", "proof.json")
     spoiled = json.loads((elsewhere / "proof.json").read_text())
@@ -110,11 +110,11 @@ def test_what_cannot_be_proved_is_exit_code_1(capsys, elsewhere):
 
 
 @pytest.mark.long
-def test_a_certificate_that_does_not_hold_is_exit_code_1(capsys, elsewhere):
-    """Of a servo, on surfaces that its cap leaves out: the claim of its gain is of an empty interval."""
+def test_an_adapting_gain_that_is_not_proved_is_exit_code_1(capsys, elsewhere):
+    """Of a servo, on surfaces above its cap: the gain of the cap is stable there, the adapting gain is not proved."""
     (elsewhere / "gains.toml").write_text(replace(servo_gains(), cap=1e4).to_toml())
     assert main(["certify", "gains.toml", "--stiffness", "9e4:1e5", "--damping-time", "0:0"]) == 1
-    assert "✕ The certificate does not hold: " in capsys.readouterr().out
+    assert "Not proved: the adapting gain." in capsys.readouterr().out
 
 
 def test_from_what_identify_printed(capsys, elsewhere):
@@ -264,11 +264,6 @@ def test_straight_from_a_log(capsys, root):
             "below what",
         ),
         (("--stiffness", "1e2:1e6", "--peak", "20.5", "--arm", "ur5e", "--force", "20"), "no approach speed"),
-        (("--stiffness", "1e2:1e6", "--surface-speed", "0.01", "--arm", "ur5e", "--force", "20"), "limit is"),
-        (
-            ("--stiffness", "1e2:1e6", "--surface-speed", "-1", "--arm", "ur5e", "--force", "20"),
-            "0 m/s or more",
-        ),
         (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20", "--out", "g.json"), "toml"),
         (("missing.json", "--arm", "ur5e", "--force", "20"), "missing.json"),
         (("x.json", "--stiffness", "1:2", "--arm", "ur5e", "--force", "20"), "not both"),
@@ -309,7 +304,6 @@ def test_a_bad_identification_is_one_line(capsys, elsewhere, text, says):
     [
         ((), "nothing to certify"),
         (("gains.toml", "--jitter", "-1"), "jitter"),
-        (("gains.toml", "--margin", "0.5"), "margin"),
         (("gains.toml", "--stiffness", "5:1"), "lower end"),
         (("gains.toml", "--damping-time", "0.1:0.2"), "0:T"),
         (("gains.toml", "--out", "proof.txt"), "json"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.contact_frame.load import Normal, across_per_along, direction_of, scale_std
+from palpate.contact_frame.load import Normal, main_axis, scale_std, slope_across
 
 TRIALS = 300
 
@@ -30,7 +30,7 @@ def test_the_angle_is_as_far_off_as_it_says(colour):
     for _ in range(TRIALS if not colour else 60):
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
-        axis, std = direction_of(pressing(rng, normal, 0.5, colour, 1000))
+        axis, std = main_axis(pressing(rng, normal, 0.5, colour, 1000))
         axis = axis if axis @ normal > 0 else -axis
         ratios += list((axis - (axis @ normal) * normal) / std)
     rms = np.sqrt(np.sum(np.square(ratios)) / (2 * len(ratios) / 3))
@@ -40,7 +40,7 @@ def test_the_angle_is_as_far_off_as_it_says(colour):
 def test_a_bias_has_no_say():
     rng = np.random.default_rng(1)
     force = pressing(rng, np.array([0.0, 0.6, 0.8]), 0.0)
-    axis, std = direction_of(force)
+    axis, std = main_axis(force)
     assert abs(axis @ [0.0, 0.6, 0.8]) == pytest.approx(1.0, abs=1e-12)
     assert std < 1e-9
 
@@ -73,13 +73,13 @@ def test_where_tool_and_force_go_along_the_normal_the_cosines_cancel():
 def test_across_per_along():
     depth = np.linspace(0, 1, 50)
     vectors = np.outer(depth, [0.3, 0.0, 1.0]) + 7
-    assert across_per_along(vectors, np.array([0.0, 0.0, 1.0])) == pytest.approx([0.3, 0.0, 0.0])
+    assert slope_across(vectors, np.array([0.0, 0.0, 1.0])) == pytest.approx([0.3, 0.0, 0.0])
 
 
 def test_noise_has_no_direction():
     rng = np.random.default_rng(3)
     for _ in range(20):
-        axis, std = direction_of(rng.normal(0, 1, (2000, 3)))
+        axis, std = main_axis(rng.normal(0, 1, (2000, 3)))
         normal = Normal(axis, std, True)
         assert not normal.shown
         assert scale_std(normal, rng.normal(size=(50, 3)), rng.normal(size=(50, 3))) > 0.9

@@ -7,8 +7,8 @@ from bench.quick import quick
 from palpate.bench import build, with_values
 from palpate.controllers import ControllerTable
 from palpate.signals.types import example, kinds
-from palpate_checks import controllers as laws
-from palpate_checks.controllers import TICK, WALL
+from palpate.testing import controllers as laws
+from palpate.testing.check import TICK, WALL
 
 each = pytest.mark.parametrize(
     "table", [example(kind) for kind in kinds(ControllerTable)], ids=lambda t: t.__struct_config__.tag

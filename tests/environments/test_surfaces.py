@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, SurfaceState, join, touch
 from palpate.environments.surface import alone, members
-from palpate_checks import surfaces as laws
-from palpate_checks.surfaces import DT, press, recover
+from palpate.testing import surfaces as laws
+from palpate.testing.surfaces import DT, press, recover
 
 SURFACES = {
     "foam, solid": StandardLinearSolid(5600, 13, 0.02, 6900, 0.23),

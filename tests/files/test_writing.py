@@ -15,7 +15,7 @@ from palpate.files import MADE, check_place, fresh_folder, ours, whole, with_aut
 from palpate.logs import write_record
 from palpate.records import Record
 from palpate.report import style
-from palpate.report.page import PageAnswer, answer_page
+from palpate.report.page import Answer, answer_page
 
 
 def names(folder):
@@ -28,7 +28,7 @@ def a_png(path):
 
 def a_page(path):
     write_text(
-        path, answer_page(PageAnswer(title="T", sentence="S", about="A"), room="record", command="palpate")
+        path, answer_page(Answer(title="T", sentence="S", about="A"), room="record", command="palpate")
     )
 
 

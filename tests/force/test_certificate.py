@@ -18,7 +18,7 @@ from palpate.force.cells import Box, Prover, curvature_bound
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, exact_interval, proved_claim
 from palpate.force.claims import Claim, adapting_claims, held_claim
-from palpate.force.describe import bounds, sentence
+from palpate.force.describe import bounds, claim_scope
 from palpate.force.gains import approach_speed
 from palpate.force.lag import lag_of
 from palpate.force.lyapunov import common
@@ -66,10 +66,7 @@ def test_just_outside_is_unstable(proof):
 def test_what_is_not_stable_is_not_proved():
     gains = gains_of()
     high = 1.01 * exact_interval(gains)[1]
-    assert (
-        proved_claim(gains, held_claim(gains, 0.9 * high, high, 0.0), [Box(0.98 * high, high, 0.0, 0.0)])
-        is None
-    )
+    assert proved_claim(gains, held_claim(gains, 0.98 * high, high, 0.0)) is None
 
 
 @pytest.mark.parametrize(
@@ -155,9 +152,9 @@ def test_a_torque_arm_is_proved_through_its_exponential():
     prover = claim.prover(gains)
     for cell in claim.cells:
         middle = float(np.sqrt(cell.low * cell.high))
-        L = cell.cell.L
+        L = cell.L
         inside = np.linalg.norm(L.T @ prover.loop.phi(middle, 0.0, Law(gains.gain)) @ np.linalg.inv(L.T), 2)
-        assert inside <= prover.contraction(cell.cell.box, L)[0]
+        assert inside <= prover.contraction(cell.box, L)[0]
 
 
 def test_the_curvature_bound_is_one():
@@ -209,12 +206,12 @@ def test_a_torque_arm_is_proved_on_surfaces_with_damping_too():
     assert claim is not None
     prover, rng = claim.prover(gains), np.random.default_rng(0)
     for cell in claim.cells:
-        L = cell.cell.L
+        L = cell.L
         bound, time = rng.uniform(cell.low, cell.high), rng.uniform(cell.least, cell.most)
         K = bound / (1.0 + time / gains.theta)
         Phi = prover.loop.phi(K, time * K, Law(gains.gain))
         inside = np.linalg.norm(L.T @ Phi @ np.linalg.inv(L.T), 2)
-        assert inside <= prover.contraction(cell.cell.box, L)[0]
+        assert inside <= prover.contraction(cell.box, L)[0]
 
 
 @pytest.mark.long
@@ -223,7 +220,7 @@ def test_contact_lost_and_found_makes_nothing_grow(proof):
     gains, claim = proof.gains, proof.claims[1]
     assert (claim.kind, len(claim.cells)) == ("one-sided", 1)
     loop = claim.prover(gains).loop
-    L, force = claim.cells[0].cell.L, gains.force
+    L, force = claim.cells[0].L, gains.force
     for bound, time in ((claim.high, 0.0), (0.3 * claim.high, 0.0), (0.5 * claim.high, claim.most)):
         K = bound / (1.0 + time / gains.theta)
         rest = force / K
@@ -271,7 +268,7 @@ def test_the_bounds_of_K_u_are_those_at_which_the_shares_are_left():
             for K in np.geomspace(1e3, high, 50)
         ]
         assert 1.99 < max(shares) <= 2.0 + 1e-9
-        assert f"K_u is {low:.3g}" in sentence(claim, gains)
+        assert f"K_u {low:.3g}" in claim_scope(claim, gains)
 
 
 def test_a_claim_for_one_sided_contact_is_of_one_norm(proof):
@@ -317,7 +314,7 @@ def test_an_inner_loop_known_to_intervals_is_proved_for_all_that_it_may_be():
         w = 2.0 * np.pi * f
         time, bound, late = rng.uniform(0.0, claim.most), rng.uniform(claim.low, claim.high), rng.integers(3)
         cell = next(c for c in claim.cells if c.loss == late and c.least <= time <= c.most)
-        loop, L = replace(claim.prover(gains).loop, inner=(w * w, 2.0 * z * w)), cell.cell.L
+        loop, L = replace(claim.prover(gains).loop, inner=(w * w, 2.0 * z * w)), cell.L
         K = bound / (1.0 + time / gains.theta)
         Phi = loop.phi(K, time * K, Law(gains.gain), late)
         assert np.linalg.norm(L.T @ Phi @ np.linalg.inv(L.T), 2) < 1.0

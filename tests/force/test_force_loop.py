@@ -13,7 +13,7 @@ from force.gained import gains_of
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.certificate import FORM, Certificate
-from palpate.force.flat import BOUND
+from palpate.force.guard import BOUND
 
 
 @pytest.fixture
@@ -187,3 +187,47 @@ def test_files(loop, tmp_path):
         ForceLoop.load(tmp_path / "gains.toml", tmp_path / "other.json")
     with pytest.raises(InputError, match="folder"):
         loop.save(tmp_path / "nowhere" / "gains.toml")
+
+
+def steady_press(arm="ur5e", bad=None, count=1, seconds=3.5, seed=0):
+    """A loop whose tip follows at once and presses a spring of 5 kN/m with 10 N; from 1.5 s on `count` bad readings."""
+    loop, rng, x = ForceLoop(gains_of(arm, force=10.0, cap=1e5)), np.random.default_rng(seed), -2e-4
+    tick, speeds, states = loop.gains.arm.tick, [], []
+    begin, every = round(1.5 / tick), max(round(1.0 / loop.gains.arm.sensor.sampling / tick), 1)
+    for k in range(round(seconds / tick)):
+        if k % every == 0:
+            reading = max(5e3 * x, 0.0) + 0.1 * rng.normal()
+        shown = reading
+        if bad is not None and begin <= k < begin + count * every:
+            shown = bad + 1e-3 * ((k - begin) // every % 5)  # equal ones would be one reading
+        speeds.append(loop.update(shown, x))
+        states.append((loop.phase, loop.trouble))
+        x += tick * speeds[-1]
+    return loop, np.array(speeds), states, begin
+
+
+@pytest.mark.parametrize("arm", ["ur5e", "fr3"])
+@pytest.mark.parametrize("bad", [0.0, 100.0, 1000.0, -1000.0])
+def test_one_bad_sample_in_a_steady_press_leaves_no_trace(arm, bad):
+    for count, seed in ((1, 0), (1, 1), (2, 2)):
+        clean, *_ = steady_press(arm, seed=seed)
+        loop, _, states, begin = steady_press(arm, bad, count, seed=seed)
+        assert states[begin - 1] == ("locked", "")
+        assert loop.trouble == ""
+        assert loop.estimate.stiffness == pytest.approx(5e3, rel=0.05)
+        assert loop.estimate.stiffness == clean.estimate.stiffness
+        assert loop.estimate.bound == pytest.approx(clean.estimate.bound, rel=0.01)
+
+
+def test_a_bad_sample_that_is_a_large_force_is_reacted_to_at_once():
+    for bad, words in ((1000.0, "end of its scale"), (70.0, "above its limit"), (-50.0, "negative beyond")):
+        loop, speeds, states, begin = steady_press(bad=bad)
+        assert words in states[begin][1]
+        assert speeds[begin] == 0.0 if bad < 0.0 else speeds[begin] <= -loop.gains.approach
+
+
+def test_a_force_that_departs_for_three_readings_is_believed():
+    gone, *_ = steady_press(bad=0.0, count=10_000)
+    assert gone.phase == "free motion"
+    bounds = [steady_press(bad=0.0, count=count)[0].estimate.bound for count in (2, 3)]
+    assert bounds[0] < 1.1 * 5e3 < 2.0 * 5e3 < bounds[1]

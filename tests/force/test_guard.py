@@ -8,8 +8,7 @@ import pytest
 from force.gained import gains_of
 from palpate.force import ForceLoop
 from palpate.force.contact_evidence import FREE_MOTION
-from palpate.force.flat import state_in
-from palpate.force.guard import BEYOND, BLIND, BOUNCED, DRIFTS, SWINGS, TROUBLES, UNTARED, Guarded
+from palpate.force.guard import BEYOND, BLIND, BOUNCED, DRIFTS, SWINGS, TROUBLES, UNTARED, Guarded, state_in
 from palpate.force.simulated_press import pressed, surface, world_of
 
 HOSTILE = [
@@ -29,6 +28,15 @@ HOSTILE = [
     999.0,
     -999.0,
 ]
+
+
+def troubles(control, rows):
+    """The trouble of each tick of a run, from its readings and positions."""
+    state, codes = control.start(), []
+    for k in range(len(rows)):
+        _, state = control.step(state, 20.0, rows[k, 4], rows[k - 1, 2] if k else -1e-3)
+        codes.append(state.guard.trouble)
+    return codes
 
 
 def travel(name, error, seconds=1.5, noise=0.1, force=20.0):
@@ -153,14 +161,9 @@ def test_a_cap_that_is_far_too_low_ends_within_three_bounces(times):
 
 def test_a_cap_that_is_refuted_is_said():
     gains = gains_of("ur5e", cap=2e3)
-    control = Guarded(gains.cautious())
-    world, state, said = world_of(gains.arm, noise=0.1), control.start(), set()
+    world, control = world_of(gains.arm, noise=0.1), Guarded(gains.cautious())
     rows = pressed(world, surface(4e4, 10.0), control, 1e-3, np.full(1000, 20.0), 1)
-    for k in range(len(rows)):
-        place = rows[k - 1, 2] if k else -1e-3
-        _, state = control.step(state, 20.0, rows[k, 4], place)
-        said.add(state.guard.trouble)
-    assert BEYOND in said
+    assert BEYOND in troubles(control, rows)
 
 
 @pytest.mark.parametrize("mass", [1.0, 3.0])
@@ -169,13 +172,9 @@ def test_a_heavy_surface_that_swings_off_the_tip_is_said_within_a_second_and_met
     world, control = world_of(gains.arm, noise=0.1), Guarded(gains.cautious())
     rows = pressed(world, surface(650.0, 0.5, mass=mass), control, 1e-3, np.full(1000, 20.0), 1)
     assert rows[:, 0].max() < 20.0
-    state, said = control.start(), []
-    for k in range(len(rows)):
-        _, state = control.step(state, 20.0, rows[k, 4], rows[k - 1, 2] if k else -1e-3)
-        said.append(state.guard.trouble)
-    first = said.index(SWINGS) * gains.arm.tick
-    assert first < 1.2
-    assert rows[[code == SWINGS for code in said], 3].max() <= gains.approach * (1.0 + 1e-12)
+    codes = troubles(control, rows)
+    assert codes.index(SWINGS) * gains.arm.tick < 1.2
+    assert rows[[code == SWINGS for code in codes], 3].max() <= gains.approach * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("mass", [0.0, 0.1])
@@ -183,11 +182,7 @@ def test_a_surface_that_stays_at_the_tip_is_not_said_to_swing(mass):
     gains = gains_of("ur5e")
     world, control = world_of(gains.arm, noise=0.1), Guarded(gains.cautious())
     rows = pressed(world, surface(2e4, 20.0, mass=mass), control, 1e-3, np.full(1000, 20.0), 1)
-    state, said = control.start(), set()
-    for k in range(len(rows)):
-        _, state = control.step(state, 20.0, rows[k, 4], rows[k - 1, 2] if k else -1e-3)
-        said.add(state.guard.trouble)
-    assert SWINGS not in said
+    assert SWINGS not in troubles(control, rows)
 
 
 def test_bounces_that_do_not_end_stop_the_tip():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.force.onset import EMPTY, NO_STARTS, explained_variance, later, latest
+from palpate.force.contact_evidence import EMPTY, NO_STARTS, explained_variance, later, latest
 
 NEVER = 1e12
 """Readings in free motion without end: its mean is exact."""

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
 from force.gained import servo_gains
+from palpate.certify.force_certificate import RefusedError, check
 from palpate.errors import InputError
 from palpate.force.arm import load_arm, parse_arm
 from palpate.force.boundary import radius
@@ -26,9 +27,8 @@ from palpate.force.sampled_loop import SampledLoop, law_for
 from palpate.force.simulated_press import pressed, surface, world_of
 from palpate.force.slide_table import Slide
 from palpate.force.sliding.paths import directions
-from palpate_certify.force_certificate import RefusedError, check
-from palpate_slide.ground import ground_of
-from palpate_slide.world import figures_of, simulate
+from palpate.slide.ground import ground_of
+from palpate.slide.world import figures_of, simulate
 
 
 @pytest.fixture(scope="module")
@@ -254,6 +254,7 @@ def test_it_is_read_from_a_file(gains):
     assert parse_arm(text, "here").kind == "servo"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("K", "speed", "R"), [(18e3, 0.09, 0.09), (6e3, 0.08, -0.09)])
 def test_a_slide_leads_by_the_lag_of_free_motion_where_the_surface_bends(gains, K, speed, R):
     """With the lead of a press there, for K_u, it lifts off or digs in by the lag that is left, up to 20 % of F_d."""

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from palpate.certify.force_certificate import RefusedError, check, check_slide
 from palpate.force.arm import load_arm
 from palpate.force.certifying import certify
 from palpate.force.gains import gains_for
 from palpate.force.sampled_loop import Law
 from palpate.force.slide_table import Slide
-from palpate.force.sliding.slide_proof import MISALIGNED, gain_factors, slide_proof
-from palpate_certify.force_certificate import RefusedError, check, check_slide
+from palpate.force.sliding.slide_proof import MAX_MISALIGNMENT, gain_factors, slide_proof
 
 MU_MAX = 0.9
 
@@ -27,7 +27,7 @@ def proved(request, tmp_path_factory):
 
 def test_the_factor_of_the_gain_is_between_its_ends():
     least, most = gain_factors(MU_MAX)
-    phi, mu = np.meshgrid(np.linspace(-MISALIGNED, MISALIGNED, 201), np.linspace(0.0, MU_MAX, 51))
+    phi, mu = np.meshgrid(np.linspace(-MAX_MISALIGNMENT, MAX_MISALIGNMENT, 201), np.linspace(0.0, MU_MAX, 51))
     m = np.cos(phi) * (np.cos(phi) + mu * np.sin(phi))
     assert m.min() == pytest.approx(least)
     assert m.max() == pytest.approx(most, rel=1e-4)

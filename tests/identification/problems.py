@@ -6,7 +6,7 @@ from typing import Any
 
 from palpate.identification.contacts import contacts_of
 from palpate.identification.options import Options
-from palpate.identification.problem import Problem, problem_of
+from palpate.identification.problem import Problem, build_problem
 from palpate.identification.sampling import channels_of
 from palpate.records import Record
 
@@ -21,4 +21,4 @@ def problem(log: Record, lag: float | None = 0.0, **said: Any) -> Problem:
     """
     options = Options.of(lag=lag, **said)
     channels, chain, contacts = contacts_of(channels_of(log), options)
-    return problem_of(channels, chain, contacts, options)
+    return build_problem(channels, chain, contacts, options)

@@ -10,8 +10,8 @@ from scipy.stats import multivariate_normal
 
 from identification.test_budget import NOISE, flat_columns, stiffer_about
 from identification.test_by_octave import DT, ROWS, level, system
-from palpate.identification.estimators.averaging import averaged, members, of_octaves
-from palpate.identification.estimators.octaves import LARGEST, PERIODS, System, solve
+from palpate.identification.averaging import average_members, members, octave_spread
+from palpate.identification.octaves import MAX_TERM_RATIO, PERIODS, System, solve
 
 COUNT = 60
 
@@ -29,7 +29,7 @@ def asked_of(columns, force):
     rows = np.column_stack([columns, force])
     products = (rows.T @ rows)[None]
     power = np.diag(products[0])
-    weight = power[:-1] / (LARGEST**2 * power[-1])
+    weight = power[:-1] / (MAX_TERM_RATIO**2 * power[-1])
     lines = np.array([float(len(rows))])
     return System(products, lines, (products[None], lines[None]), np.zeros(columns.shape[1]), weight)
 
@@ -38,7 +38,7 @@ def variances(columns, force, noise):
     """Of the spring: without the other force, averaged over its sizes, and with the largest."""
     asked, level = asked_of(columns, force), np.array([noise])
     alone = replace(asked, prior_weight=np.array([asked.prior_weight[0], 1e12]))
-    found = averaged(members(asked, level, level, [[1]]))
+    found = average_members(members(asked, level, level, [[1]]))
     return [own.cov[0, 0] for own in (solve(alone, level), found, solve(asked, level))]
 
 
@@ -71,7 +71,7 @@ def test_what_is_left_beyond_the_noise_is_less_evidence():
     columns, force = rows_of(0.0, 0.1)
     asked, noise = asked_of(columns, force), np.array([1e-2])
     by_chance, by_model = (members(asked, noise, noise * share, [[1]]) for share in (1.0, 1e-2))
-    assert averaged(by_model).cov[0, 0] > 1.5 * averaged(by_chance).cov[0, 0]
+    assert average_members(by_model).cov[0, 0] > 1.5 * average_members(by_chance).cov[0, 0]
 
 
 @pytest.mark.parametrize("collinear", [0.0, 0.9, 0.99])
@@ -83,7 +83,7 @@ def test_intervals_hold_a_spring_beside_a_force_of_any_size(collinear):
         size = 0.0 if seed % 2 else 5 * 10 ** rng.uniform(-3, 0)
         columns, force = rows_of(size, 0.1, seed, collinear)
         noise = np.array([0.01])
-        found = averaged(members(asked_of(columns, force), noise, noise, [[1]]))
+        found = average_members(members(asked_of(columns, force), noise, noise, [[1]]))
         held += abs(found.theta[0] - 5.0) < 1.96 * np.sqrt(found.cov[0, 0])
     assert held / 400 > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 400)  # three deviations of a binomial
 
@@ -97,7 +97,7 @@ def test_an_octave_that_differs_is_seen_by_leaving_it_out(off):
     asked = system(column, stiffer_about(column[:, 0], at, off) + noise)
     levels = level(asked, NOISE**2)
     whole = solve(asked, levels)
-    found = np.sqrt(of_octaves(whole, asked, levels, levels, []).variance[0])
+    found = np.sqrt(octave_spread(whole, asked, levels, levels, []).variance[0])
     pull = abs(whole.theta[0] - 5.0)
     std = np.sqrt(whole.cov[0, 0])
     if off:

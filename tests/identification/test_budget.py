@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from identification.test_by_octave import DT, ROWS, level, system
-from palpate.identification.estimators import budget as causes
-from palpate.identification.estimators.budget import HIDDEN_SHARE
-from palpate.identification.estimators.octaves import System, estimate, solve
+from palpate.identification import budget as causes
+from palpate.identification.octaves import System, estimate, solve
 from palpate.identification.uncertainty import Contribution, half_width, half_widths
+from palpate.signals.octaves import HIDDEN_SHARE
 
 NOISE = 0.1
 
@@ -30,13 +30,13 @@ def stiffer_about(column, frequency, more):
     return np.fft.irfft(lines * np.where(inside, 5.0 + more, 5.0), ROWS)
 
 
-def of_stretches(each, seed=0):
+def stretch_spread(each, seed=0):
     """Of a log in equal stretches, each with a stiffness of its own."""
     column = flat_columns(seed)
     force = column[:, 0] * np.repeat(each, ROWS // len(each))
     asked = system(column, force + np.random.default_rng([seed, 2]).normal(0, NOISE, ROWS))
     whole = estimate(asked)
-    return causes.of_stretches(asked, whole), whole
+    return causes.stretch_spread(asked, whole), whole
 
 
 def by_residuals(columns, target, groups):
@@ -66,7 +66,7 @@ def test_stretches_of_unlike_leverage_count_as_bell_and_mccaffrey_have_it():
     asked = System(
         products.sum(axis=0), np.array([60.0]), (products, np.full((5, 1), 12.0)), np.zeros(2), np.zeros(2)
     )
-    found = causes.of_stretches(asked, solve(asked, np.ones(1)))
+    found = causes.stretch_spread(asked, solve(asked, np.ones(1)))
     assert found.freedom == pytest.approx(np.clip(freedom, 1, 4), rel=1e-6)
     assert found.variance == pytest.approx(np.maximum(variance - own, 0), rel=1e-6)
     assert freedom.max() < 2  # one stretch has nearly all that tells them
@@ -74,7 +74,7 @@ def test_stretches_of_unlike_leverage_count_as_bell_and_mccaffrey_have_it():
 
 def test_stretches_that_differ_have_the_variance_of_their_mean():
     each = 5.0 + np.array([1.0, -1.0, 0.5, -0.5, 1.0, -1.0, 0.5, -0.5])
-    found, whole = of_stretches(each)
+    found, whole = stretch_spread(each)
     variance = found.variance[0] + whole.cov[0, 0]
     # Stretches of white motion have as much of it to a tenth, and blocks at their edges are of two of them.
     assert np.sqrt(variance) == pytest.approx(each.std(ddof=1) / np.sqrt(8), rel=0.5)
@@ -85,7 +85,7 @@ def test_stretches_that_agree_add_next_to_nothing():
     """In the mean over seeds: the scatter of eight about their variance."""
     shares = []
     for seed in range(40):
-        found, whole = of_stretches(np.full(8, 5.0), seed)
+        found, whole = stretch_spread(np.full(8, 5.0), seed)
         shares.append(found.variance[0] / whole.cov[0, 0])
     assert np.mean(shares) < 0.5
 
@@ -96,7 +96,7 @@ def test_a_stretch_that_alone_has_the_motion_is_not_held_against_the_rest():
     column[ROWS // 8 :] *= 1e-3
     asked = system(column, 5.0 * column[:, 0] + np.random.default_rng(2).normal(0, NOISE, ROWS))
     whole = estimate(asked)
-    assert causes.of_stretches(asked, whole).variance[0] < 2 * whole.cov[0, 0]
+    assert causes.stretch_spread(asked, whole).variance[0] < 2 * whole.cov[0, 0]
 
 
 def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
@@ -106,13 +106,13 @@ def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
     noise = level(asked, NOISE**2)
     seen = noise.copy()
     seen[4] += 2.0**2
-    found = causes.of_unexplained(asked, solve(asked, seen), noise, asked.lines)
+    found = causes.unexplained_spread(asked, solve(asked, seen), noise, asked.lines)
     weight = 1 / seen
     gram = asked.products[:, 0, 0]
     # All lines of the octave may conspire: a force of amplitude 2 in each, along the column.
     pull = np.sqrt(asked.lines[4] * 2.0**2 * gram[4]) * weight[4] / (weight @ gram)
     assert np.sqrt(found.variance[0]) == pytest.approx(HIDDEN_SHARE * pull, rel=1e-6)
-    none = causes.of_unexplained(asked, solve(asked, seen), seen, asked.lines)
+    none = causes.unexplained_spread(asked, solve(asked, seen), seen, asked.lines)
     assert none.variance[0] == 0.0
 
 
@@ -123,7 +123,7 @@ def test_more_of_the_same_log_does_not_hide_what_is_unexplained():
         column = np.random.default_rng(3).normal(size=(rows, 1))
         asked = system(column, 5.0 * column[:, 0])
         whole = solve(asked, level(asked))
-        hidden = causes.of_unexplained(asked, whole, level(asked, 0.01), asked.lines)
+        hidden = causes.unexplained_spread(asked, whole, level(asked, 0.01), asked.lines)
         shares.append(np.sqrt([hidden.variance[0], whole.cov[0, 0]]))
     (hidden, noise), (hidden_long, noise_long) = shares
     assert noise_long == pytest.approx(noise / 2, rel=0.1)
@@ -138,7 +138,7 @@ def test_parts_of_the_covariance_are_what_each_cause_adds():
     asked = system(own, force, names=("K", "lag", "Fc"))
     noise = level(asked, NOISE**2)
     whole = solve(asked, noise)
-    parts = causes.of_noise(asked, whole, ("K", "lag", "Fc"), 2, "lag")
+    parts = causes.noise_budget(asked, whole, ("K", "lag", "Fc"), 2, "lag")
     assert set(parts) == {"noise", "lag", "other forces"}
     total = sum(part.variance for part in parts.values())
     assert total[0] == pytest.approx(whole.cov[0, 0], rel=1e-6)

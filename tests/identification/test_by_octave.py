@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.estimators.octaves import (
+from palpate.identification.octaves import (
     Segment,
+    build_system,
     estimate,
-    held,
-    longest_of,
-    octaves_of,
+    estimate_with_fixed,
+    longest_length,
     solve,
-    system_of,
+    sum_octaves,
 )
 
 DT = 1e-2
@@ -33,8 +33,8 @@ def coloured_columns(seed, count=2):
 
 def system(columns, force, names="KBM", prior=None):
     segments = [Segment(0, len(force))]
-    octaves = octaves_of(np.column_stack([columns, force]), segments, DT, longest_of(segments))
-    return system_of(octaves, tuple(names[: columns.shape[1]]), prior or {})
+    octaves = sum_octaves(np.column_stack([columns, force]), segments, DT, longest_length(segments))
+    return build_system(octaves, tuple(names[: columns.shape[1]]), prior or {})
 
 
 def two_columns(seed=0, noise=0.5, extra=None):
@@ -69,8 +69,8 @@ def test_the_noise_of_each_octave_is_found():
     slow = sosfiltfilt(butter(6, 2.0, fs=1 / DT, output="sos"), white)
     force = own @ TRUTH + 3.0 * slow + np.random.default_rng(5).normal(0, 0.1, ROWS)
     segments = [Segment(0, ROWS)]
-    octaves = octaves_of(np.column_stack([own, force]), segments, DT, ROWS)
-    found = estimate(system_of(octaves, ("K", "B"), {}))
+    octaves = sum_octaves(np.column_stack([own, force]), segments, DT, ROWS)
+    found = estimate(build_system(octaves, ("K", "B"), {}))
     low = (octaves.all_lines >= 16) & (1.4 * octaves.frequency < 1.5)
     high = octaves.frequency / 1.4 > 3.5
     assert low.any()
@@ -149,7 +149,7 @@ def test_octaves_that_do_not_count_are_as_if_there_were_none():
 
 def test_a_parameter_that_is_held_leaves_the_others_as_if_its_force_were_taken_off():
     own, force = two_columns()
-    found = held(system(own, force), {1: -1.5})
+    found = estimate_with_fixed(system(own, force), {1: -1.5})
     alone = estimate(system(own[:, :1], force + 1.5 * own[:, 1]))
     # But for the weak prior, which goes with the power of the force.
     assert found.theta == pytest.approx([alone.theta[0], -1.5], rel=1e-4)

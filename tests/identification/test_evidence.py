@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.problems import problem
-from identification.synthetic_contacts import pressed, record
+from identification.synthetic_contacts import record
 from palpate.identification import Verdict, identify
-from palpate.identification.estimators.octaves import PERIODS, segments_of
-from palpate.identification.evidence.press import evidence_of, press_of
-from palpate.identification.evidence.slope import Loading, slope_of
-from palpate.identification.evidence.spectrum import dynamic_stiffness, working_point
 from palpate.identification.filters import low_passed
+from palpate.identification.octaves import PERIODS
 from palpate.identification.options import Lag, Options
+from palpate.identification.press import find_press, gather_evidence
 from palpate.identification.result import DynamicStiffness
+from palpate.identification.slope import Loading, upper_slope
+from palpate.identification.spectrum import dynamic_stiffness, working_point
 from palpate.identification.steady_press import WINDOW, Curve, Slopes, SteadyPress, slopes_at
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.low_pass import LowPass
@@ -48,8 +48,7 @@ def answering(impedance, frequency, size=1e-3, noise=0.0, seed=0):
 
 def seen(log, lag=0.0, lag_std=0.0, **said):
     asked = problem(log, lag, bonded=True, cutoff=CUTOFF, **said)
-    segments = segments_of(asked.motion.rows, asked.spans)
-    return asked, dynamic_stiffness(asked, segments, lag, lag_std)
+    return asked, dynamic_stiffness(asked, lag, lag_std)
 
 
 def octave_frequencies(up_to):
@@ -160,7 +159,7 @@ def press_path(rise, hold=0.0, depth=2e-3, start=0.5, lead=-0.5e-3):
 
 def press(time, x, force, noise=1e-3, **said):
     asked = problem(record(time, x, force + np.random.default_rng(0).normal(0, noise, len(x))), 0.0, **said)
-    return press_of(asked, None, segments_of(asked.motion.rows, asked.spans))
+    return find_press(asked, None)
 
 
 def test_a_press_in_steps_has_slopes_at_the_forces_of_all_of_them():
@@ -310,7 +309,7 @@ def in_steps(k, b, tau=0.1, rest=1.0):
 @pytest.mark.parametrize("damping", [0.0, 40.0])
 def test_the_rests_of_a_press_in_steps_tell_its_speed_from_its_depth(damping):
     """Within one such advance the force has the slope k - b/tau: the interval reaches both, and no farther."""
-    slope = slope_of([in_steps(2000.0, damping)]).stiffness
+    slope = upper_slope([in_steps(2000.0, damping)]).stiffness
     assert slope.value + slope.half >= 2000.0 * (1 - 1e-9)
     assert slope.value - slope.half <= (2000.0 - damping / 0.1) * (1 + 1e-9)
     assert slope.half == pytest.approx(damping / 0.1 / 2, rel=0.02, abs=1e-6)
@@ -320,7 +319,7 @@ def test_the_slope_is_of_the_last_rise():
     """A shell that snaps through at a third of its force: its peak is not the upper part, however noisy it is."""
     depth = np.linspace(0.0, 3e-3, 3000)
     force = np.interp(depth, [0, 1e-3, 2e-3, 3e-3], [0.0, 4.2, 2.0, 10.0])
-    slope = slope_of([Loading(depth, np.full(3000, 1e-3), force, np.arange(3000) * DT)])
+    slope = upper_slope([Loading(depth, np.full(3000, 1e-3), force, np.arange(3000) * DT)])
     assert slope.stiffness.value == pytest.approx(8000.0, rel=1e-6)
     assert slope.force == pytest.approx(7.0, abs=0.1)
     assert slope.depth == pytest.approx(2.625e-3, abs=2e-5)
@@ -376,22 +375,9 @@ def test_strokes_at_constant_speed_are_no_more_certain_than_the_other_loadings_a
     stroke = Measurement(claimed, {"noise": Contribution.within(10.0), "repetition": Contribution(0.0)})
     press = SteadyPress(Slopes(5.0, 1e-3, stroke, (claimed,), None, 1.0), (), *np.empty((2, 2, 1)))
     asked = replace(asked, contacts=replace(asked.contacts, press=press))
-    found = evidence_of(asked, Options.of(), "N/m")[2].stiffness
+    found = gather_evidence(asked, Options.of(), "N/m")[2].stiffness
     assert found.value == claimed
     assert found.ci95 == pytest.approx((claimed - half, claimed + half), abs=60)
-
-
-def test_the_json_of_all_of_it():
-    """Contract 7's words."""
-    said = identify(pressed(), lag=0.0).to_json()
-    point = said["working_point"]
-    assert set(point) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source", "each"}
-    assert {"value", "std", "ci95", "unit", "verdict", "reason", "prediction95"} <= set(point["stiffness"])
-    assert point["source"] in {"octave", "press"}
-    for own in said["dynamic_stiffness"]:
-        assert set(own) == {"Hz", "storage", "storage_half", "loss", "loss_half", "blocks"}
-    assert set(said["press"]) == {"tangent", "hysteresis_loss", "relaxation"}
-    assert set(said["press"]["tangent"][0]) == {"force_N", "stiffness", "half"}
 
 
 def jumping(rate, seconds, at):

@@ -9,7 +9,7 @@ import pytest
 
 from identification.synthetic_contacts import coloured, force_of, pressed, record
 from palpate.identification import identify
-from palpate.identification.free_motion import Drift, free_motion_of
+from palpate.identification.free_motion import Drift, find_free_motion
 from palpate.logs import read_log
 
 PRESS = Path(__file__).parents[2] / "examples" / "data" / "press.csv"
@@ -31,7 +31,7 @@ def ends(force: np.ndarray) -> tuple[float, float]:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_air_lies_where_the_force_stays(way, sign):
     force, x = hinge(1e-3, 0.05)
-    air = free_motion_of(sign * force + 3.0, way * x, ends(sign * force + 3.0))
+    air = find_free_motion(sign * force + 3.0, way * x, ends(sign * force + 3.0))
     assert air is not None
     assert air.way == way
     assert air.rest == pytest.approx(3.0, abs=0.05)
@@ -44,7 +44,7 @@ def test_a_surface_that_is_never_left_has_no_air(n, seed):
     """The probe turns where a quarter of the depth is still pressed: 6 % of the force for n = 2."""
     x = 2.5e-3 - 1.5e-3 * np.cos(2 * np.pi * 0.5 * TIME)
     force = 20 * (x / 4e-3) ** n + coloured(len(TIME), 0.05, 0.9, np.random.default_rng(seed))
-    assert free_motion_of(force, x, ends(force)) is None
+    assert find_free_motion(force, x, ends(force)) is None
 
 
 def test_a_short_stretch_of_air_at_the_begin_is_seen():

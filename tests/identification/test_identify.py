@@ -57,20 +57,16 @@ def holds(parameter, truth):
 @pytest.mark.parametrize("pole", [0.0, 0.9, 0.99])
 def test_intervals_cover_the_truth_under_coloured_noise(pole):
     truth = {"K": 5000.0, "B": 40.0, "M": 0.5}
-    robust, plain = dict.fromkeys(truth, 0), dict.fromkeys(truth, 0)
+    inside = dict.fromkeys(truth, 0)
     runs = 25
     for seed in range(1000, 1000 + runs):
         found = identify(
             shaken(seed=seed, pole=pole, n=1500), model="kelvin-voigt-mass", lag=0.0, tolerance=1.0
         )
         for name, value in truth.items():
-            p = found.parameters[name]
-            robust[name] += holds(p, value)
-            own = p.ci95_if_model_holds
-            plain[name] += own is None or own[0] <= value <= own[1]
+            inside[name] += holds(found.parameters[name], value)
     # 95 % of 25 are 23.75; a binomial's four deviations less are 19.4.
-    assert min(robust.values()) >= 20, robust
-    assert min(plain.values()) >= 20, plain
+    assert min(inside.values()) >= 20, inside
 
 
 @pytest.mark.long
@@ -81,15 +77,6 @@ def test_intervals_of_presses_cover_the_truth_without_a_known_lag():
         for name, value in (("K", 5000), ("B", 40)):
             inside[name] += holds(found.parameters[name], value)
     assert min(inside.values()) >= 9, inside  # 11.4 expected, a binomial's three deviations less
-
-
-@pytest.mark.long
-def test_if_the_model_holds_estimates_are_unbiased_and_vary_as_claimed():
-    found = [identify(pressed(seed=seed), lag=0.0, model="kelvin-voigt").estimate for seed in range(20)]
-    values = np.array([e.theta[e.names.index("K")] for e in found])
-    claimed = np.mean([e.std[e.names.index("K")] for e in found])
-    assert abs(values.mean() - 5000) < 4 * claimed / np.sqrt(20)
-    assert values.std() == pytest.approx(claimed, rel=0.5)  # 20 seeds know a deviation to 16 %
 
 
 def test_a_standard_linear_solid_is_recognised():
@@ -111,7 +98,6 @@ def test_a_standard_linear_solid_is_recognised():
     asked = identify(log, lag=0.0, model="standard-linear-solid")
     for name, truth in (("K", 5600), ("K1", 6900), ("tau", 0.23)):
         assert holds(asked.parameters[name], truth)
-        assert asked.estimate.theta[asked.estimate.names.index(name)] == pytest.approx(truth, rel=0.03)
 
 
 def test_a_hunt_crossley_contact_is_recognised():
@@ -193,15 +179,6 @@ def test_calibration_is_in_the_interval():
     assert p.ci95[1] - p.value >= p.budget["calibration"]
 
 
-@pytest.mark.parametrize(("force", "position"), [(-1, 1), (1, -1), (-1, -1)])
-def test_reversed_signs_are_found_and_said(force, position):
-    log = pressed()
-    found = identify(record(log["time"], position * log["position"], force * log["force"]))
-    assert ("force-sign-reversed" in found.codes) == (force < 0)
-    assert ("position-sign-reversed" in found.codes) == (position < 0)
-    assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
-
-
 def test_an_offset_of_the_force_does_no_harm():
     log = pressed()
     for offset in (-3.0, 2.0):
@@ -271,12 +248,6 @@ def test_jitter_and_repeated_times():
     assert found.parameters["K"].value == pytest.approx(5000, rel=0.02)
 
 
-def test_units_off_by_a_thousand_are_suspected():
-    log = pressed()
-    found = identify(record(log["time"], log["position"] * 1e6, log["force"]))
-    assert "unit-doubtful" in found.codes
-
-
 def test_a_press_of_metres_is_one_of_millimetres():
     log = pressed()
     found = identify(record(log["time"], log["position"] * 1e3, log["force"]))
@@ -291,15 +262,6 @@ def test_ten_rows_a_second():
     assert "low-rate" in found.codes
     assert found.working_point.stiffness.value == pytest.approx(5000, rel=0.02)
     assert found.parameters["B"].verdict is not Verdict.IDENTIFIED
-
-
-def test_no_contact():
-    log = pressed()
-    found = identify(
-        record(log["time"], log["position"], coloured(len(log), 0.05, 0.9, np.random.default_rng(0)))
-    )
-    assert "no-contact" in found.codes
-    assert not found.found
 
 
 def test_contact_at_the_first_sample():

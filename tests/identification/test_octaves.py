@@ -9,16 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.estimators.octaves import (
+from palpate.identification.octaves import (
     GROUPS,
-    OVERLAP,
-    SHORTEST,
-    TIED,
+    MIN_SEGMENT_ROWS,
     Segment,
-    longest_of,
-    octaves_of,
-    segments_of,
+    longest_length,
+    split_segments,
+    sum_octaves,
 )
+from palpate.signals.octaves import OVERLAP, TIED
 
 DT = 1e-3
 
@@ -30,7 +29,7 @@ def columns(rows, seed=0, p=3):
 def sums(own, *lengths):
     edges = np.cumsum([0, *(lengths or [len(own)])])
     segments = [Segment(int(a), int(b)) for a, b in pairwise(edges)]
-    return octaves_of(own, segments, DT, longest_of(segments))
+    return sum_octaves(own, segments, DT, longest_length(segments))
 
 
 def line(block, number):
@@ -59,7 +58,7 @@ def test_the_first_octave_is_the_whole_contact_and_the_next_its_blocks_by_hand()
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.lists(st.integers(SHORTEST, 300), min_size=1, max_size=5), st.integers(0, 2**31))
+@given(st.lists(st.integers(MIN_SEGMENT_ROWS, 300), min_size=1, max_size=5), st.integers(0, 2**31))
 def test_a_regression_that_holds_in_every_row_holds_in_every_octave(lengths, seed):
     """A window multiplies both sides alike: f = 5 x - 2 y leaves nothing, whatever the gaps, offsets and slopes."""
     rng = np.random.default_rng(seed)
@@ -133,14 +132,16 @@ def test_octaves_alone():
 def test_rows_are_cut_at_gaps_and_at_the_ends_of_contacts():
     rows = np.r_[np.arange(10, 60), np.arange(80, 120), np.arange(120, 150)]
     spans = np.r_[np.zeros(90, int), np.ones(30, int)]
-    assert [(s.first, s.last) for s in segments_of(rows, spans)] == [(0, 50), (50, 90), (90, 120)]
+    assert [(s.first, s.last) for s in split_segments(rows, spans)] == [(0, 50), (50, 90), (90, 120)]
 
 
 def test_rows_that_are_two_samples_apart_have_no_gap():
-    assert segments_of(np.arange(0, 100, 2), np.zeros(50, int)) == [Segment(0, 50)]
+    assert split_segments(np.arange(0, 100, 2), np.zeros(50, int)) == [Segment(0, 50)]
 
 
 def test_a_piece_too_short_for_a_block_is_left_out():
-    rows = np.r_[np.arange(0, SHORTEST - 1), np.arange(100, 100 + SHORTEST)]
-    assert segments_of(rows, np.zeros(len(rows), int)) == [Segment(SHORTEST - 1, 2 * SHORTEST - 1)]
-    assert segments_of(np.empty(0, int), np.empty(0, int)) == []
+    rows = np.r_[np.arange(0, MIN_SEGMENT_ROWS - 1), np.arange(100, 100 + MIN_SEGMENT_ROWS)]
+    assert split_segments(rows, np.zeros(len(rows), int)) == [
+        Segment(MIN_SEGMENT_ROWS - 1, 2 * MIN_SEGMENT_ROWS - 1)
+    ]
+    assert split_segments(np.empty(0, int), np.empty(0, int)) == []

@@ -120,7 +120,7 @@ def test_one_log_is_no_pool():
     assert own.parameter.value is None
     assert own.parameter.verdict is Verdict.NOT_IDENTIFIABLE
     assert own.prediction95 is None
-    assert not pool([found(100, 4), None]).found
+    assert not pool([found(100, 4), None]).identified
 
 
 def test_nothing_found_is_nothing_pooled():

@@ -11,7 +11,7 @@ STEP = 1 / 12
 """Of the grid that the instants of 480 samples a second fall on, between 1000 rows a second [rows]."""
 
 
-def held(instants, samples, count):
+def estimate_with_fixed(instants, samples, count):
     """What `count` rows show of samples that came out at these instants: each row the last one until then."""
     shown = np.searchsorted(instants, np.arange(count), side="right") - 1
     return samples[shown]
@@ -45,7 +45,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
     instants = grid(period, phase * period, count)
     # Where a sample comes out at the very instant of a row, rounding decides which row shows it.
     assume(np.abs(instants - np.round(instants)).min() > 1e-7)
-    values = held(instants, noisy(seed, len(instants)), count)
+    values = estimate_with_fixed(instants, noisy(seed, len(instants)), count)
     found = sample_clock_of(values)
     inside = instants[instants > 0]
     wanted, rows = rows_of(inside), found.rows[found.instants > 0]
@@ -66,7 +66,7 @@ def test_any_even_grid_is_recovered(period, phase, seed):
 def test_the_spread_holds_the_true_phase(phase, seed):
     """480 in 1000: within a twelfth of a row, wherever the clock stands, and no nearer."""
     instants = grid(25 / 12, phase * 25 / 12, 2000)
-    found = sample_clock_of(held(instants, noisy(seed, len(instants)), 2000))
+    found = sample_clock_of(estimate_with_fixed(instants, noisy(seed, len(instants)), 2000))
     place = np.searchsorted(found.rows, rows_of(instants[5:-5]))
     error = found.instants[place] - instants[5:-5]
     assert found.spread == pytest.approx(STEP / np.sqrt(12), rel=1e-3)
@@ -80,7 +80,7 @@ def test_at_its_rate():
     for seed in range(40):
         phase = np.random.default_rng([seed, 1]).uniform(0, 25 / 12)
         instants = grid(25 / 12, phase, 500)
-        found = sample_clock_of(held(instants, noisy(seed, len(instants)), 500))
+        found = sample_clock_of(estimate_with_fixed(instants, noisy(seed, len(instants)), 500))
         place = np.searchsorted(found.rows, rows_of(instants[5]))
         errors.append(found.instants[place] - instants[5])
         spreads.append(found.spread)
@@ -101,7 +101,7 @@ def test_samples_that_equal_the_one_before_are_there_all_the_same(period, phase,
     samples = noisy(seed, len(instants))
     for k in np.flatnonzero(rng.uniform(size=len(samples)) < share):
         samples[k] = samples[k - 1]
-    values = held(instants, samples, 2000)
+    values = estimate_with_fixed(instants, samples, 2000)
     found = sample_clock_of(values)
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     np.testing.assert_array_equal(found.rows[place], rows_of(instants[3:-3]))
@@ -115,7 +115,7 @@ def test_a_sensor_that_rests_for_long_is_followed_through():
     samples = noisy(3, len(instants))
     moving = (np.arange(len(samples)) // 60) % 2 == 0
     samples = np.where(moving, samples, np.repeat(samples[::60], 60)[: len(samples)])
-    found = sample_clock_of(held(instants, samples, 3000))
+    found = sample_clock_of(estimate_with_fixed(instants, samples, 3000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
 
@@ -125,7 +125,7 @@ def test_a_clock_that_is_off_by_parts_in_a_million_is_not_taken_for_the_nominal_
     """Over 20 s, 0.2 per mille is four rows; every sample is found, and far nearer than the row it shows in."""
     period = 25 / 12 * (1 + drift)
     instants = grid(period, 0.3, 20_000)
-    found = sample_clock_of(held(instants, noisy(4, len(instants)), 20_000))
+    found = sample_clock_of(estimate_with_fixed(instants, noisy(4, len(instants)), 20_000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert found.period == pytest.approx(period, abs=1e-6)
     # The rows that a drifting grid passes leave less than STEP open.
@@ -138,7 +138,7 @@ def test_a_clock_that_is_off_by_parts_in_a_million_is_not_taken_for_the_nominal_
 def test_a_clock_in_step_with_the_rows_but_for_a_few(nominal, slips):
     """A sample more or less every some seconds: near 2 rows, one kind looks nearly like the other."""
     instants = grid(nominal * (1 + slips / 20_000), 0.3, 20_000)
-    found = sample_clock_of(held(instants, noisy(4, len(instants)), 20_000))
+    found = sample_clock_of(estimate_with_fixed(instants, noisy(4, len(instants)), 20_000))
     own = instants[3:-3]
     place = np.searchsorted(found.rows, rows_of(own))
     np.testing.assert_array_equal(found.rows[place], rows_of(own))
@@ -154,7 +154,7 @@ def test_a_clock_without_an_even_beat_leaves_each_sample_half_a_row_before_it_sh
     rng = np.random.default_rng(5)
     instants = np.cumsum(25 / 12 + rng.uniform(-0.6, 0.6, 900))
     samples = noisy(6, 900)
-    values = held(np.r_[-1.0, instants], np.r_[0.0, samples], 1800)
+    values = estimate_with_fixed(np.r_[-1.0, instants], np.r_[0.0, samples], 1800)
     found = sample_clock_of(values)
     own = np.intersect1d(found.rows, rows_of(instants), return_indices=True)
     assert len(own[0]) >= 860  # two samples within one row are one change
@@ -173,7 +173,7 @@ def test_a_channel_as_fast_as_the_log_is_fresh_in_every_row(period, repeated):
     samples = noisy(7, len(instants))
     for k in np.flatnonzero(rng.uniform(size=len(samples)) < repeated):
         samples[k] = samples[k - 1]
-    found = sample_clock_of(held(instants, samples, 500))
+    found = sample_clock_of(estimate_with_fixed(instants, samples, 500))
     np.testing.assert_array_equal(found.rows, np.arange(500))
     np.testing.assert_array_equal(found.instants, np.arange(500.0))
     assert (found.spread, found.period) == (0.0, 1.0)
@@ -191,7 +191,7 @@ def test_what_hardly_ever_changes_has_no_grid_of_its_own(changes, first):
 @pytest.mark.parametrize("period", [60.0, 100.3, 1000.7])
 def test_a_sensor_a_hundred_times_slower_than_the_log(period):
     instants = grid(period, 0.3, 20_000)
-    found = sample_clock_of(held(instants, noisy(9, len(instants)), 20_000))
+    found = sample_clock_of(estimate_with_fixed(instants, noisy(9, len(instants)), 20_000))
     own = instants[instants > 0]
     place = np.searchsorted(found.rows, rows_of(own))
     assert np.abs(found.instants[place] - own).max() <= 0.5
@@ -203,14 +203,14 @@ def test_a_lone_change_long_before_all_others_does_not_hide_them():
     samples = noisy(10, len(instants))
     samples[: len(samples) * 9 // 10] = 0.0
     samples[3:] += 1.0
-    found = sample_clock_of(held(instants, samples, 60_000))
+    found = sample_clock_of(estimate_with_fixed(instants, samples, 60_000))
     place = np.searchsorted(found.rows, rows_of(instants[3:-3]))
     assert np.abs(found.instants[place] - instants[3:-3]).max() <= STEP
 
 
 def test_the_readings_alone_count_not_their_size():
     instants = grid(25 / 12, 0.7, 1000)
-    values = held(instants, noisy(8, len(instants)), 1000)
+    values = estimate_with_fixed(instants, noisy(8, len(instants)), 1000)
     one, other = sample_clock_of(values), sample_clock_of(-1e-3 * values + 50)
     np.testing.assert_array_equal(one.instants, other.instants)
     np.testing.assert_array_equal(one.rows, other.rows)

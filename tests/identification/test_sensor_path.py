@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palpate.identification.filters import NOISELESS, Chain, PositionNoise, SensorPath
+from palpate.identification.filters import Chain, SensorPath
 from palpate.signals.low_pass import LowPass
+from palpate.signals.position_noise import NOISELESS, PositionNoise
 
 DT = 1e-3
 SENSOR = LowPass(((3, 120.0),))

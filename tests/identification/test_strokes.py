@@ -5,14 +5,14 @@ import pytest
 
 from identification.synthetic_contacts import record
 from palpate.identification.sampling import channels_of
-from palpate.identification.strokes import strokes_of, turns_of
+from palpate.identification.strokes import find_strokes, find_turns
 
 TIME = np.arange(5000) / 1000
 REST_AND_PRESS = np.interp(TIME, [0.0, 0.5, 1.5, 3.0, 5.0], [0.0, 0.3e-3, 0.3e-3, 2e-3, 0.0])
 
 
 def strokes(position):
-    return strokes_of(channels_of(record(TIME, position, 3000 * position)))
+    return find_strokes(channels_of(record(TIME, position, 3000 * position)))
 
 
 def test_a_stroke_begins_where_the_probe_last_rested():
@@ -34,5 +34,5 @@ def test_a_shaken_position_has_none(frequency):
 
 def test_turns_are_the_extremes_further_apart_than_a_way():
     position = np.array([0.0, 3.0, 2.5, 5.0, 1.0, 4.0])
-    assert turns_of(position, 1.0) == [0, 3, 4, 5]
-    assert turns_of(position, 0.3) == [0, 1, 2, 3, 4, 5]
+    assert find_turns(position, 1.0) == [0, 3, 4, 5]
+    assert find_turns(position, 0.3) == [0, 1, 2, 3, 4, 5]

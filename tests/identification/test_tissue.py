@@ -11,9 +11,9 @@ import pytest
 from identification.problems import problem
 from identification.synthetic_contacts import press_path, record
 from palpate.identification import Verdict, identify
-from palpate.identification.evidence import evidence_of, stiffness_of
 from palpate.identification.models import Motion
 from palpate.identification.options import Options
+from palpate.identification.press import gather_evidence, stiffness_at_point
 
 TIME = np.arange(4000) / 1000
 NAME = "quasi-linear-viscoelastic"
@@ -89,11 +89,11 @@ def test_a_power_of_the_depth_is_refused_where_no_surface_is_seen():
 @pytest.mark.parametrize("source", ["octave", "press"])
 def test_half_the_force_shows_half_the_stiffness(source):
     own = problem(tissue(TIME, once))
-    point = evidence_of(own, Options.of(), "N/m")[2]
+    point = gather_evidence(own, Options.of(), "N/m")[2]
     assert point is not None
     point = replace(point, source=source)
     own = own.with_touches if source == "press" else own
-    whole, half = (stiffness_of(own, share * own.force, point) for share in (1.0, 0.5))
+    whole, half = (stiffness_at_point(own, share * own.force, point) for share in (1.0, 0.5))
     assert half == pytest.approx(whole / 2, rel=1e-9)
 
 

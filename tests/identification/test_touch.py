@@ -6,7 +6,7 @@ from palpate.identification.contacts import Contacts
 from palpate.identification.filters import Chain
 from palpate.identification.models import Motion
 from palpate.identification.options import Lag
-from palpate.identification.problem import Memory, Problem, touching
+from palpate.identification.problem import Memory, Problem, with_rows_before_touch
 
 FORCE = np.arange(200.0)
 USABLE = np.ones(200, bool)
@@ -16,7 +16,7 @@ def touches(rows, spans, begins, resting=0.0, usable=USABLE):
     motion = Motion(Chain(20.0, 1e-3), np.zeros(200), rows, bonded=False)
     contacts = Contacts((), False, 1.0, 1.0, resting, 0.0, ())
     problem = Problem(motion, FORCE[rows], spans, Lag(0.0), (), 0.0, contacts)
-    return touching(problem, Memory(FORCE, usable, begins, 20))
+    return with_rows_before_touch(problem, Memory(FORCE, usable, begins, 20))
 
 
 def test_rows_reach_back_before_each_touch():

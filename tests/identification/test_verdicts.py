@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -64,27 +65,6 @@ def test_a_mass_below_zero_leaves_a_damping_that_is_as_wide_as_that_force(twiste
     assert next(iter(found["B"].budget)) == "missing force"
 
 
-def test_a_falling_branch_is_not_turned_into_a_stiffness():
-    """Cut out of a bistable structure's log: one axis has no way to pin a sign."""
-    x = 1e-3 * np.sin(2 * np.pi * 1.3 * TIME) + 2e-4 * np.sin(2 * np.pi * 9 * TIME)
-    found = identify(record(TIME, x, 20 - 7500 * x + noise(0.05)), lag=0.0)
-    assert "K" not in identified(found)
-    point = found.working_point
-    assert point is None or point.stiffness.value is None or point.stiffness.value < 0 or (
-        point.stiffness.verdict is not Verdict.IDENTIFIED
-    )  # fmt: skip
-
-
-def test_a_lag_that_nobody_calibrated_keeps_damping_of_a_slow_sine_from_being_identified():
-    omega = 2 * np.pi
-    x = 1e-3 * np.sin(omega * TIME)
-    force = 10 + 5000 * x + 40e-3 * omega * np.cos(omega * TIME) + noise(0.02)
-    found = identify(record(TIME, x, force), bonded=True, model="kelvin-voigt")
-    assert "B" not in identified(found)
-    assert found.lag.kind == "prior"
-    assert "lag" in found.parameters["B"].budget
-
-
 def test_a_step_made_within_contact_identifies_nothing_of_what_rests():
     """The position never moves while it counts: whatever is dropped has no small deviation."""
     x = np.where(TIME < 2.0, 1e-3, 1.0001e-3)
@@ -137,7 +117,12 @@ def test_a_lag_that_is_none_is_an_error_of_one_line(bad):
 
 
 LOG = pressed(noise=0.02, n=2500)
-PLAIN = identify(LOG, lag=0.0)
+
+
+@cache
+def plain():
+    """The log as it is, identified by the first test that compares with it."""
+    return identify(LOG, lag=0.0)
 
 
 def same(one, other, scales):
@@ -155,20 +140,20 @@ def same(one, other, scales):
 def test_a_force_in_another_unit_scales_every_parameter(size):
     c = 10.0**size
     found = identify(record(LOG["time"], LOG["position"], c * LOG["force"]), lag=0.0)
-    same(PLAIN, found, dict.fromkeys("KBM", c))
+    same(plain(), found, dict.fromkeys("KBM", c))
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.floats(-2, 2), st.floats(-1e4, 1e4))
 def test_where_position_and_clock_begin_does_not_count(origin, clock):
     found = identify(record(LOG["time"] + clock, LOG["position"] + origin, LOG["force"]), lag=0.0)
-    same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+    same(plain(), found, dict.fromkeys("KBM", 1.0))
 
 
 @pytest.mark.parametrize(("force", "position"), [(-1, 1), (1, -1), (-1, -1)])
 def test_channels_that_count_the_other_way_say_the_same(force, position):
     found = identify(record(LOG["time"], position * LOG["position"], force * LOG["force"]), lag=0.0)
-    same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+    same(plain(), found, dict.fromkeys("KBM", 1.0))
     assert ("force-sign-reversed" in found.codes) == (force < 0)
     assert ("position-sign-reversed" in found.codes) == (position < 0)
 
@@ -177,7 +162,7 @@ def test_channels_that_count_the_other_way_say_the_same(force, position):
 def test_a_force_sign_that_is_told_is_kept_or_contradicted(told):
     found = identify(LOG, lag=0.0, force_sign=told)
     if told == 1:
-        same(PLAIN, found, dict.fromkeys("KBM", 1.0))
+        same(plain(), found, dict.fromkeys("KBM", 1.0))
     else:
         assert "K" not in identified(found)
 
@@ -187,27 +172,34 @@ NUMBER = (int, float)
 
 def test_the_json_is_the_contract():
     """One object of plain values: every key there, of its type."""
-    said = json.loads(json.dumps(PLAIN.to_json()))
+    said = json.loads(json.dumps(plain().to_json()))
     assert {
         "model", "parameters", "contacts", "lag_s", "fit", "warnings", "working_point", "dynamic_stiffness",
         "press", "models", "options",
     } <= set(said)  # fmt: skip
     for p in said["parameters"].values():
-        assert set(p) == {
-            "value", "std", "ci95", "ci95_if_model_holds", "budget", "unit", "verdict", "reason"
-        }  # fmt: skip
+        assert set(p) == {"value", "std", "ci95", "budget", "unit", "verdict", "reason"}
         assert p["verdict"] in {"identified", "not identifiable", "rejected"}
         assert p["reason"]
         assert all(isinstance(half, NUMBER) and half >= 0 for half in p["budget"].values())
         assert list(p["budget"].values()) == sorted(p["budget"].values(), reverse=True)
-        for interval in (p["ci95"], p["ci95_if_model_holds"]):
-            assert interval is None or interval[0] <= interval[1]
+        assert p["ci95"] is None or p["ci95"][0] <= p["ci95"][1]
         if p["verdict"] == "identified":
             assert p["ci95"][0] < p["value"] < p["ci95"][1]
             assert p["ci95"][1] - p["value"] <= 0.25 * abs(p["value"]) * (1 + 1e-9)
     assert all(set(span) == {"start_s", "end_s"} for span in said["contacts"])
     assert set(said["fit"]) == {"r2", "rmse_N", "n"}
     assert all(set(w) == {"code", "text"} for w in said["warnings"])
+    point = said["working_point"]
+    assert set(point) == {"stiffness", "force_N", "depth_m", "frequency_Hz", "source", "each"}
+    assert set(point["stiffness"]) == set(said["parameters"]["K"]) | {"prediction95"}
+    assert point["source"] in {"octave", "press"}
+    octaves = {"Hz", "storage", "storage_half", "loss", "loss_half", "blocks"}
+    assert all(set(octave) == octaves for octave in said["dynamic_stiffness"])
+    assert set(said["press"]) == {"tangent", "hysteresis_loss", "relaxation"}
+    assert all(set(slope) == {"force_N", "stiffness", "half"} for slope in said["press"]["tangent"])
+    assert all({"model", "r2", "note"} <= set(compared) for compared in said["models"])
+    assert [compared["model"] for compared in said["models"] if compared["chosen"]] == [said["model"]]
     assert said["options"]["tolerance"] == 0.25
     assert said["lag_s"] is None
 

@@ -9,31 +9,22 @@ import palpate.identifiers as room
 from palpate.errors import InputError
 from palpate.identifiers import (
     ContactIdentifier,
-    Directional,
     Exponential,
-    KalmanFilter,
     NeuralProbe,
     RecursiveLeastSquares,
     RestartingLeastSquares,
     SIFt,
 )
-from palpate_checks import identifiers as laws
-from palpate_checks.identifiers import NOISE, TRUTH, answers
-from palpate_checks.identifiers import foam as press
+from palpate.testing import identifiers as laws
+from palpate.testing.identifiers import NOISE, TRUTH, answers
+from palpate.testing.identifiers import foam as press
 
 START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])
 NAMES = ("M", "B", "K")
 MAKERS = {
     "least squares": lambda start=START, P=VAGUE: RecursiveLeastSquares(start, P, names=NAMES),
     "exponential": lambda start=START, P=VAGUE: RecursiveLeastSquares(start, P, Exponential(0.995), NAMES),
-    "directional": lambda start=START, P=VAGUE: RecursiveLeastSquares(start, P, Directional(0.99), NAMES),
     "SIFt": lambda start=START, P=VAGUE: RecursiveLeastSquares(start, P, SIFt(0.99), NAMES),
-    "Kalman": lambda start=START, P=VAGUE: KalmanFilter(
-        start, P, 1e-5 * np.sqrt(np.abs(np.diag(P))), noise=NOISE, names=NAMES
-    ),
-    "Kalman, noise unknown": lambda start=START, P=VAGUE: KalmanFilter(
-        start, P, 1e-5 * np.sqrt(np.abs(np.diag(P))), names=NAMES
-    ),
     "restarting": lambda start=START, P=VAGUE: RestartingLeastSquares(start, P, names=NAMES),
     "network": lambda: NeuralProbe.thesis("foam"),
 }
@@ -127,25 +118,6 @@ def test_the_covariance_stays_one_through_any_rest(make, rest):
             assert np.isfinite(answers(estimator)).all()
     estimator.update_many(phi, force)
     assert estimator.theta[2] == pytest.approx(TRUTH[2], rel=0.05)
-
-
-@linear
-def test_without_forgetting_it_is_the_batch_solution(make):
-    """Each with its memory as long as it can be."""
-    kind, phi_force = make(), press(400)
-    phi, force = phi_force
-    if isinstance(kind, KalmanFilter):
-        estimator, r = KalmanFilter(START, VAGUE, np.zeros(3), noise=0.7), 0.49
-    else:
-        estimator, r = type(kind)(START, VAGUE), 1.0
-    estimator.update_many(phi, force)
-    # On the square root, which keeps the digits that the normal equations lose.
-    design = np.vstack([phi / np.sqrt(r), np.diag(1.0 / np.sqrt(np.diag(VAGUE)))])
-    right = np.concatenate([force / np.sqrt(r), np.zeros(3)])
-    Q, R = np.linalg.qr(design)
-    inverse = np.linalg.inv(R)
-    np.testing.assert_allclose(estimator.theta, inverse @ (Q.T @ right), rtol=1e-9)
-    np.testing.assert_allclose(estimator.covariance, inverse @ inverse.T, rtol=1e-7)
 
 
 @linear

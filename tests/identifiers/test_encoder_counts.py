@@ -20,6 +20,12 @@ def found(made):
     return one.estimate()
 
 
+def assert_stiffness_within_bounds(estimate, made):
+    low, high = made.truth["K"]
+    half = 1.96 * float(estimate.std[2])
+    assert low - 1.5 * half < estimate.theta[2] < high + 1.5 * half
+
+
 @pytest.mark.parametrize("sensor", ["each tick", "480 Hz"])
 @pytest.mark.parametrize("position", ["exact", "counts 2", "counts 10"])
 @pytest.mark.parametrize("surface", ["spring-damper", "mass"])
@@ -29,9 +35,7 @@ def test_its_stiffness_is_known(surface, position, sensor):
         estimate = found(made)
         assert not estimate.rejected
         assert estimate.verdicts()["K"] == "identified"
-        low, high = made.truth["K"]
-        half = 1.96 * float(estimate.std[2])
-        assert low - 1.5 * half < estimate.theta[2] < high + 1.5 * half
+        assert_stiffness_within_bounds(estimate, made)
 
 
 @pytest.mark.parametrize("sensor", ["each tick", "480 Hz"])
@@ -41,9 +45,7 @@ def test_white_noise_of_the_position_rejects_nothing_and_bounds_hold(surface, se
         made = stream(seed, surface, "white 3", sensor)
         estimate = found(made)
         assert not estimate.rejected
-        low, high = made.truth["K"]
-        half = 1.96 * float(estimate.std[2])
-        assert low - 1.5 * half < estimate.theta[2] < high + 1.5 * half
+        assert_stiffness_within_bounds(estimate, made)
 
 
 def test_a_change_of_the_surface_is_found_and_the_rest_identified():

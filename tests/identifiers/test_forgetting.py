@@ -4,19 +4,13 @@ import numpy as np
 import pytest
 
 from palpate.errors import InputError
-from palpate.identifiers import Directional, Exponential, RecursiveLeastSquares, SIFt
+from palpate.identifiers import Exponential, RecursiveLeastSquares, SIFt
 
 KEEP = 0.97
 
 
 def exponential(information, phi, variances):
     return KEEP * information
-
-
-def directional(information, phi, variances):
-    """The information on the force that is foretold, 1 / phi^T P phi, shrinks to `KEEP` of it (Kulhavy)."""
-    known = 1.0 / (phi @ np.linalg.inv(information) @ phi)
-    return information - (1.0 - KEEP) * known * np.outer(phi, phi)
 
 
 def subspace(information, phi, variances):
@@ -29,7 +23,6 @@ def subspace(information, phi, variances):
 
 POLICIES = {
     "exponential": (Exponential(KEEP), exponential),
-    "directional": (Directional(KEEP), directional),
     "SIFt": (SIFt(KEEP), subspace),
 }
 
@@ -45,7 +38,7 @@ def samples(n, count, seed=0):
     [
         *((3, name) for name in POLICIES),
         (4, "exponential"),  # each policy is compiled again for a fourth parameter
-        *(pytest.param(4, name, marks=pytest.mark.long) for name in ("directional", "SIFt")),
+        pytest.param(4, "SIFt", marks=pytest.mark.long),
     ],
 )
 def test_it_is_its_definition(n, name):
@@ -63,9 +56,7 @@ def test_it_is_its_definition(n, name):
     np.testing.assert_allclose(estimator.covariance, np.linalg.inv(information), rtol=1e-5, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "kind", [Exponential, *(pytest.param(k, marks=pytest.mark.long) for k in (Directional, SIFt))]
-)
+@pytest.mark.parametrize("kind", [Exponential, pytest.param(SIFt, marks=pytest.mark.long)])
 def test_forgetting_nothing_is_no_policy_at_all(kind):
     phi, y = samples(3, 200)
     plain = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3))
@@ -103,11 +94,10 @@ def test_a_sample_that_says_too_little_is_left_out():
     assert estimator.theta[1] > 1.0
 
 
-@pytest.mark.parametrize("kind", [Directional, SIFt])
-def test_what_is_not_excited_is_remembered(kind):
-    """Exponential forgetting loses it; these two keep its value and how well it is known."""
+def test_what_is_not_excited_is_remembered():
+    """Exponential forgetting loses it; SIFt keeps its value and how well it is known."""
     phi, y = samples(3, 500)
-    estimator = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3), kind(KEEP))
+    estimator = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3), SIFt(KEEP))
     estimator.update_many(phi, y)
     known = estimator.theta, estimator.covariance
     still = np.tile([1.0, 0.0, 0.0], (20_000, 1))
@@ -121,7 +111,7 @@ def test_what_is_not_excited_is_remembered(kind):
     assert np.all(np.diag(exponential.covariance)[1:] > 1e3)
 
 
-@pytest.mark.parametrize("kind", [Exponential, Directional, SIFt])
+@pytest.mark.parametrize("kind", [Exponential, SIFt])
 def test_a_surface_that_changes_is_followed(kind):
     phi, y = samples(3, 3000)
     estimator = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3), kind(KEEP))
@@ -178,7 +168,7 @@ class WhenLarge(NamedTuple):
 """
 
 
-@pytest.mark.parametrize("kind", [Exponential, Directional, SIFt])
+@pytest.mark.parametrize("kind", [Exponential, SIFt])
 @pytest.mark.parametrize("keep", [0.0, 1.2, -0.5, np.nan])
 def test_a_factor_that_is_none_is_refused(kind, keep):
     with pytest.raises(InputError, match=r"forgetting must be in \(0, 1\]"):

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from palpate.errors import InputError
 from palpate.identifiers import (
     ContactIdentifier,
-    Directional,
     Exponential,
-    KalmanFilter,
     RecursiveLeastSquares,
     RestartingLeastSquares,
     SIFt,
@@ -19,9 +18,7 @@ START, VAGUE = np.zeros(3), np.diag([1e2, 1e6, 1e10])
 TRUTH = np.array([0.3, 60.0, 5200.0])
 MAKERS = {
     "exponential": lambda: RecursiveLeastSquares(START, VAGUE, Exponential(0.998)),
-    "directional": lambda: RecursiveLeastSquares(START, VAGUE, Directional(0.994)),
     "SIFt": lambda: RecursiveLeastSquares(START, VAGUE, SIFt(0.994)),
-    "Kalman": lambda: KalmanFilter(START, VAGUE, [0.0, 30.0, 0.1]),
     "restarting": lambda: RestartingLeastSquares(START, VAGUE),
 }
 
@@ -40,6 +37,24 @@ def test_regressors_of_any_size_leave_an_estimator_alive(make):
             assert np.isfinite(found.theta).all()
             assert np.isfinite(found.covariance).all()
             assert (np.diag(found.covariance) >= 0.0).all()
+
+
+@pytest.mark.parametrize("variance", [1e-60, 1e60])
+def test_the_smallest_and_the_largest_covariance_leave_an_estimator_finite(variance):
+    random, P = np.random.default_rng(5), variance * np.eye(3)
+    for one in (RecursiveLeastSquares(START, P), RestartingLeastSquares(START, P)):
+        for scale in (1.0, 1e-20, 1e28, 1.0):
+            one.update_many(scale * random.normal(size=(20, 3)), scale * random.normal(size=20))
+            found = one.estimate()
+            assert np.isfinite(found.theta).all()
+            assert np.isfinite(found.covariance).all()
+
+
+def test_numbers_that_no_filter_has_are_refused():
+    for bad in (np.nan, np.inf, -1.0, "1", None, 1e200, 1j):
+        for arguments in ({"memory": bad}, {"evidence": bad}, {"forgetting": bad}):
+            with pytest.raises(InputError):
+                RestartingLeastSquares(START, VAGUE, **arguments)
 
 
 @pytest.mark.parametrize("touch", [None, 0.0, 3.0])

@@ -210,18 +210,6 @@ def test_zeros_teach_nothing(make):
     np.testing.assert_array_equal(after.covariance, before.covariance)
 
 
-def test_no_variance_is_below_zero_however_long_nothing_moves():
-    """Rest at one place is where differences of covariances lose their sign; a root has none to lose."""
-    estimator = pressed(RestartingLeastSquares)
-    phi = np.tile([0.0, 1e-2, 1.0], (200_000, 1))
-    random = np.random.default_rng(12)
-    for _ in range(5):
-        estimator.update_many(phi, 70.0 + random.normal(0.0, NOISE, len(phi)))
-        C = estimator.estimate().covariance
-        std = np.sqrt(np.diag(C))
-        assert np.linalg.eigvalsh(C / np.outer(std, std))[0] > -1e-12
-
-
 def test_two_threads_share_an_estimator_with_a_lock():
     """An estimator belongs to one thread at a time: behind a lock no sample is lost."""
     from threading import Lock, Thread

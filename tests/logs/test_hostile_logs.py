@@ -19,13 +19,14 @@ import pytest
 from scipy.io import savemat
 
 from logs.ros_bags import storage, wrench, write_bag
+from palpate.cli import main
 from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
 from palpate.logs import read_log, read_record
+from palpate.logs.bags import Bag
 from palpate.logs.formats import kind_of
 from palpate.logs.listing import list_log
 from palpate.logs.read import measured_by
-from palpate_bags import Bag
 
 T = np.arange(50) / 100
 COLUMNS = {"time": "t", "position": "x", "force": "f"}
@@ -316,3 +317,13 @@ def test_little_memory_is_a_line(tmp_path, limit, words):
     assert done.returncode == 2
     assert words in done.stderr.decode()
     assert done.stderr.count(b"\n") == 1
+
+
+def test_a_position_as_large_as_a_number_can_be(tmp_path, capsys):
+    """A byte that is spoiled makes one reading of 1e307: a multiple of it is no number any more."""
+    rows = [f"{k / 1000:.3f},{k % 7 / 10},{k % 7}" for k in range(200)]
+    rows[150] = "0.150,-1.6e307,3"
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,position_mm,force_N\n" + "\n".join(rows) + "\n")
+    assert main(["topics", str(log)]) == 0
+    assert "position_mm" in capsys.readouterr().out

@@ -13,7 +13,7 @@ from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs import read_log
 from palpate.logs.listing import list_log
-from palpate.report.identification.words import sha256_of
+from palpate.report.identification.words import file_digest
 
 RNG = np.random.default_rng(5)
 T = np.arange(400) / 100
@@ -40,7 +40,7 @@ def test_equal_sheets_are_proposed_as_a_pool_and_identified_as_one(book, capsys)
     assert main([*words[1:], "--json", "--no-figure"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert [one["file"] for one in found["files"]] == [f"{book}/Specimen {k}" for k in range(1, 6)]
-    assert {one["sha256"] for one in found["files"]} == {sha256_of(book)}
+    assert {one["sha256"] for one in found["files"]} == {file_digest(book)}
 
 
 def test_one_sheet_of_a_book_is_a_log(book):

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import gzip
-import sys
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -133,7 +132,7 @@ def test_a_unit_in_the_name_is_taken_and_said(tmp_path):
     log = write(tmp_path / "a.csv", rows(), header="t,x_mm,f_mN")
     record = read_log(log, time="t", position="x_mm", force="f_mN")
     assert record["force"][1] == pytest.approx(0.01)
-    assert {note["code"] for note in record.meta["notes"]} == {"unit-guess"}
+    assert {note["code"] for note in record.meta["notes"]} == {"unit-stated"}
 
 
 CLOCKS = {
@@ -263,13 +262,3 @@ def test_a_column_that_is_there_twice_must_be_named_by_number(tmp_path):
     with pytest.raises(InputError, match=r"2 columns named 'f'.*1, 2"):
         read_log(log, time="t", position="f:mm", force="f:mN")
     assert len(read_log(log, time="t", position="1:mm", force="2:mN")) == 30
-
-
-def test_without_its_reader_a_bag_names_its_extra(tmp_path, monkeypatch):
-    path = tmp_path / "log.mcap"
-    path.write_bytes(b"\x89MCAP0\r\n")
-    monkeypatch.setitem(sys.modules, "palpate_bags", None)
-    with pytest.raises(
-        InputError, match=r"palpate-bags, which is not installed: pip install 'palpate\[bags\]'"
-    ):
-        read_log(path, force="/ft.wrench.force.z", position="/pose.pose.position.z")

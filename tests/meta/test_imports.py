@@ -1,5 +1,6 @@
 """The rooms, as the contract of `make lint` and CONTRIBUTING have them."""
 
+import ast
 import re
 import tomllib
 
@@ -15,3 +16,16 @@ def test_the_house_is_drawn_as_it_stands(root):
     package = root / "src" / "palpate"
     there = {p.stem for p in package.iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()}
     assert set.union(*layers) == there - {"__init__", "__main__"}
+
+
+def test_machine_code_is_called_through_the_typed_edge_alone(sources):
+    for path, _, tree in sources:
+        names = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        called = {
+            node.func.attr
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+        }
+        if path.parent.name != "_jit":
+            assert not names & {"entry_point", "overloads"}, path
+            assert "compiled" not in called, path

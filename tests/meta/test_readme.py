@@ -12,6 +12,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.cli._program import COMPANIONS, added_commands, program
+from palpate.errors import how_to_install
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -135,7 +136,7 @@ def test_cheap_commands_of_the_readme_run(root, capsys, line):
 
 
 def test_the_log_of_the_readme_is_identified(root, capsys, monkeypatch, tmp_path):
-    (line,) = [line for line in commands(root, "README.md", "palpate") if "identify examples" in line]
+    (line,) = {line for line in commands(root, "README.md", "palpate") if "identify examples" in line}
     words = shlex.split(line)[1:]
     words[1] = str(root / words[1])
     monkeypatch.chdir(tmp_path)
@@ -143,29 +144,129 @@ def test_the_log_of_the_readme_is_identified(root, capsys, monkeypatch, tmp_path
     assert "K" in capsys.readouterr().out
 
 
-def own_address(target):
-    """A link to the project's own sources as its file; the package index has no files beside the README."""
-    source = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["urls"]["Source"]
-    raw = source.replace("github.com", "raw.githubusercontent.com") + "/main/"
-    for base in (f"{source}/blob/main/", raw):
-        if target.startswith(base):
-            return str(ROOT / target.removeprefix(base))
-    return target
-
-
-def test_the_readme_shows_on_the_package_index():
-    """Every link and picture is absolute, and the pictures are few and small."""
+def test_the_readme_shows_in_the_checkout():
+    """Every link and picture is a file beside it, and the pictures are few and small."""
     targets = re.findall(r"\]\(([^)#]+)[^)]*\)", (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert all("://" in target for target in targets), targets
-    pictures = [Path(own_address(t)) for t in targets if t.endswith((".png", ".svg"))]
+    assert not [target for target in targets if "://" in target]
+    pictures = [ROOT / target for target in targets if target.endswith((".png", ".svg"))]
     assert len(pictures) >= 5
     assert sum(path.stat().st_size for path in pictures) < 1_000_000
+
+
+KINDS = {".c", ".css", ".html", ".js", ".md", ".py", ".svg", ".toml", ".yaml", ".yml"}
+
+
+def product_texts():
+    """Text of each tracked file that users get or read, by its path; tests are for developers."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True
+    ).stdout.decode()
+    for name in listed.split("\0"):
+        parts, path = Path(name).parts, ROOT / name
+        if (
+            path.is_file()
+            and path.suffix in {".py", ".md", ".toml", ".html", ".js", ".c", ".svg"}
+            and "tests" not in parts
+        ):
+            yield name, path.read_text(encoding="utf-8")
+
+
+UNPUBLISHED = re.compile(
+    r"(?:github\.com|githubusercontent\.com|gitlab\.com|pypi\.org/project)[/:]palpate\b"
+    r"|palpate\.(?:readthedocs|github)\.io|://(?:www\.|docs\.)?palpate\."
+)
+"""Addresses of palpate's own on the web: none of them is there yet."""
+
+
+def test_no_address_leads_to_what_is_not_published():
+    found = [f"{name}: {match[0]}" for name, text in product_texts() for match in UNPUBLISHED.finditer(text)]
+    assert not found
+
+
+ARGUMENT = r"(?:'[^'\n]+'|\"[^\"\n]+\"|--?[\w-]+|[\w.\[][\w./\[\]-]*)"
+INSTALLED = re.compile(rf"pip install\s+({ARGUMENT}(?: +{ARGUMENT})*)")
+
+
+def folders_of_distributions():
+    """Requirements of palpate's distributions, by the folder that pip is given."""
+    projects = {}
+    for file in [ROOT / "pyproject.toml", *ROOT.glob("packages/*/pyproject.toml")]:
+        folder = "." if file.parent == ROOT else f"./packages/{file.parent.name}"
+        projects[folder] = tomllib.loads(file.read_text(encoding="utf-8"))["project"]
+    return projects
+
+
+def needed_beside(project, folders):
+    """Folders of other distributions that a distribution needs, but for palpate's, in alphabetical order."""
+    names = ["./packages/" + re.split(r"[^\w-]", line)[0] for line in project["dependencies"]]
+    own = {name for name in names if name in folders}
+    return sorted(own.union(*(needed_beside(folders[name], folders) for name in own)))
+
+
+def test_what_is_not_installed_is_named_with_all_that_it_needs():
+    folders = folders_of_distributions()
+    for folder, project in folders.items():
+        words = ["pip", "install", *needed_beside(project, folders), folder]
+        assert how_to_install(project["name"]) == f"{' '.join(words)} in palpate's sources"
+    assert how_to_install("palpate[arms]") == "pip install '.[arms]' in palpate's sources"
+
+
+def test_what_the_product_says_to_install_can_be():
+    """A folder of the checkout, after those that it needs, with an extra that it has; or a library of others."""
+    folders, wrong, count = folders_of_distributions(), [], 0
+    lines = [
+        line
+        for project in folders.values()
+        for extra in [project["dependencies"], *project.get("optional-dependencies", {}).values()]
+        for line in extra
+    ]
+    libraries = {re.match(r"[\w.-]+", line)[0] for line in lines}
+    for name, text in product_texts():
+        for match in INSTALLED.finditer(text):
+            words = [word.strip("'\"") for word in match[1].partition(" in ")[0].split() if word[0] != "-"]
+            before: set[str] = set()
+            for word in words:
+                place, _, extra = word.removesuffix("]").partition("[")
+                place = f"./{place}" if re.match(r"\w+/", place) else place
+                own = folders.get(place)
+                known = own is not None and (not extra or extra in own["optional-dependencies"])
+                ready = known and before.issuperset(needed_beside(own, folders))
+                if not (ready or (word in libraries and not word.startswith("palpate"))):
+                    wrong.append(f"{name}: {match[0]}")
+                before.add(place)
+                count += 1
+    assert not wrong, wrong
+    assert count > 10
+    extras = re.findall(
+        r"how_to_install\(['\"]([\w-]+)\[(\w+)\]['\"]\)", "".join(t for _, t in product_texts())
+    )
+    assert len(extras) > 8
+    for name, extra in extras:
+        assert extra in folders["." if name == "palpate" else f"./packages/{name}"]["optional-dependencies"]
+
+
+WRITES = ("--out", "--report", "--figure", "--table", "--save-options", ">", "export")
+"""Words of a command before the name of what it makes."""
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/tutorial.md"])
+def test_each_file_that_a_command_reads_is_in_the_checkout(root, page):
+    """Or a command above it makes the file."""
+    made, read = set(), []
+    for line in commands(root, page, "palpate"):
+        words = shlex.split(line)[2:]
+        for before, word in zip(["", *words], words, strict=False):
+            if before in WRITES:
+                made.add(word)
+            elif re.search(r"\.[a-z]\w*$|/", word.partition(":")[0]) and not word.startswith("--"):
+                read.append(word)
+                assert word in made or (root / word).exists(), f"{page}: {line}"
+    assert read or page != "README.md"
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(root, page):
     text = (root / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", text):
-        own = own_address(target)
-        if "://" not in own:
-            assert ((root / page).parent / own).exists(), f"{page}: {target}"
+        if "://" not in target:
+            assert ((root / page).parent / target).exists(), f"{page}: {target}"

@@ -25,7 +25,7 @@ def pressed(name, physics, mode="torque", resolution=0.0, nudge=0.0, stiffness=5
     simulated = SimulatedArm(arm, loop, place, cell, physics, 0, resolution)
     simulated._body.q[0] += nudge
     driver = CautiousDriver(simulated, ForceLoop(gains), place.normal)
-    return press(simulated, driver, place, Plan(20.0, seconds, 0.0))
+    return press(simulated, driver, place, Plan(20.0, seconds, 0.0), gains)
 
 
 def difference(one, other, column="force"):

@@ -8,8 +8,8 @@ import pytest
 
 from palpate.errors import InputError
 from palpate.force import load_arm
+from palpate.press.at_rest import check_drift, fitting, noise_and_drift
 from palpate.press.engines import press_gains
-from palpate.press.sequence import check_drift, fitting, noise_and_drift
 
 GAINS = press_gains(load_arm("ur5e"), 20.0)
 TIMES = np.arange(250) / 500.0

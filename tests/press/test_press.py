@@ -11,30 +11,32 @@ import pytest
 
 from palpate import read_log
 from palpate._vector import ZERO3, Mat3
+from palpate.bench.summary import RETREAT
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.force import ForceLoop
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, read_sensor
-from palpate.press.prepare import Question, arm_of, prepare_press, surface_of
-from palpate.press.pressing import press, summarise
+from palpate.press.prepare import PressSpec, arm_of, prepare_press, surface_of
+from palpate.press.pressing import press
 from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.summary import summarise
 from palpate.robots.serial.from_toml import names
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
 
 
 def question(**changes):
-    return Question(**{"arm": "fr3", "force": 20.0, "surface": surface_of("K=5000,B=50"), **changes})
+    return PressSpec(**{"arm": "fr3", "force": 20.0, "surface": surface_of("K=5000,B=50"), **changes})
 
 
 def asked(**changes):
     pressing = prepare_press(question(**changes))
     record = pressing.run()
-    return record, summarise(record, pressing.asked)
+    return record, summarise(record, pressing.request)
 
 
 @pytest.mark.parametrize(
@@ -85,12 +87,12 @@ def test_a_slow_touch_of_a_heavy_tip_is_not_taken_for_a_soft_surface():
 
 
 def test_gains_for_a_tip_without_mass_say_what_to_add(tmp_path):
-    known = prepare_press(question(arm="ur5e", mode="position")).asked.gains
-    assert not any("under [inner]" in note for note in prepare_press(question(arm="ur5e")).asked.notes)
+    known = prepare_press(question(arm="ur5e", mode="position")).request.gains
+    assert not any("under [inner]" in note for note in prepare_press(question(arm="ur5e")).request.notes)
     inner = msgspec.structs.replace(known.arm.inner, mass=None)
     massless = msgspec.structs.replace(known, arm=msgspec.structs.replace(known.arm, inner=inner))
     (tmp_path / "gains.toml").write_text(massless.to_toml())
-    notes = prepare_press(question(arm="ur5e", gains=tmp_path / "gains.toml")).asked.notes
+    notes = prepare_press(question(arm="ur5e", gains=tmp_path / "gains.toml")).request.notes
     assert [note for note in notes if "add mass = M, 3.7 kg here, under [inner]" in note and "\n" not in note]
 
 
@@ -140,7 +142,7 @@ def test_the_folder_and_what_is_printed(tmp_path, capsys):
 
 def simulated(arm="fr3", **changes):
     """A press that is over soon: the arm, its driver, its place."""
-    asked = prepare_press(question(arm=arm)).asked
+    asked = prepare_press(question(arm=arm)).request
     robot = replace(asked.arm, **changes)
     cell = cell_of(robot, asked.place, asked.surface, asked.gains.arm)
     one = SimulatedArm(robot, asked.gains.arm, asked.place, cell)
@@ -148,18 +150,18 @@ def simulated(arm="fr3", **changes):
 
 
 def test_it_ends_at_the_end_of_a_joints_range():
-    home = prepare_press(question()).asked.arm.home
+    home = prepare_press(question()).request.arm.home
     one, driver, place = simulated(lower=home - 1e-4, upper=home + 1e-4)
-    record = press(one, driver, place, Plan(20.0, 1.0))
+    record = press(one, driver, place, Plan(20.0, 1.0), driver.loop.gains)
     assert record.meta["end"] == "joint limit"
     assert "reached the end of its range" in record.meta["why"]
 
 
 def test_it_gives_up_where_there_is_no_surface():
     one, driver, place = simulated()
-    record = press(one, driver, place, Plan(20.0, 1.0, longest=0.05))
+    record = press(one, driver, place, Plan(20.0, 1.0, longest=0.05), driver.loop.gains)
     assert record.meta["end"] == "no contact"
-    assert len(record) == 50
+    assert np.count_nonzero(record["phase"] != RETREAT) == 50
 
 
 def test_an_interrupted_press_keeps_what_there_is():
@@ -169,9 +171,9 @@ def test_an_interrupted_press_keeps_what_there_is():
         if time > 0.3:
             raise KeyboardInterrupt
 
-    record = press(one, driver, place, Plan(20.0, 1.0), progress)
+    record = press(one, driver, place, Plan(20.0, 1.0), driver.loop.gains, progress)
     assert record.meta["end"] == "interrupted"
-    assert len(record) == 400
+    assert np.count_nonzero(record["phase"] != RETREAT) == 400
 
 
 def test_a_commanded_pose_is_reached():
@@ -187,7 +189,7 @@ def test_a_commanded_pose_is_reached():
 
 def test_a_place_and_a_normal_of_ones_own():
     pressing = prepare_press(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
-    place = pressing.asked.place
+    place = pressing.request.place
     assert place.pose[:3, 2] == pytest.approx(np.array([0.3, 0.0, -1.0]) / np.sqrt(1.09), abs=1e-8)
     surface = place.pose[:3, 3] + 0.003 * place.normal
     assert surface == pytest.approx([0.45, 0.1, 0.4], abs=1e-8)
@@ -196,9 +198,9 @@ def test_a_place_and_a_normal_of_ones_own():
 def test_a_users_own_gains(tmp_path):
     pressing = prepare_press(question(force=15.0))
     path = tmp_path / "gains.toml"
-    path.write_text(pressing.asked.gains.to_toml())
+    path.write_text(pressing.request.gains.to_toml())
     again = prepare_press(question(force=15.0, gains=path))
-    assert again.asked.gains == pressing.asked.gains
+    assert again.request.gains == pressing.request.gains
     with pytest.raises(InputError, match="for a torque arm, and --mode says position"):
         prepare_press(question(force=15.0, gains=path, mode="position"))
 
@@ -310,13 +312,13 @@ def test_too_few_joints(tmp_path, capsys):
 def test_without_mujoco_the_extra_is_named(monkeypatch, capsys, tmp_path):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert main([*PLAIN, "--physics", "mujoco", "--out", str(tmp_path / "out")]) == 2
-    assert "palpate[arms]" in capsys.readouterr().err
+    assert "pip install '.[arms]' in palpate's sources" in capsys.readouterr().err
 
 
 def test_a_force_that_the_motors_cannot_give():
     pressing = prepare_press(question(arm="panda"))
     with pytest.raises(InputError, match=r"takes \S+ N m of joint\d, which gives"):
-        check_able(pressing.asked.arm, pressing.asked.place, 0.003, 1000.0)
+        check_able(pressing.request.arm, pressing.request.place, 0.003, 1000.0)
 
 
 #: A user's model: position servos, a gripper, damping, a floor in the way, a keyframe, and no site.
@@ -342,9 +344,10 @@ def test_a_users_own_model(tmp_path, physics):
     path = tmp_path / "cell.xml"
     path.write_text(cell())
     pressing = prepare_press(question(arm=str(path), site="hand", physics=physics, seconds=0.6))
-    assert any("grip" in note for note in pressing.asked.notes)
+    assert any("grip" in note for note in pressing.request.notes)
     record = pressing.run()
-    assert record["force"][-1] == pytest.approx(20.0, abs=1.0)
+    assert record["force"][record["phase"] != RETREAT][-1] == pytest.approx(20.0, abs=1.0)
+    assert record["force"][-1] == 0.0
 
 
 @pytest.mark.long
@@ -352,7 +355,7 @@ def test_only_mujoco_knows_the_damping_of_its_joints(tmp_path):
     path = tmp_path / "cell.xml"
     path.write_text(cell(damping=30.0))
     pressing = prepare_press(question(arm=str(path), site="hand", physics="mujoco", seconds=0.4))
-    assert any("damping" in note for note in pressing.asked.notes)
+    assert any("damping" in note for note in pressing.request.notes)
     damped = pressing.run()
     free = prepare_press(question(arm=str(path), site="hand", seconds=0.4)).run()
     assert damped["x"][1000] < free["x"][1000] - 1e-5  # the approach is slower

@@ -9,10 +9,10 @@ import pytest
 from palpate.cli import main
 from palpate.contact_frame import Payload
 from palpate.errors import InputError
-from palpate.press.prepare import Question, prepare_press, surface_of
-from palpate.press.pressing import summarise
+from palpate.press.prepare import PressSpec, prepare_press, surface_of
 from palpate.press.setting import cell_of, held_tool, with_tool
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.summary import summarise
 from palpate.report.press import notes
 from palpate.robots import SerialArm
 
@@ -29,12 +29,12 @@ def changed(**fields):
 
 def pressing(tool=TOOL, **changes):
     asked = {"arm": "fr3", "force": 20.0, "surface": surface_of("K=5000,B=50"), "normal": (0.0, 0.0, -1.0)}
-    return prepare_press(Question(**{**asked, "payload": tool, "seconds": 4.0, **changes}))
+    return prepare_press(PressSpec(**{**asked, "payload": tool, "seconds": 4.0, **changes}))
 
 
 def simulated(tool, physics="own", arm="ur5e", **changes):
     """An arm in free motion whose sensor has no noise."""
-    asked = pressing(tool, arm=arm, physics=physics, **changes).asked
+    asked = pressing(tool, arm=arm, physics=physics, **changes).request
     cell = cell_of(asked.arm, asked.place, asked.surface, asked.gains.arm, held_tool(tool))
     cell = cell._replace(place=cell.place + 1.0, sensor=cell.sensor._replace(noise=0.0))
     return SimulatedArm(asked.arm, asked.gains.arm, asked.place, cell, physics, resolution=0.0), asked
@@ -103,7 +103,7 @@ def pressed():
 
 def test_it_presses_with_the_force_asked_for_and_the_tools_mass_is_taken_off(pressed):
     press, record = pressed
-    found = summarise(record, press.asked)
+    found = summarise(record, press.request)
     assert found["end"] == "done"
     assert found["force"]["mean_N"] == pytest.approx(20.0, abs=0.1)
     K = found["identified"]["parameters"]["K"]
@@ -142,16 +142,17 @@ def test_a_wrong_sign_is_named_and_mass_and_damping_are_refused(tmp_path, capsys
 
 @pytest.mark.parametrize(("share", "says"), [(0.95, "tare it"), (2.0, "the end of its scale")])
 def test_an_untared_and_a_saturated_sensor_are_refused(share, says):
-    scale = pressing().asked.gains.arm.sensor.full_scale
+    scale = pressing().request.gains.arm.sensor.full_scale
     with pytest.raises(InputError, match=says):
         pressing(changed(bias=(0.0, 0.0, share * scale))).run()
 
 
+@pytest.mark.long
 def test_a_sensor_that_meets_the_end_of_its_scale_under_way_is_named(pressed):
     press, record = pressed
-    scale = press.asked.gains.arm.sensor.full_scale
+    scale = press.request.gains.arm.sensor.full_scale
     shown = np.where(record["force_sampled"] > 19.0, scale - record.meta["tare_N"], record["force_sampled"])
-    summary = summarise(replace(record, columns={**record.columns, "force_sampled": shown}), press.asked)
+    summary = summarise(replace(record, columns={**record.columns, "force_sampled": shown}), press.request)
     assert summary["sensor_saturated"] == pytest.approx(np.mean(record["force_sampled"] > 19.0))
     assert any("sensor was saturated" in note for note in notes(summary))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from palpate.force.guard import BEYOND, DRIFTS, LATE, STALE, SWINGS, TROUBLES
-from palpate.press.sequence import Troubles
+from palpate.press.troubles import Troubles
 
 STANDS, LATELY = TROUBLES[STALE], TROUBLES[LATE]
 

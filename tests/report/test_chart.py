@@ -1,21 +1,27 @@
 """A chart in a figure and in a page: the same lines, levels and marks, over the same axes."""
 
-import base64
-
 import numpy as np
 import pytest
 
-from palpate.report.chart import COLOURS, KNOWN, MOST, Band, Chart, Mark, Series, figure_of, panels
+from palpate.report.chart import (
+    ABSENT,
+    COLOURS,
+    KNOWN,
+    MAX_POINTS,
+    Band,
+    Chart,
+    Mark,
+    Series,
+    build_figure,
+    panels,
+)
 
 T = np.linspace(0.0, 4.0, 40_001)
 
 
 def opened(column):
-    """As the page unpacks it; gaps and places that a line does not have are not numbers."""
-    if isinstance(column, list):
-        return np.array([np.nan if v in ("absent", None) else v for v in column])
-    codes = np.frombuffer(base64.b64decode(column["b"]), "<i2")
-    return np.where(codes < -32700, np.nan, (codes + 32500.0) * column["s"] + column["o"])
+    """As the page reads it; gaps and places that a line does not have are not numbers."""
+    return np.array([np.nan if v in (ABSENT, None) else v for v in column], dtype=float)
 
 
 def force():
@@ -32,11 +38,11 @@ def force():
 
 def test_a_figure_and_a_page_show_the_same():
     chart, below = force(), Chart("depth [mm]", [Series(T, T, "K")], x="time [s]", xlim=(0.0, 3.5), log="y")
-    axis, lower = figure_of([chart, below]).axes
+    axis, lower = build_figure([chart, below]).axes
     shown, under = panels([chart, below])
     spec, columns = shown["spec"], shown["columns"]
     t, true = opened(columns["t"]), opened(columns["c0"])
-    assert len(t) <= 1.1 * MOST
+    assert len(t) <= 1.1 * MAX_POINTS
     assert np.nanmax(true) == pytest.approx(np.max(axis.lines[0].get_ydata()), abs=1e-3)  # its peak is kept
     assert axis.lines[0].get_color() == COLOURS[spec["series"][0]["colour"]]
     assert axis.get_xlim() == pytest.approx((t[0], t[-1]), abs=1e-3)
@@ -58,7 +64,7 @@ def test_charts_in_rows_have_an_axis_each():
     charts = [
         Chart("torque [N m]", [Series(T, k * T, "ink")], x="time [s]", title=f"q{k}") for k in (1, 2, 3, 4)
     ]
-    figure = figure_of(charts, columns=3)
+    figure = build_figure(charts, columns=3)
     assert [axis.get_title(loc="left") for axis in figure.axes] == ["q1", "q2", "q3", "q4"]
     assert all(axis.get_xlabel() == "time [s]" for axis in figure.axes)
 
@@ -67,3 +73,19 @@ def test_gaps_stay_gaps():
     values = np.where((T > 1.0) & (T < 2.0), np.nan, T)
     (shown,) = panels([Chart("force [N]", [Series(T, values, "F")])])
     assert np.isnan(opened(shown["columns"]["c0"])).any()
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e3, -1e-4])
+def test_a_page_has_a_column_to_a_ten_thousandth_of_its_range(offset):
+    y = offset + 1e-3 * np.sin(T[::100])
+    (shown,) = panels([Chart("depth [m]", [Series(T[::100], y, "F")])])
+    assert opened(shown["columns"]["c0"]) == pytest.approx(y, abs=1e-4 * np.ptp(y))
+
+
+def test_a_page_tells_a_gap_from_a_place_that_a_line_lacks():
+    whole, coarse = np.where(T > 3.0, np.nan, T), T[::1000]
+    chart = Chart("force [N]", [Series(T, whole, "F"), Series(coarse, coarse, "measured")])
+    columns = panels([chart])[0]["columns"]
+    assert None in columns["c0"]
+    assert ABSENT in columns["c1"]
+    assert None not in columns["c1"]

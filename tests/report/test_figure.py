@@ -1,4 +1,4 @@
-"""The picture of an identification: its panels, and that it is there whole or not at all."""
+"""The charts of an identification, and its picture: there whole or not at all."""
 
 from dataclasses import replace
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.files import check_place
-from palpate.report.identification.figure import draw, write_figure
+from palpate.report.identification.charts import build_charts, evidence_charts, time_charts
+from palpate.report.identification.page import draw, write_figure
 from palpate.report.identification.words import full_number, sentence
 from palpate.report.style import with_peaks
 from report.outcomes import OUTCOMES
@@ -17,56 +18,73 @@ def found():
     return OUTCOMES["identified"]()
 
 
-def axes_of(figure):
-    return {axis.get_title("left"): axis for axis in figure.axes}
+def by_title(charts):
+    return {chart.title: chart for chart in charts}
 
 
-def quantity_of(axis):
-    """What lies above an axis."""
-    return axis.texts[0].get_text() if axis.texts else ""
+def line_of(chart, label):
+    (line,) = (series for series in chart.series if series.label == label)
+    return line
 
 
 def test_the_panels_and_what_they_measure(found):
     pressed = replace(OUTCOMES["not_identifiable"](), dynamic_stiffness=found.dynamic_stiffness)
-    axes = axes_of(draw(pressed, "press.csv"))
-    labels = {title: (axis.get_xlabel(), quantity_of(axis)) for title, axis in axes.items() if title}
-    assert labels == {
-        "Dynamic stiffness": ("", "storage [kN/m]"),
-        "Press": ("depth from touch [mm]", "force [N]"),
-        "Force": ("", "force [N]"),
-        "Misfit": ("time [s]", "misfit [N]"),
-        "Is the misfit noise?": ("frequency [Hz]", "misfit [N/√Hz]"),
-    }
-    assert list(labels)[:2] == ["Dynamic stiffness", "Press"], "what the log shows stands before the model"
+    charts = build_charts(pressed, pressed.traces)
+    assert [(chart.title, chart.x, chart.y) for chart in charts] == [
+        ("Storage", "frequency [Hz]", "storage [kN/m]"),
+        ("Loss", "frequency [Hz]", "loss [kN/m]"),
+        ("Press", "depth from touch [mm]", "force [N]"),
+        ("Force", "time [s]", "force [N]"),
+        ("Misfit", "time [s]", "misfit [N]"),
+    ]
 
 
-def test_a_log_without_a_way_in_says_so(found):
+def test_without_a_press_there_is_no_chart_of_one(found):
     bare = replace(found, press=None)
-    assert "no loading in this log" in quantity_of(axes_of(draw(bare, "log"))["Press"])
+    assert "Press" not in by_title(evidence_charts(bare, bare.traces))
 
 
 def test_storage_and_loss_are_those_of_the_octaves(found):
-    above, below = draw(found, "press.csv").axes[:2]
-    for axis, part in ((above, "storage"), (below, "loss")):
-        drawn = np.concatenate(
-            [line.get_ydata() for line in axis.lines if line.get_marker() == "o" and line.get_ms() < 6]
-        )
-        own = [getattr(octave, part) / 1e3 for octave in found.dynamic_stiffness]
-        assert sorted(drawn) == pytest.approx(sorted(own))
+    charts = by_title(build_charts(found, found.traces))
+    for part in ("storage", "loss"):
+        chart = charts[part.capitalize()]
+        scale = 1e3 if "kN/m" in chart.y else 1.0
+        shown = line_of(chart, "measured")
+        octaves = {octave.frequency: octave for octave in found.dynamic_stiffness}
+        assert len(shown.x) > 0
+        (interval,) = chart.intervals
+        for i, frequency in enumerate(shown.x):
+            octave = octaves.pop(frequency)
+            value, half = getattr(octave, part), getattr(octave, f"{part}_half")
+            assert shown.y[i] == pytest.approx(value / scale)
+            assert interval.low[3 * i] == pytest.approx((value - half) / scale)
+            assert interval.high[3 * i + 1] == pytest.approx((value + half) / scale)
+        hidden = [span for mark in chart.marks for span in mark.spans]
+        assert len(hidden) == len(octaves)
 
 
 def test_what_is_drawn_is_what_was_measured_and_fitted(found):
-    axis = axes_of(draw(found, "press.csv"))["Force"]
-    lines = {line.get_label(): line.get_xydata() for line in axis.lines}
-    assert np.array_equal(lines["measured"][:, 1], found.traces.force)
-    model = lines["model"]
-    assert np.array_equal(model[np.isfinite(model[:, 1]), 1], found.traces.predicted)
+    force, misfit = time_charts(found, found.traces)
+    assert np.array_equal(line_of(force, "measured").y, found.traces.force)
+    model = line_of(force, "model").y
+    assert np.array_equal(model[np.isfinite(model)], found.traces.predicted)
+    left = line_of(misfit, "measured less model").y
+    assert np.array_equal(left[np.isfinite(left)], found.traces.fitted_force - found.traces.predicted)
+
+
+def test_a_line_is_broken_between_contacts(found):
+    traces = found.traces
+    half = len(traces.fitted_time) // 2
+    moved = np.where(np.arange(len(traces.fitted_time)) < half, 0.0, 5.0) + traces.fitted_time
+    force, _ = time_charts(found, replace(traces, fitted_time=moved))
+    model = line_of(force, "model")
+    (gap, _) = np.flatnonzero(np.isnan(model.y))
+    assert model.x[gap + 1] - model.x[gap] > 5.0
 
 
 def test_the_sentence_and_the_verdicts_stand_above_the_panels(found):
-    figure = draw(found, "press.csv")
-    written = " ".join(" ".join(text.get_text() for part in figure.subfigs for text in part.texts).split())
-    assert "press.csv" in written
+    written = " ".join(draw(found, "press.csv").get_suptitle().split())
+    assert written.startswith("press.csv")
     assert sentence(found) in written
     for name, p in found.parameters.items():
         assert f"{name} {full_number(p)}" in written
@@ -77,8 +95,8 @@ def test_a_name_is_no_formula(found):
     """Matplotlib would take what stands between dollars for mathematics, and fail."""
     figure = draw(found, "a$x_{1$ \x1b[31m.csv")
     figure.canvas.draw()
-    assert "$x_{1$" in figure.subfigs[0].texts[0].get_text()
-    assert "\x1b" not in figure.subfigs[0].texts[0].get_text()
+    assert r"\$x_{1\$" in figure.get_suptitle()
+    assert "\x1b" not in figure.get_suptitle()
 
 
 LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("not_identifiable", "volts")]
@@ -97,8 +115,9 @@ def test_every_outcome_has_a_picture(outcome, tmp_path):
 
 
 def test_without_a_contact_the_force_is_shown_alone():
-    (axis,) = draw(OUTCOMES["no_contact"](), "log").axes
-    assert quantity_of(axis) == "force [N]"
+    none = OUTCOMES["no_contact"]()
+    (chart,) = build_charts(none, none.traces)
+    assert chart.y == "force [N]"
 
 
 def test_without_traces_there_is_none(found, tmp_path):

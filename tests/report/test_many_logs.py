@@ -7,7 +7,7 @@ from html import unescape
 import numpy as np
 import pytest
 
-from palpate.cli._terminal import show_answer
+from palpate.cli._terminal import console
 from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Traces, WorkingPoint
@@ -16,7 +16,8 @@ from palpate.report.identification.words import Source
 from palpate.report.many.page import draw_logs as draw
 from palpate.report.many.page import page_of_logs as page
 from palpate.report.many.page import write_figure
-from palpate.report.many.table import LogRow, answer_of, failures, json_of, sentence
+from palpate.report.many.table import LogRow, build_answer, failures, pooled_json, sentence
+from palpate.report.terminal import show_answer
 from report.test_identification_page import Reader
 
 NONE = np.empty(0)
@@ -43,7 +44,7 @@ def rows():
 
 @pytest.fixture
 def pooled(rows):
-    return pool([own.found for own in rows])
+    return pool([own.result for own in rows])
 
 
 def test_the_sentence_holds_mean_next_press_place_and_cause(rows, pooled):
@@ -68,7 +69,7 @@ def test_without_a_number_it_says_so():
 
 
 def test_the_json_has_a_row_each_and_what_is_pooled(rows, pooled):
-    own = json.loads(json.dumps(json_of(rows, pooled), allow_nan=False))
+    own = json.loads(json.dumps(pooled_json(rows, pooled), allow_nan=False))
     assert [log["file"] for log in own["logs"]] == [r.source.file for r in rows]
     assert own["logs"][-1]["error"].startswith("there is no file")
     assert own["logs"][0]["parameters"]["K"]["value"] == 5000
@@ -83,12 +84,12 @@ def test_the_page_shows_each_log_and_the_mean(rows, pooled):
     for r in rows[:-1]:
         assert r.source.title in read.text
     assert "there is no file <b>; check the path" in read.text
-    assert len(read.of("img")) == 2
+    assert len(read.of("img")) == 1
     assert "a<script" not in html
     assert html.count("<script") == 1, "the page's own, which sorts its table"
     assert "\x1b" not in html
     shown = re.search(r"<pre>(\{.*\})</pre>", html, re.DOTALL).group(1)
-    assert json.loads(unescape(shown)) == json.loads(json.dumps(json_of(rows, pooled)))
+    assert json.loads(unescape(shown)) == json.loads(json.dumps(pooled_json(rows, pooled)))
 
 
 def test_the_forest_has_a_row_a_log_and_the_pooled_one(rows, pooled):
@@ -113,7 +114,7 @@ def test_both_files_are_whole_and_ours(rows, pooled, tmp_path):
 
 def test_the_terminal_shows_each_log_and_the_mean(rows, pooled, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
-    show_answer(answer_of(rows, pooled))
+    show_answer(build_answer(rows, pooled), console())
     text = capsys.readouterr().out
     assert " ".join(text.split()).startswith(sentence(rows, pooled))
     assert "5000 ± 40" in text

@@ -92,7 +92,7 @@ def test_many_logs_are_equal_by_value_and_named_one_by_one(found, pooled):
 def test_a_record_is_readable(record):
     lines = str(record).splitlines()
     assert lines[0].startswith("Record: 3 columns of 4000 rows, 0 to 7.998 s")
-    assert [line.split()[:2] for line in lines[2:]] == [["time", "s"], ["position", "m"], ["force", "N"]]
+    assert [line.split()[:2] for line in lines[3:]] == [["time", "s"], ["position", "m"], ["force", "N"]]
     assert repr(record).startswith("<Record: 3 columns of 4000 rows")
 
 
@@ -159,7 +159,6 @@ def test_equal_is_by_value(record, found):
     assert found != palpate.identify(record, lag=0.0)
     assert found.traces == copy.deepcopy(found.traces)
     assert found.press == copy.deepcopy(found.press)
-    assert found.estimate == copy.deepcopy(found.estimate)
     changed = {name: column.copy() for name, column in record.columns.items()}
     changed["force"][7] += 1e-12
     assert record != replace(record, columns=changed)
@@ -182,7 +181,9 @@ def test_no_number_equals_no_number():
 
 def test_an_empty_record_is_shown(tmp_path):
     empty = palpate.Record({}, {})
-    assert str(empty) == "Record: 0 columns of 0 rows\n  column  unit  least  mean  largest  missing"
+    head, columns = str(empty).splitlines()[:2]
+    assert head == "Record: 0 columns of 0 rows"
+    assert columns.split() == ["column", "unit", "least", "mean", "largest", "missing"]
     assert empty.report(tmp_path / "empty.html").exists()
     nothing = palpate.Record({"force": np.full(5, np.nan)}, {"force": "N"})
     assert str(nothing).splitlines()[-1].split() == ["force", "N", "-", "-", "-", "5"]

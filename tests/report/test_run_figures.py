@@ -4,14 +4,23 @@ import numpy as np
 import pytest
 
 from bench.quick import quick
-from palpate.bench import build
+from palpate.bench import build, summarise
 from palpate.records import Record
-from palpate.report.run import figures as run_figures
+from palpate.report.run.page import write_report
 
 
 @pytest.fixture(scope="module")
 def record():
     return build(quick("foam-hybrid")).run(1.5, press=0.4)
+
+
+@pytest.fixture(scope="module")
+def summary(record):
+    return {**summarise(record), "command": "palpate run", "seed": 0, "not_identified": ""}
+
+
+def write(record, summary, folder):
+    return write_report(record, summary, None, "the experiment's file", folder)
 
 
 def pixels(path):
@@ -20,10 +29,12 @@ def pixels(path):
     return imread(path)
 
 
-def test_every_figure_is_a_picture_with_a_caption(record, tmp_path):
-    captions = run_figures.draw(record, tmp_path)
+def test_every_figure_is_a_picture_with_a_caption(record, summary, tmp_path):
+    captions = write(record, summary, tmp_path)
     assert list(captions) == ["approach.png", "force.png", "identification.png", "torque.png"]
-    assert {path.name for path in tmp_path.iterdir()} == set(captions), "no half-written file is left"
+    assert {path.name for path in tmp_path.iterdir()} == {*captions, "report.html"}, (
+        "no half-written file is left"
+    )
     for name, caption in captions.items():
         assert caption.endswith(".")
         picture = pixels(tmp_path / name)
@@ -31,33 +42,33 @@ def test_every_figure_is_a_picture_with_a_caption(record, tmp_path):
         assert picture[..., :3].std() > 0.05, "something is drawn"
 
 
-def test_without_contact_there_is_nothing_to_show_of_it(record, tmp_path):
+def test_without_contact_there_is_nothing_to_show_of_it(record, summary, tmp_path):
     air = Record({**record.columns, "phase": np.zeros(len(record))}, record.units, record.meta)
-    assert list(run_figures.draw(air, tmp_path)) == ["approach.png", "torque.png"]
+    assert list(write(air, {**summary, "force": None}, tmp_path)) == ["approach.png", "torque.png"]
 
 
 @pytest.mark.long
-def test_the_same_record_gives_the_same_picture(record, tmp_path):
+def test_the_same_record_gives_the_same_picture(record, summary, tmp_path):
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
     for folder in "ab":
-        run_figures.draw(record, tmp_path / folder)
-    for path in (tmp_path / "a").iterdir():
+        write(record, summary, tmp_path / folder)
+    for path in (tmp_path / "a").glob("*.png"):
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
 
 
 @pytest.mark.long
-def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, tmp_path):
+def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, summary, tmp_path):
     untold = Record(record.columns, record.units, {**record.meta, "truth": {}})
-    assert "identification.png" in run_figures.draw(untold, tmp_path)
+    assert "identification.png" in write(untold, summary, tmp_path)
 
 
 @pytest.mark.parametrize(
     "rows", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(250, marks=pytest.mark.long)]
 )
-def test_a_short_record_is_drawn(record, tmp_path, rows):
+def test_a_short_record_is_drawn(record, summary, tmp_path, rows):
     """An interrupted run has whatever it has."""
     short = Record(
         {name: column[:rows] for name, column in record.columns.items()}, record.units, record.meta
     )
-    assert run_figures.draw(short, tmp_path)
+    assert write(short, summary, tmp_path)

@@ -34,7 +34,7 @@ def test_a_force_loop_says_its_phase_its_trouble_and_its_gains():
     assert text.startswith(
         f"<ForceLoop: {loop.phase}, trouble {loop.trouble}, force 20 N, arm position at 500 Hz"
     )
-    assert loop.trouble in loop._repr_html_()
+    assert loop.trouble in text
 
 
 def test_a_parameter_says_number_interval_and_verdict(found):
@@ -46,8 +46,8 @@ def test_a_parameter_says_number_interval_and_verdict(found):
 
 
 def test_advice_in_python_names_the_keyword(found):
-    assert "lag=" in found.B._repr_html_()
-    for view in (found.B._repr_html_(), found._repr_html_(), str(found), repr(found)):
+    assert "lag=" in found._repr_html_()
+    for view in (found._repr_html_(), str(found), repr(found)):
         assert "--lag" not in view
         assert "--robot-stiffness" not in view
 
@@ -80,7 +80,6 @@ def test_a_value_is_one_short_line(make, told):
     assert "\n" not in repr(value)
     assert len(repr(value)) < 200
     assert "array(" not in repr(value)
-    assert value._repr_html_().startswith("<div><p><b>")
 
 
 def test_a_strangers_name_stays_text(found):
@@ -88,5 +87,4 @@ def test_a_strangers_name_stays_text(found):
 
     bad = replace(found.K, unit="N\x1b[31m", reason="<script>alert(1)</script>\x1b[31m")
     assert "N" in repr(bad)
-    assert "<script>" not in bad._repr_html_()
-    assert "\x1b" not in bad._repr_html_() + repr(bad)
+    assert "\x1b" not in repr(bad)

@@ -8,7 +8,7 @@ import pytest
 from palpate.identification.causes import Code, Warn, cause_of
 from palpate.identification.result import DynamicStiffness, Identification, Traces, WorkingPoint
 from palpate.identification.uncertainty import Measurement, Parameter, Verdict
-from palpate.report.identification.words import limited_by, model_line, sentence
+from palpate.report.identification.words import limited_by, sentence
 from palpate.units import quantity, quantity_between
 
 NONE = np.empty(0)
@@ -16,7 +16,7 @@ NONE = np.empty(0)
 
 def parameter(value, half, verdict=Verdict.IDENTIFIED, unit="N/m", **budget):
     ends = None if value is None else (value - half, value + half)
-    return Parameter(value, half / 1.96, ends, unit, verdict, "95 %: -1 to 2 N/m", None, budget)
+    return Parameter(value, half / 1.96, ends, unit, verdict, "95 %: -1 to 2 N/m", budget)
 
 
 def made(
@@ -97,12 +97,6 @@ def test_a_log_in_volts_has_no_units():
     found = made(parameter(2.5, 0.1, unit="1"))
     found = replace(found, traces=replace(found.traces, force_unit="1", position_unit="1"))
     assert "2.50 ± 0.10 at 13.3, 0.00236 deep and 0.57 Hz" in sentence(found)
-
-
-def test_the_model_says_which_parameters_it_has():
-    assert model_line(made(parameter(5200, 50), K=Verdict.IDENTIFIED)) == (
-        "By the model kelvin-voigt, stiffness is identified; damping is not identifiable."
-    )
 
 
 def test_a_cause_that_nobody_described_is_named():

@@ -52,10 +52,3 @@ def test_model_takes_each_sine_and_cosine_once(monkeypatch):
         monkeypatch.setattr(robots.arm3, name, lambda a, real=real, name=name: calls.append(name) or real(a))
     Arm3().model(Vec3(0.1, 0.2, 0.3), Vec3(1.0, 2.0, 3.0))
     assert sorted(calls) == ["cos"] * 3 + ["sin"] * 3
-
-
-def test_laws_take_batches():
-    q, qd, qdd, w = (Vec3(*rows) for rows in RNG.uniform(-3.0, 3.0, (4, 3, 2, 5)))
-    many = Arm3().newton_euler(q, qd, qdd, w)
-    one = Arm3().newton_euler(*(Vec3(*(float(c[1, 3]) for c in v)) for v in (q, qd, qdd, w)))
-    np.testing.assert_allclose([c[1, 3] for c in many], one, rtol=1e-12)

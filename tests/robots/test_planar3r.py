@@ -77,17 +77,6 @@ def test_the_recursion_and_the_closed_form_agree_under_a_wrench(robot):
     np.testing.assert_allclose(robot.forward_dynamics(q, qd, closed, w), qdd, atol=1e-9)
 
 
-def test_jacobian_and_its_derivative_by_finite_differences():
-    q, qd = RNG.uniform(-3.0, 3.0, (2, 100, 3))
-    step = 1e-6
-    for j in range(3):
-        e = step * np.eye(3)[j]
-        slope = (THESIS.forward_kinematics(q + e) - THESIS.forward_kinematics(q - e)) / (2.0 * step)
-        np.testing.assert_allclose(THESIS.jacobian(q)[..., j], slope, atol=1e-9)
-    slope = (THESIS.jacobian(q + step * qd) - THESIS.jacobian(q - step * qd)) / (2.0 * step)
-    np.testing.assert_allclose(THESIS.jacobian_dot(q, qd), slope, atol=1e-8)
-
-
 def test_inverse_jacobian():
     q = RNG.uniform(-3.0, 3.0, (200, 3))
     q[:, 1] = np.where(np.abs(np.sin(q[:, 1])) < 1e-2, 1.0, q[:, 1])
@@ -101,32 +90,6 @@ def test_mass_matrix_is_symmetric_and_positive_definite(robot):
     M = robot.mass_matrix(RNG.uniform(-np.pi, np.pi, (500, 3)))
     assert np.array_equal(M, np.swapaxes(M, -1, -2))
     assert np.linalg.eigvalsh(M).min() > 1e-4
-
-
-def coriolis(robot, q, qd):
-    """C(q, qd) of Christoffel's symbols, by finite differences of M."""
-    step = 1e-5
-    slope = np.stack(
-        [(robot.mass_matrix(q + e) - robot.mass_matrix(q - e)) / (2.0 * step) for e in step * np.eye(3)],
-        axis=-1,
-    )  # dM_ij / dq_k
-    symbols = 0.5 * (slope + np.swapaxes(slope, 1, 2) - np.transpose(slope, (2, 0, 1)))
-    return symbols @ qd, slope @ qd
-
-
-@ARMS
-@pytest.mark.parametrize("state", STATES[:4])
-def test_mass_rate_minus_twice_coriolis_is_skew(robot, state):
-    q, qd, _, _ = state
-    C, M_rate = coriolis(robot, q, qd)
-    np.testing.assert_allclose(C @ qd, robot.bias_torque(q, qd), atol=1e-7)
-    skew = M_rate - 2.0 * C
-    np.testing.assert_allclose(skew, -skew.T, atol=1e-8)
-
-
-def test_bias_torque_is_quadratic_in_the_rates():
-    q, qd = RNG.uniform(-3.0, 3.0, (2, 50, 3))
-    np.testing.assert_allclose(THESIS.bias_torque(q, -3.0 * qd), 9.0 * THESIS.bias_torque(q, qd), rtol=1e-12)
 
 
 def test_work_of_the_motors_and_of_the_wrench_is_the_change_of_kinetic_energy():

@@ -11,18 +11,17 @@ from palpate.bench import build, load, with_values
 from palpate.environments import KelvinVoigt
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
-from palpate_thesis.conditions import SHORT, rougher
 from palpate_thesis.explanations import e6_friction_compensation as compensation
 from palpate_thesis.explanations.e6_friction_compensation import (
     Recovery,
     drawn_back,
-    found_again,
-    recovery_of,
+    measure_recovery,
+    recovery_claim,
 )
 from palpate_thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
 from palpate_thesis.figures.fig_4_03 import LoopParameters
 from palpate_thesis.figures.fig_4_19 import CoupledAndDecoupled, Stray, press_with_jumps, stray
-from palpate_thesis.force_control.disturbances import (
+from palpate_thesis.force_control.interventions import (
     Disturbance,
     desired_pose,
     other_surface,
@@ -30,7 +29,7 @@ from palpate_thesis.force_control.disturbances import (
     surface_back,
 )
 from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import SHORT, Runs, rougher
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)
@@ -64,7 +63,7 @@ def test_a_surface_drawn_back_is_lost_and_found():
     before, after = around(record, "force", 0.6)
     assert before > 15.0
     assert after < 2.0
-    one = recovery_of(drawn_back(0))
+    one = measure_recovery(drawn_back(0))
     assert one.times == 1
     assert 1.0 < one.took < 15.0
 
@@ -157,11 +156,11 @@ def test_a_hopeless_loop_has_no_limit():
 
 def test_without_friction_the_arm_is_the_target_spring_and_damper():
     e = with_values(fig_2_02.PARAMETERS, fig_2_02.FREE)
-    found = fig_2_02.found_in(fig_2_02.record_jumps(e, 0))
+    found = fig_2_02.estimate_impedance(fig_2_02.record_jumps(e, 0))
     assert pytest.approx(1.0, abs=0.05) == found.K
     assert pytest.approx(1.0, abs=0.25) == found.B
     assert pytest.approx(1.0 - 600.0 * 0.007 / 5.0, abs=0.15) == found.M  # the velocity's lag takes the rest
-    rough = fig_2_02.found_in(fig_2_02.record_jumps(fig_2_02.PARAMETERS, 0))
+    rough = fig_2_02.estimate_impedance(fig_2_02.record_jumps(fig_2_02.PARAMETERS, 0))
     assert abs(rough.K - 1.0) > 0.3
 
 
@@ -236,13 +235,13 @@ def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
 
 def test_a_regain_that_is_late_hard_or_missing_is_not_well():
     good = Recovery(8.0, 0.02, 1.05, 1)
-    assert found_again([good] * 10).verdict == "reproduced"
+    assert recovery_claim([good] * 10).verdict == "reproduced"
     for bad in (
         Recovery(12.0, 0.02, 1.05, 1),
         Recovery(8.0, 0.02, 1.5, 1),
         Recovery(np.inf, np.inf, np.inf, 1),
     ):
-        assert found_again([bad] * 10).verdict == "differs"
+        assert recovery_claim([bad] * 10).verdict == "differs"
 
 
 @pytest.mark.long
@@ -266,8 +265,8 @@ def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
     stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
     runs = Runs((0,))
     free = with_values(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
-    assert not fig_4_03.stays_quiet(runs.one(free))
-    assert fig_4_03.stays_quiet(runs.one(fig_4_03.press_of(case, stiffness, 1.0)))
+    assert not fig_4_03.stays_quiet(runs.record(free))
+    assert fig_4_03.stays_quiet(runs.record(fig_4_03.press_of(case, stiffness, 1.0)))
 
 
 def test_rougher_friction_is_what_it_says():

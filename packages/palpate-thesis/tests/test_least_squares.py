@@ -24,7 +24,7 @@ M, B, K = 0.4, 150.0, 6000.0
 @pytest.fixture(scope="module")
 def foam() -> Record:
     """One run on the plain foam."""
-    return Runs((3,)).one(press_runs.PLAIN)
+    return Runs((3,)).record(press_runs.PLAIN)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -49,7 +48,7 @@ CLAIMS = (
         "neural-rubber-steps",
         "neural-rubber-sine",
     ),
-    *("decoupled-control", "impedance-holds", "network-alone", "self-tuning-robust", "open-questions"),
+    *("decoupled-control", "impedance-holds", "network-alone", "self-tuning-robust"),
 )
 """Every claim of the thesis that has a row."""
 SEEDS = range(10)
@@ -119,9 +118,7 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
         "index.html",
         STATE,
         "2.1.png",
-        "2.1.panels.json",
         "2.2.png",
-        "2.2.panels.json",
     }
     claims = json.loads((folder / "claims.json").read_text("utf-8"))
     assert [list(claim) for claim in claims] == [FIELDS, FIELDS]
@@ -129,7 +126,7 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     assert {claim["verdict"] for claim in claims} <= VERDICTS
     page = (folder / "index.html").read_text("utf-8")
     assert "&lt;it&gt; holds &amp; is told" in page
-    assert page.count("data:image/svg+xml;base64,") == 2
+    assert page.count("data:image/png;base64,") == 2
     assert "://" not in re.sub(r"http://www\.w3\.org\S*|https://github\.com/leeoniya/uPlot", "", page), (
         "the page opens without a network"
     )
@@ -160,7 +157,6 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
         ("6.9", "Neural identifier"),
         ("6.10", "Force control"),
         ("why-negative-mass", "Explanations"),
-        ("model-tunes", "Schemes that the thesis names"),
     ],
 )
 def test_figures_stand_in_their_chapters(number, chapter):
@@ -235,11 +231,6 @@ def test_a_file_in_the_place_is_refused(tmp_path):
         measured([toy("2.1", [])], tmp_path / "thesis")
 
 
-def test_an_empty_folder_is_taken(tmp_path):
-    measured([toy("2.1", [])], tmp_path)
-    assert "claims.json" in names(tmp_path)
-
-
 @pytest.mark.parametrize(
     ("name", "said"), [("6.99", "6.9"), ("why-negativ-mass", "why-negative-mass"), ("x", "3.5")]
 )
@@ -267,48 +258,9 @@ def test_one_figure_is_measured_by_the_program(program, tmp_path):
     folder = tmp_path / "t"
     ran = program("thesis", "3.7", "--out", folder)
     assert ran.returncode == 0, ran.stderr
-    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png", "3.7.panels.json"}
+    assert names(folder) == {"claims.json", "index.html", STATE, "3.7.png"}
     assert "217 Hz" in ran.stdout
     assert "--replace" in one_line(program("thesis", "3.7", "--out", folder))
-
-
-def test_a_place_that_cannot_be_is_one_line(program, tmp_path):
-    (tmp_path / "file").touch()
-    assert "file" in one_line(program("thesis", "3.7", "--out", tmp_path / "file" / "thesis"))
-
-
-@pytest.mark.skipif(not Path("/proc/version").exists(), reason="no /proc here")
-def test_a_place_that_may_not_be_written_is_one_line(program):
-    assert "/proc" in one_line(program("thesis", "3.7", "--out", "/proc/thesis"))
-
-
-def cramped(folder: Path, most: int) -> subprocess.CompletedProcess:
-    """`palpate thesis 3.7` where no file can grow beyond so many bytes.
-
-    It leaves no bytecode: what Python could write half of it would be read by every later process.
-    """
-    resource = pytest.importorskip("resource")
-    return subprocess.run(
-        [sys.executable, "-m", "palpate", "thesis", "3.7", "--out", str(folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
-    )
-
-
-@pytest.mark.long
-def test_a_disk_that_is_full_leaves_nothing_half_written_and_can_be_gone_on_from(program, tmp_path):
-    folder = tmp_path / "t"
-    one_line(cramped(folder, 2000))
-    assert not {"claims.json", "index.html", "3.7.png"} & names(folder)
-    assert program("thesis", "3.7", "--out", folder).returncode == 0
-    page = (folder / "index.html").stat().st_size
-    assert page > (folder / "3.7.png").stat().st_size
-    one_line(cramped(tmp_path / "again", page - 1000))
-    assert "3.7.png" in names(tmp_path / "again")
-    assert "index.html" not in names(tmp_path / "again")
 
 
 def test_figures_are_written_as_asked(program, tmp_path):
@@ -402,10 +354,10 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
 def test_a_run_cut_short_is_never_measured():
     experiment = with_values(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
     runs = Runs()
-    runs.one(with_values(experiment, {"run.press": 0.1}))  # compiles
+    runs.record(with_values(experiment, {"run.press": 0.1}))  # compiles
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
-        runs.one(experiment)
+        runs.record(experiment)
 
 
 @pytest.mark.long
@@ -413,7 +365,7 @@ def test_ctrl_c_stops_the_runs_of_all_threads():
     """Hours of simulated time are under way on other threads; they end within a look."""
     experiment = with_values(load("foam-hybrid"), {"run.press": 3000.0, "run.duration": 3600.0})
     runs = Runs()
-    runs.one(with_values(experiment, {"run.press": 0.1}))  # compiles
+    runs.record(with_values(experiment, {"run.press": 0.1}))  # compiles
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     before, begun = threading.active_count(), time.monotonic()

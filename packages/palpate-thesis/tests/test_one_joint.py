@@ -1,21 +1,17 @@
 """The bench of one joint: its physics against closed forms, and a network that alone learns to press."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
 
 from palpate.environments import KelvinVoigt, join
-from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.references import ForceSchedule
 from palpate_thesis.one_joint import (
     COLUMNS,
-    JOINT_FRICTION,
     DirectIntegral,
     Joint,
-    Link,
     direct_neural,
     one_joint,
 )
@@ -121,20 +117,3 @@ def test_a_run_leaves_the_next_one_as_it_was():
     one, other = bench.run(0.5, seed=1), bench.run(0.5, seed=1)
     assert np.array_equal(one.columns["force"], other.columns["force"])
     assert not np.array_equal(one.columns["force_sampled"], bench.run(0.5, seed=2).columns["force_sampled"])
-
-
-@pytest.mark.parametrize(
-    ("make", "wrong"),
-    [(Link, {"inertia": 0.0}), (Link, {"lever": -1.0}), (Link, {"limit": 0.0})]
-    + [(partial(one_joint, FOAM, direct_neural(), STEPS), wrong) for wrong in ({"rate": 0}, {"steps": 0})],
-)
-def test_a_joint_that_cannot_be_is_refused(make, wrong):
-    with pytest.raises(InputError, match=f"{next(iter(wrong))} must be above 0"):
-        make(**wrong)
-
-
-def test_a_run_of_no_time_and_impossible_friction_are_refused():
-    with pytest.raises(InputError, match="at least one tick"):
-        one_joint(FOAM, direct_neural(), STEPS).run(0.0)
-    with pytest.raises(InputError, match="coulomb"):
-        one_joint(FOAM, direct_neural(), STEPS, link=Link(JOINT_FRICTION._replace(coulomb=0.0)))

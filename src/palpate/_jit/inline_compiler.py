@@ -8,8 +8,6 @@ unroll. Without all that a kernel compiles in two thirds of the time, and is the
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
-from contextlib import contextmanager
 from types import CodeType
 from typing import Any
 
@@ -64,7 +62,7 @@ def _flags() -> tuple[Any, type]:
     return shared, Entered
 
 
-def _link_below(library: Any, module: Any, without: Any = None) -> None:
+def _link_below(library: Any, module: Any) -> None:
     """Links into a library's module all that it calls, directly or not, each once.
 
     A function comes after its caller: LLVM omits functions that are not requested.
@@ -73,7 +71,7 @@ def _link_below(library: Any, module: Any, without: Any = None) -> None:
 
     def visit(one: Any) -> None:
         for below in one._linking_libraries:
-            if below not in order and below is not without:
+            if below not in order:
                 order[below] = None
                 if isinstance(below, _linked_library_type()):
                     visit(below)
@@ -85,69 +83,6 @@ def _link_below(library: Any, module: Any, without: Any = None) -> None:
         module.link_in(alone, preserve=True)
 
 
-_SPECULATED, _SPECULATED_BY_LLVM = 2, 4
-"""Cost of a side of a condition up to which it is computed before the condition is known: here, and LLVM's default."""
-_NEWEST_LLVM = 22
-"""The last version that is known to have the option: an unknown one ends the process."""
-_COUNTING = """
-define linkonce_odr void @NRT_{name}(ptr %info) alwaysinline {{
-  %none = icmp eq ptr %info, null
-  br i1 %none, label %end, label %count
-count:
-  %before = load i64, ptr %info
-  %after = add i64 %before, {step}
-  store i64 %after, ptr %info
-  %last = icmp eq i64 %after, 0
-  br i1 %last, label %free, label %end
-free:
-  call void @NRT_MemInfo_call_dtor(ptr %info)
-  br label %end
-end:
-  ret void
-}}
-"""
-"""Count of the references to an array, not atomic: Numba makes a count for each argument at each call of a kernel, and
-one for each array that is made in it, so that one thread alone knows of it."""
-
-
-@contextmanager
-def _branches() -> Iterator[None]:
-    """Within it a side of a condition stays a branch, which the processor predicts, unless it is a single operation.
-
-    By default LLVM computes both sides, divisions among them, and all that follows waits for the slower one. The option
-    belongs to the process, so it is set back for the user's own Numba.
-    """
-    _speculate(_SPECULATED)
-    try:
-        yield
-    finally:
-        _speculate(_SPECULATED_BY_LLVM)
-
-
-def _speculate(cost: int) -> None:
-    from llvmlite import binding
-
-    if binding.llvm_version_info[0] <= _NEWEST_LLVM:
-        binding.set_option("palpate", f"-two-entry-phi-node-folding-threshold={cost}")
-
-
-def _count_in_place(library: Any) -> None:
-    """Puts the counts that are left after the passes into the kernel itself."""
-    from llvmlite import binding
-    from numba.core.runtime import rtsys
-
-    module, codegen = library._final_module, library._codegen
-    functions = (_COUNTING.format(name=name, step=step) for name, step in (("incref", 1), ("decref", -1)))
-    text = "declare void @NRT_MemInfo_call_dtor(ptr)" + "".join(functions)
-    module.link_in(binding.parse_assembly(text))
-    module.link_in(rtsys.library._get_module_for_linking(), preserve=True)
-    builder = binding.create_pass_builder(codegen._tm, binding.create_pipeline_tuning_options(1))
-    manager = binding.create_new_module_pass_manager()
-    manager.add_always_inliner_pass()
-    manager.add_global_dead_code_eliminate_pass()  # or another module's calls might find these functions
-    manager.run(module, builder)
-
-
 def _entry_compiler() -> type:
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import Compiler
@@ -156,16 +91,9 @@ def _entry_compiler() -> type:
         """Code that takes in each function that it calls once, and runs."""
 
         def finalize(self) -> None:
-            from numba.core.runtime import rtsys
-
-            _link_below(self, self._final_module, without=rtsys.library)
+            _link_below(self, self._final_module)
             self._linking_libraries = []
             super().finalize()
-
-        def _optimize_final_module(self) -> None:
-            with _branches():
-                super()._optimize_final_module()
-            _count_in_place(self)
 
     class SameFlagsCompiler(Compiler):
         """Numba's compiler, but that what is called sees the flags of everything inside."""
@@ -204,14 +132,6 @@ def _linked_library_type() -> type:
         @property
         def codegen(self) -> Any:
             return _Unloaded(self._codegen)
-
-        def _optimize_functions(self, module: Any) -> None:
-            module.data_layout = self._codegen._data_layout
-            with _branches():
-                for function in module.functions:
-                    if not function.is_declaration:
-                        manager, builder = self._codegen._function_pass_manager()
-                        manager.run(function, builder)
 
         def finalize(self) -> None:
             """Nothing is linked in: the kernel takes in each function once, and not once for each that calls it."""

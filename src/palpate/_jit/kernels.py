@@ -194,25 +194,41 @@ def _hand_over() -> None:
         importlib.import_module("numba.extending").register_jitable(**inside())(laws.pop())
 
 
+def compiled_for(kernel: Kernel, example: tuple[Any, ...]) -> Any:
+    """Machine code of a kernel that was called with such arguments."""
+    import numba
+
+    return kernel.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
+
+
 class BoundKernel:
     """Calls a kernel; from the second call on straight at its machine code, a call costing a third or less.
 
+    Arguments of other types or dimensions than those of the first call take the way of every kernel, and compile.
+
     Args:
-        kernel: what is called; the types of its arguments are those of the first call for ever.
+        kernel: what is called.
     """
 
     def __init__(self, kernel: Kernel):
         self._kernel, self._entry = kernel, None
+        self._forms: tuple[Any, ...] = ()
 
     def __call__(self, *args: Any) -> Any:
-        if self._entry is not None:
-            return self._entry(*args)
-        import numba
-
-        types = tuple(map(numba.typeof, args))
+        forms = tuple(map(_form, args))
+        if forms == self._forms:
+            return self._entry(*args)  # type: ignore[misc]
         result = self._kernel(*args)
-        self._entry = self._kernel.compiled.overloads[types].entry_point
+        if self._entry is None:
+            self._entry, self._forms = compiled_for(self._kernel, args), forms
         return result
+
+
+def _form(value: Any) -> Any:
+    """Type of an argument as far as machine code depends on it, without what a part holds."""
+    if hasattr(value, "dtype"):
+        return value.ndim, value.dtype, value.flags.carray
+    return type(value)
 
 
 _PLACE = re.compile(r'File "([^"\n]+\.py)", line (\d+)')

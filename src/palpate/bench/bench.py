@@ -46,21 +46,21 @@ class Bench(Readable):
         controller(type(self.loop.controller))  # a user's own may have only start and step
 
     def with_surface(self, surface: Any) -> "Bench":
-        """The same bench before another surface, one of `palpate.environments` or a part of your own.
+        """Replace the surface by one of `palpate.environments` or a part of your own; return a new bench.
 
-        Its ``truth()``, {name: (value, unit)}, becomes the record's; left out, nothing is known of it.
+        The surface's ``truth()``, {name: (value, unit)}, becomes the record's; without it the record has no truth.
         """
         plant = self.loop.plant._replace(surface=surface)
         truth = surface.truth() if hasattr(surface, "truth") else {}
-        told = {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
-        return replace(self, loop=self.loop._replace(plant=plant), meta={**self.meta, "truth": told})
+        described = {name: {"value": value, "unit": unit} for name, (value, unit) in truth.items()}
+        return replace(self, loop=self.loop._replace(plant=plant), meta={**self.meta, "truth": described})
 
     def with_controller(self, controller: Any) -> "Bench":
-        """The same bench with another controller in contact: a part with ``start()`` and ``step``."""
+        """Replace the controller in contact, a part with ``start()`` and ``step``; return a new bench."""
         return replace(self, loop=self.loop._replace(controller=controller))
 
     def with_identifier(self, identifier: Callable[[], Identifier]) -> "Bench":
-        """The same bench with an identifier that watches; the record has its numbers as ``K_identifier`` and so on.
+        """Add an identifier that watches; return a new bench, whose records have columns ``K_identifier`` and so on.
 
         Args:
             identifier: makes one at its start, as a class of `palpate.identifiers` or of your own does: it has
@@ -69,7 +69,7 @@ class Bench(Readable):
         return replace(self, identifier=identifier)
 
     def with_wave(self, wave: ArrayLike) -> "Bench":
-        """The same bench, asked for this force on top of its levels and its sine.
+        """Add a force on top of the desired levels and the sine; return a new bench.
 
         Args:
             wave: [N], one value a tick from contact on, shape (n,); zero after its end.
@@ -93,12 +93,12 @@ class Bench(Readable):
         progress: Progress | None = None,
         waiting: Callable[[], None] | None = None,
     ) -> Record:
-        """Runs from rest in free motion.
+        """Run from rest in free motion.
 
         Args:
-            duration: at most so long [s].
+            duration: upper bound of the run [s].
             seed: of the noise; the same seed gives the same record, bit for bit.
-            press: ends so long after the first contact [s].
+            press: time from the first contact to the end [s].
             compiled: False runs the same code a tick at a time in plain Python, for a debugger; the numbers are
                 the same, it takes some 300 times as long.
             progress: called now and then with the time reached [s] and the phase.
@@ -120,13 +120,13 @@ class Bench(Readable):
         total = round(duration / tick)
         rows, ending = self._rows(simulation, total, None if press is None else round(press / tick), progress)
         columns = {name: _column(rows, i) for i, name in enumerate(COLUMNS)}
-        told = {
+        instruments = {
             "instruments": {
                 "force": self.loop.force.description(),
                 "position": {"lag_s": self.loop.encoder.lag},
             }
         }
-        meta = {**self.meta, **told, "seed": seed, "end": ending.end, "why": ending.why}
+        meta = {**self.meta, **instruments, "seed": seed, "end": ending.end, "why": ending.why}
         record = Record(columns, COLUMNS, meta)
         if self.identifier is None:
             return record
@@ -165,18 +165,19 @@ class Bench(Readable):
         return chunks, end or Ending(DONE, "as asked for")
 
     def _no_contact(self, chunks: list[Array], seconds: float) -> str:
-        """Why nothing was touched: how far the tip is from the surface, and how long the approach takes."""
+        """Reason why nothing was touched: the distance to the surface, and the time of the approach."""
         gap = -float(chunks[-1][-1, list(COLUMNS).index("penetration")])
         if not gap > 0.0:
             return f"no contact was detected in {seconds:g} s: the force stays below that of a contact"
-        told = f"no contact was detected: after {seconds:g} s the tip is still {1e3 * gap:.3g} mm before the surface"
+        message = f"no contact was detected: after {seconds:g} s the tip is still {1e3 * gap:.3g} mm before the surface"
         approach, wall = (self.meta.get("experiment", {}).get(name, {}) for name in ("approach", "wall"))
         if not (approach.get("step", 0.0) > 0.0 and "x" in wall):
-            return told
+            return message
         needed = approach["hold"] + approach["period"] * (wall["x"] - approach["first"]) / approach["step"]
         if needed < seconds:
-            return told
-        return f"{told}; the approach takes {needed:.3g} s: extend [run] duration, or begin nearer ([approach] first)"
+            return message
+        remedy = "extend [run] duration, or begin nearer ([approach] first)"
+        return f"{message}; the approach takes {needed:.3g} s: {remedy}"
 
 
 def _column(rows: list[Array], i: int) -> Array:

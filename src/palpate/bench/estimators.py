@@ -253,8 +253,8 @@ def after(identifier: Identifier, regressor: Array, force: float, t: float) -> A
     name = type(identifier).__name__
     try:
         identifier.update(regressor, force)
-        found = identifier.estimate()
-        theta, P = np.asarray(found.theta, float), np.asarray(found.covariance, float)
+        estimate = identifier.estimate()
+        theta, P = np.asarray(estimate.theta, float), np.asarray(estimate.covariance, float)
     except Exception as error:
         raise PartError(f"the identifier {name} fails at {t:.3f} s: {reason(error)}") from error
     if theta.shape != (3,) or P.shape != (3, 3):

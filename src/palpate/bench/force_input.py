@@ -63,7 +63,7 @@ class Conditioning(NamedTuple):
     tick: float
 
     def start_at(self, q):
-        """As after a long rest at the joint angles q, without force."""
+        """State after a long rest at the joint angles q, without force."""
         return ConditioningState(
             q,
             self.arm.pose(q),
@@ -283,7 +283,7 @@ class StopCondition:
         self._phase = 0.0
 
     def judge(self, out: Array, trouble: str) -> tuple[int, Ending | None]:
-        """How many of these rows to keep, and the ending if there is one.
+        """Count the rows to keep, and find the ending if there is one.
 
         Args:
             out: rows in the order of `COLUMNS`.

@@ -1,4 +1,4 @@
-"""From an experiment's numbers to the parts of a loop.
+"""Builds the parts of a loop from an experiment's numbers.
 
 Here the numbers are checked against each other; each number alone is checked where it is read.
 
@@ -42,7 +42,7 @@ SLOWER = 20.0
 
 
 def check(e: Experiment) -> None:
-    """Raises an InputError that names the keys of numbers that do not go together."""
+    """Refuse numbers that contradict each other, and name their keys."""
     _check_rates(e)
     _check_waves(e)
     if any(high < low for high, low in zip(e.friction.static, e.friction.coulomb, strict=True)):
@@ -279,7 +279,7 @@ TICKS = 3
 
 
 def check_parts(bench: object, waiting: Callable[[], None] | None = None) -> None:
-    """Steps each part of the user's once in plain Python, and compiles the loop with them.
+    """Step each part of the user's once in plain Python, and compile the loop with them.
 
     Args:
         bench: whose parts; one along one direction has none of the user's.

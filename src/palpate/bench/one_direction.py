@@ -39,7 +39,7 @@ class TouchedSurface(Table):
     sway: NotNegative = 0.0
     """Amplitude of the surface's own motion [m]."""
     sway_frequency: NotNegative = 0.5
-    """Of that [Hz]."""
+    """Frequency of that motion [Hz]."""
 
 
 class StepsAndSine(Table):
@@ -47,7 +47,7 @@ class StepsAndSine(Table):
 
     first: Positive = 20.0
     second: Positive | None = None
-    """Of every other interval; as the first when left out."""
+    """Force of every other interval [N]; the first if left out."""
     period: Positive = 2.0
     amplitude: NotNegative = 0.0
     frequency: NotNegative = 0.5
@@ -57,9 +57,9 @@ class Priors(Table):
     """Factors of the law's prior over the truth; 1 is the truth."""
 
     cap: Positive = 1.0
-    """Of the stiffest surface that there may be."""
+    """Factor of the stiffest surface considered."""
     lag: Positive = 1.0
-    """Of the loop's whole lag."""
+    """Factor of the loop's whole lag."""
 
 
 class Duration(Table):
@@ -82,7 +82,7 @@ class OneDirection(Table, kw_only=True):
     force: StepsAndSine = StepsAndSine()
     priors: Priors = Priors()
     noise: NotNegative | None = None
-    """Of the force sensor [N], standard deviation of a reading; as the arm's file has it when left out."""
+    """Standard deviation of a force reading [N]; that of the arm's file if left out."""
     run: Duration = Duration()
 
 
@@ -98,8 +98,8 @@ COLUMNS = {
 }
 AHEAD = 0.3
 """Time that the approach takes at the law's own speed [s]."""
-FIRM = 0.5
-"""Of the desired force: contact that had it and has no force is lost; before, a touch may bounce."""
+FIRM_CONTACT = 0.5
+"""Fraction of the desired force from which on a vanishing force is a loss; below it a touch may bounce."""
 
 
 @law
@@ -141,7 +141,7 @@ class OneDirectionBench:
         progress: Callable[[float, str], None] | None = None,
         waiting: Callable[[], None] | None = None,
     ) -> Record:
-        """Runs from free motion; arguments and record as for `Bench.run`.
+        """Run from free motion; arguments and record as for `Bench.run`.
 
         Raises:
             InputError: a duration or a press of less than a tick.
@@ -188,14 +188,19 @@ class OneDirectionBench:
     def _record(self, rows: Array, desired: Array, seed: int, end: str, why: str) -> Record:
         force = rows[:, 0]
         touched = np.maximum.accumulate(force > 0.0) if len(force) else force > 0.0
-        firm = np.maximum.accumulate(force > FIRM * desired) if len(force) else touched
+        firm_contact = np.maximum.accumulate(force > FIRM_CONTACT * desired) if len(force) else touched
         phase = np.where(touched, CONTACT, APPROACH)
-        phase[firm & (force <= 0.0)] = LOST
+        phase[firm_contact & (force <= 0.0)] = LOST
         columns = {
-            "t": self.arm.tick * np.arange(len(rows)), "phase": phase, "x": rows[:, 2], "speed": rows[:, 3],
-            "force": force, "force_measured": rows[:, 4], "force_desired": np.where(touched, desired, 0.0),
+            "t": self.arm.tick * np.arange(len(rows)),
+            "phase": phase,
+            "x": rows[:, 2],
+            "speed": rows[:, 3],
+            "force": force,
+            "force_measured": rows[:, 4],
+            "force_desired": np.where(touched, desired, 0.0),
             "bound": rows[:, 1],
-        }  # fmt: skip
+        }
         return Record(columns, COLUMNS, {**self.meta, "seed": seed, "end": end, "why": why})
 
 
@@ -208,18 +213,27 @@ def build_one_direction(experiment: OneDirection) -> OneDirectionBench:
     e = experiment
     arm = load_arm(e.arm)
     if e.noise is not None:
-        told = max(e.noise, 1e-9)
-        arm = msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=told))
+        noise = max(e.noise, 1e-9)
+        arm = msgspec.structs.replace(arm, sensor=msgspec.structs.replace(arm.sensor, noise=noise))
     second = e.force.first if e.force.second is None else e.force.second
-    least = min(e.force.first, second) - e.force.amplitude
+    smallest_force = min(e.force.first, second) - e.force.amplitude
     cap, theta = e.priors.cap * arm.limits.stiffness, e.priors.lag * known_lag(arm)
-    gains = gains_for(arm, least, cap=cap, theta=theta)
+    gains = gains_for(arm, smallest_force, cap=cap, theta=theta)
     f = e.force
     schedule = ForceSchedule(*map(float, (f.first, second, f.period, f.amplitude, f.frequency, 0.0)))
-    truth = {"K": {"value": e.surface.stiffness, "unit": "N/m"},
-             "B": {"value": _damping(arm, e.surface), "unit": "N s/m"}}  # fmt: skip
-    loop = {"arm": arm.title, "kind": arm.kind, "rate_hz": arm.rate, "theta_s": gains.theta, "cap": gains.cap,
-            "approach_m_s": gains.approach, "series": arm.series}  # fmt: skip
+    truth = {
+        "K": {"value": e.surface.stiffness, "unit": "N/m"},
+        "B": {"value": _damping(arm, e.surface), "unit": "N s/m"},
+    }
+    loop = {
+        "arm": arm.title,
+        "kind": arm.kind,
+        "rate_hz": arm.rate,
+        "theta_s": gains.theta,
+        "cap": gains.cap,
+        "approach_m_s": gains.approach,
+        "series": arm.series,
+    }
     meta = {"experiment": msgspec.to_builtins(e), "truth": truth, "loop": loop}
     change = inf if e.surface.later is None else e.surface.changes
     return OneDirectionBench(gains, arm, _surface(arm, e), schedule, change, meta)
@@ -234,6 +248,10 @@ def _surface(arm: Arm, e: OneDirection) -> Surface:
     of = e.surface
     later = of.stiffness if of.later is None else of.later
     return surface(
-        of.stiffness, _damping(arm, of), sway=of.sway, frequency=2.0 * pi * of.sway_frequency, later=later,
+        of.stiffness,
+        _damping(arm, of),
+        sway=of.sway,
+        frequency=2.0 * pi * of.sway_frequency,
+        later=later,
         depth=e.force.first / of.stiffness,
-    )  # fmt: skip
+    )

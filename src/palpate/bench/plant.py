@@ -116,7 +116,7 @@ class Plant(NamedTuple):
     beyond: float = 0.0
 
     def start_at(self, q):
-        """At rest in free motion, at the joint angles q."""
+        """State at rest in free motion, at the joint angles q."""
         return PlantState(
             q,
             0.0 * q,

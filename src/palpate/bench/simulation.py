@@ -22,18 +22,18 @@ from palpate.plugins import reason
 from palpate.signals.types import Sense, Task
 
 DEPTH, RATE = 1e-3, 1e-3
-"""Of the tip in the surface, at which it is asked for its force [m], [m/s]."""
+"""Depth of the tip [m] and its rate [m/s] at which a surface is tried."""
 
 
 class PartCall(NamedTuple):
-    """One method of a part with the arguments that the loop gives it.
+    """A call of one method of a part, with the arguments that the loop gives.
 
     Args:
-        role: what the part is in the loop.
-        part: it.
-        method: of what name.
-        arguments: for it.
-        keeps: which of the values that it returns is the state that it was given; None if none, -1 if all of it.
+        role: of the part in the loop.
+        part: with the method.
+        method: its name.
+        arguments: of the call.
+        keeps: index of the state among the returned values; None if there is none, -1 if the value is the state.
     """
 
     role: str
@@ -44,7 +44,7 @@ class PartCall(NamedTuple):
 
 
 def diagnose(loop: Loop, state: LoopState) -> PartError:
-    """Why a loop does not run compiled, in one line.
+    """The reason why a loop does not run compiled, in one line.
 
     A mistake in a part shows itself in plain Python with the line that makes it, which is the cause of the error
     returned. What only the compiler minds shows itself where the part's methods are compiled one by one.
@@ -53,9 +53,9 @@ def diagnose(loop: Loop, state: LoopState) -> PartError:
     try:
         after = tick(loop, pressed, 0, 0.0, np.empty(len(COLUMNS)))
     except Exception as error:  # noqa: BLE001 - whatever the user's own code raises
-        found = PartError(f"{_user_parts(loop)} fails when it is stepped: {reason(error)}")
-        found.__cause__ = error
-        return found
+        failure = PartError(f"{_user_parts(loop)} fails when it is stepped: {reason(error)}")
+        failure.__cause__ = error
+        return failure
     changed = [name for name in state._fields if _kinds(getattr(state, name)) != _kinds(getattr(after, name))]
     if changed:
         return PartError(
@@ -69,45 +69,45 @@ def diagnose(loop: Loop, state: LoopState) -> PartError:
 
 
 def uncompilable(loop: Loop, state: LoopState) -> str:
-    """Which method of the user's parts does not compile, and why; "" if all do."""
+    """The first method of the user's parts that does not compile, and why; "" if all do."""
     import numba
 
     from palpate._jit.kernels import compiled_alone
 
-    for one in calls(loop, state):
-        returned, why = compiled_alone(getattr(type(one.part), one.method), one.part, *one.arguments)
-        told = f"{one.method} of the {one.role} {type(one.part).__name__}"
+    for call in calls(loop, state):
+        returned, why = compiled_alone(getattr(type(call.part), call.method), call.part, *call.arguments)
+        method = f"{call.method} of the {call.role} {type(call.part).__name__}"
         if why:
-            return f"{told} cannot be compiled: {why}"
-        if one.keeps is None:
+            return f"{method} cannot be compiled: {why}"
+        if call.keeps is None:
             continue
-        kept = returned if one.keeps < 0 else returned.types[one.keeps]
-        if kept != numba.typeof(one.arguments[0]):
+        returned_state = returned if call.keeps < 0 else returned.types[call.keeps]
+        if returned_state != numba.typeof(call.arguments[0]):
             return (
-                f"{told} returns a state of another type than start: {kept}, not {numba.typeof(one.arguments[0])}; "
-                "return the same type in every branch"
+                f"{method} returns a state of another type than start: {returned_state}, "
+                f"not {numba.typeof(call.arguments[0])}; return the same type in every branch"
             )
     return ""
 
 
 def not_finite(loop: Loop, state: LoopState) -> str:
-    """Which method of the user's parts gives a number that is none at its first call; "" if none does.
+    """The first method of the user's parts that returns a number that is not finite; "" if none does.
 
     Raises:
         PartError: a method raises, or does not return what it must.
     """
-    for one in calls(loop, state):
-        told = f"{one.method} of the {one.role} {type(one.part).__name__}"
+    for call in calls(loop, state):
+        method = f"{call.method} of the {call.role} {type(call.part).__name__}"
         try:
             with np.errstate(all="ignore"):
-                value = getattr(one.part, one.method)(*one.arguments)
+                value = getattr(call.part, call.method)(*call.arguments)
         except Exception as error:
-            raise PartError(f"{told} fails: {reason(error)}") from error
-        wrong = _wrong(one, value)
+            raise PartError(f"{method} fails: {reason(error)}") from error
+        wrong = _wrong(call, value)
         if wrong:
-            raise PartError(f"{told} {wrong}")
+            raise PartError(f"{method} {wrong}")
         if not all(map(np.isfinite, _numbers(value))):
-            return f"{told} gives {list(_numbers(value))} at its first tick; every number must be finite"
+            return f"{method} gives {list(_numbers(value))} at its first tick; every number must be finite"
     return ""
 
 
@@ -123,8 +123,8 @@ def _wrong(call: PartCall, value: Any) -> str:
     if call.method == "force" and not isinstance(value, float | int):
         return f"returns a {type(value).__name__}; it must be a number [N]"
     if call.keeps is not None:
-        kept = value if call.keeps < 0 else value[call.keeps]
-        if _kinds(kept) != _kinds(call.arguments[0]):
+        returned_state = value if call.keeps < 0 else value[call.keeps]
+        if _kinds(returned_state) != _kinds(call.arguments[0]):
             return "returns a state of another type than start; start with the types of step"
     return ""
 
@@ -134,11 +134,11 @@ def calls(loop: Loop, state: LoopState) -> Iterator[PartCall]:
     controller, surface = loop.controller, loop.plant.surface
     if is_own(controller):
         sense, task, model = _moment(loop, state)
-        own = controller.start()
+        controller_state = controller.start()
         yield PartCall("controller", controller, "start", (), None)
-        yield PartCall("controller", controller, "step", (own, sense, task, model), 1)
-        yield PartCall("controller", controller, "rest", (own, sense), -1)
-        yield PartCall("controller", controller, "report", (own,), None)
+        yield PartCall("controller", controller, "step", (controller_state, sense, task, model), 1)
+        yield PartCall("controller", controller, "rest", (controller_state, sense), -1)
+        yield PartCall("controller", controller, "report", (controller_state,), None)
     if is_own(surface):
         untouched = surface.start()
         pressed, dt = touch(untouched, RATE), loop.tick / loop.steps
@@ -159,15 +159,15 @@ def _moment(loop: Loop, state: LoopState) -> tuple[Sense, Task, Any]:
 
 
 def is_own(part: Any) -> bool:
-    """Whether a part is the user's, not one that comes with palpate."""
+    """True if a part is the user's, not one that comes with palpate."""
     return type(part).__module__.partition(".")[0] != "palpate"
 
 
 def _user_parts(loop: Loop) -> str:
     """The parts of the user's in a loop."""
-    own = {"controller": loop.controller, "surface": loop.plant.surface}
-    told = [f"the {role} {type(part).__name__}" for role, part in own.items() if is_own(part)]
-    return " or ".join(told) or "a part"
+    parts = {"controller": loop.controller, "surface": loop.plant.surface}
+    names = [f"the {role} {type(part).__name__}" for role, part in parts.items() if is_own(part)]
+    return " or ".join(names) or "a part"
 
 
 def _pressing_state(state: LoopState) -> LoopState:
@@ -177,8 +177,8 @@ def _pressing_state(state: LoopState) -> LoopState:
 
 def _numbers(value: Any) -> Iterator[float]:
     if isinstance(value, tuple):
-        for one in value:
-            yield from _numbers(one)
+        for element in value:
+            yield from _numbers(element)
     elif isinstance(value, int | float):
         yield float(value)
 
@@ -195,7 +195,7 @@ PHASE = list(COLUMNS).index("phase")
 
 @dataclass
 class Simulation:
-    """A loop on its way. The same seed gives the same rows, bit for bit, in steps of any size.
+    """A running loop. The same seed gives the same rows, bit for bit, in steps of any size.
 
     Args:
         loop: all its parts; another one of the same types may take its place between ticks.
@@ -225,7 +225,7 @@ class Simulation:
         return 0.0 if self.contact is None else (self.ticks - self.contact) * self.loop.tick
 
     def advance(self, ticks: int) -> Array:
-        """Runs so many ticks; their rows in the order of `COLUMNS`, shape (ticks, columns).
+        """Run some ticks; return their rows in the order of `COLUMNS`, shape (ticks, columns).
 
         Raises:
             PartError: a part of the user's cannot be compiled, or fails.
@@ -247,20 +247,20 @@ class Simulation:
                 self.waiting or _compiling, self.loop, self.state, self.ticks, noise, out
             )
         except NotCompiled as error:
-            found = diagnose(self.loop, self.state)
-            found.compiler = str(error.__cause__)
+            failure = diagnose(self.loop, self.state)
+            failure.compiler = str(error.__cause__)
             # The compiler's account is a hundred lines on palpate's own code: whoever wants it asks for it.
-            raise found from found.__cause__
+            raise failure from failure.__cause__
 
 
 def _compiling() -> None:
-    """Says why nothing happens for a while, to whoever watches a script."""
+    """Announce the compilation on a terminal, where a script seems to hang."""
     if sys.stderr.isatty():
         sys.stderr.write("palpate: compiling the loop: some ten seconds, once after installation\n")
 
 
 def _march_plain(loop: Loop, state: LoopState, k: int, noise: Array, out: Array) -> LoopState:
-    """As compiled also where numbers are none: plain Python raises there, after the row that has them."""
+    """Run ticks in plain Python, with NaN rows after numbers overflow: compiled code does not raise there."""
     out[:] = np.nan
     try:
         with np.errstate(all="ignore"):

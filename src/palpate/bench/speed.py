@@ -1,4 +1,4 @@
-"""How fast the loop runs here."""
+"""Speed of the loop on this machine."""
 
 import os
 import time
@@ -18,14 +18,14 @@ PRESSING = {
     "approach.hold": 0.1,
     "approach.first": 0.47,
 }
-"""So near that nearly all of a run is pressing, and learning: what a tick costs most in."""
+"""An approach so short that nearly all ticks press and learn, which costs most."""
 STEPS = 20
-"""Of the physics, in each of its ticks."""
+"""Steps of the physics in a tick."""
 TICKS, CHUNKS, REPEATS = 500, 40, 5
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -45,9 +45,9 @@ def measure(waiting: Callable[[], None] | None = None) -> dict[str, float | int]
             state = compiled_march.run(waiting, bench.loop, state, i * TICKS, numbers, out)
 
     def seconds(work: Callable[[], object]) -> float:
-        begun = time.perf_counter()
+        start = time.perf_counter()
         work()
-        return time.perf_counter() - begun
+        return time.perf_counter() - start
 
     march(0)
     alone = min(seconds(lambda: march(0)) for _ in range(REPEATS)) / ticks

@@ -8,8 +8,8 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.records import Record
 
-APPROACH, CONTACT, LOST = 0.0, 1.0, 2.0
-PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact"}
+APPROACH, CONTACT, LOST, RETREAT = 0.0, 1.0, 2.0, 4.0  # 3 is a slide over a wire
+PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact", RETREAT: "retreat"}
 DONE, NO_CONTACT, DIVERGED, LOST_CONTACT, INTERRUPTED = (
     "done",
     "no contact",
@@ -18,13 +18,13 @@ DONE, NO_CONTACT, DIVERGED, LOST_CONTACT, INTERRUPTED = (
     "interrupted",
 )
 BAND = 0.05
-"""Settled: within this share of the desired force."""
+"""Fraction of the desired force within which a force counts as settled."""
 TICK_ROUNDING = 5e-7
-"""Times are multiples of a tick but for rounding: they count as so much longer [s]."""
-SHORTEST = 64
-"""Samples from which on a spectrum tells a period from a trend."""
+"""Tolerance for times that are multiples of a tick [s]."""
+MIN_SPECTRUM_SAMPLES = 64
+"""Samples from which on a spectrum separates a period from a trend."""
 WINDOW = 1.0
-"""Steady figures are means over the last so many seconds [s]."""
+"""Time before the end over which steady figures are averaged [s]."""
 STAY, STAY_FRACTION = 0.5, 0.1
 """Settled: inside the band until the end, for so long [s], and for this fraction of the press at least."""
 STEADY = 0.02
@@ -34,13 +34,13 @@ JOINED = "saturated1"
 """A column that only the thesis' arm has, with its pose and its estimators: an arm of one direction has no joints."""
 FRONT_ENDS = ("thesis", "raw", "matched")
 IDENTIFIER = "identifier"
-"""The one that an experiment asks for besides."""
+"""Prefix of the columns of an experiment's additional identifier."""
 PARAMETERS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Why a run ended.
+    """Reason of a run's end.
 
     Args:
         end: the stable word.
@@ -86,7 +86,7 @@ def summarise(record: Record) -> dict[str, Any]:
 
 
 def losses(record: Record) -> int:
-    """How often contact was lost."""
+    """Number of times that contact was lost."""
     phase = record["phase"]
     return int(np.sum((phase[1:] == LOST) & (phase[:-1] == CONTACT)))
 
@@ -100,7 +100,7 @@ def _share(flags: Array) -> float:
 
 
 def force_figures(record: Record, pressing: Mask, last: Mask) -> dict[str, Any]:
-    """Of the true force, which only a simulation knows; the noise of the measured one beside it.
+    """Errors of the true force, which only a simulation knows, and the noise of the measured force.
 
     Args:
         record: with the columns t, force, force_desired and force_measured.
@@ -128,7 +128,7 @@ def force_figures(record: Record, pressing: Mask, last: Mask) -> dict[str, Any]:
 
 
 def settling_time(since: Array, outside: Mask) -> float | None:
-    """From when on a force stays inside its band [s]; None if it leaves it too near to the end to be called settled.
+    """Time from which on a force stays inside its band [s]; None if it does not stay long enough.
 
     Args:
         since: time since the touch [s], shape (n,).
@@ -153,7 +153,7 @@ def ringing(t: Array, force: Array, desired: Array) -> dict[str, float] | None:
         desired: the desired force, shape (n,) [N].
     """
     n = len(t)
-    if n < SHORTEST or np.any(desired != desired[-1]):
+    if n < MIN_SPECTRUM_SAMPLES or np.any(desired != desired[-1]):
         return None
     from scipy.signal import detrend
 
@@ -184,16 +184,16 @@ def _final_estimates(record: Record, last: Mask) -> dict[str, Any]:
     They take the surface for a spring, a damper and a mass; whether it is one, `palpate.identify` says of the record.
     """
     end = int(np.nonzero(last)[0][-1])
-    found: dict[str, Any] = {
+    estimates: dict[str, Any] = {
         front: {p: float(record[f"{p}_{front}"][end]) for p in PARAMETERS} for front in FRONT_ENDS
     }
     if "K_identifier" in record.columns:
-        found[IDENTIFIER] = {p: _finite_or_none(record[f"{p}_{IDENTIFIER}"][end]) for p in PARAMETERS}
-        found[f"{IDENTIFIER}_std"] = {
+        estimates[IDENTIFIER] = {p: _finite_or_none(record[f"{p}_{IDENTIFIER}"][end]) for p in PARAMETERS}
+        estimates[f"{IDENTIFIER}_std"] = {
             p: _finite_or_none(record[f"{p}_{IDENTIFIER}_std"][end]) for p in PARAMETERS
         }
-    found["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
+    estimates["matched_std"] = {p: float(record[f"{p}_matched_std"][end]) for p in PARAMETERS}
     displacement = float(np.mean(record["displacement"][last]))
     force = float(np.mean(record["force_measured"][last]))
-    found["force_over_displacement"] = {"K": force / displacement if displacement else None}
-    return found
+    estimates["force_over_displacement"] = {"K": force / displacement if displacement else None}
+    return estimates

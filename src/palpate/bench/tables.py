@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 import msgspec
 from msgspec import Meta
 
-from palpate.bench.toml_parts import ROLES, TomlFiles, explain, not_finite, table_of
+from palpate.bench.toml_parts import ROLES, TomlFiles, convert_table, not_finite, plugin_table
 from palpate.controllers import ControllerTable, HybridController
 from palpate.environments import SurfaceTable
 from palpate.errors import InputError, PluginError
@@ -73,7 +73,7 @@ class Friction(Table):
     bristle_damping: NotNegativeTriple = (120.0, 11.0, 0.65)
     viscous: NotNegativeTriple = (0.0, 0.0, 0.0)
     asymmetry: Annotated[float, Meta(gt=-1, lt=1)] = 0.0
-    """By which share both levels are higher forward and lower backward."""
+    """Fraction by which both levels are higher forward and lower backward."""
 
 
 class ElasticTable(Table):
@@ -85,7 +85,7 @@ class ElasticTable(Table):
 
 
 class Wall(Table):
-    """Where the surface is, and how the tip sticks to it."""
+    """Place of the surface, and friction of the tip along it."""
 
     x: float = 0.465
     side_stiffness: Positive = 5000.0
@@ -94,20 +94,20 @@ class Wall(Table):
 
 
 class Encoders(Table):
-    """Of the joints: counts a turn."""
+    """Counts per turn of the joints' encoders."""
 
     counts: PositiveTriple = (614400.0, 409600.0, 2000.0)
 
 
 class ForceSensorTable(Table):
-    """Its noise and its chain: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
+    """Noise and signal chain of the force sensor: low-pass [Hz], sampling [Hz], bits over a full scale [N]."""
 
     noise: NotNegative = 0.6
     """Standard deviation of a sample [N]."""
     cutoff: Positive = 120.0
     sampling: Annotated[int, Meta(ge=1)] = 480
     phase: NotNegative = 0.0
-    """When its clock ticks first [s], less than a period of its sampling."""
+    """Time of the sensor's first tick [s], less than a period of its sampling."""
     bits: Annotated[int, Meta(ge=2, le=32)] = 12
     full_scale: Positive = 200.0
     analog_filter: bool = False
@@ -115,19 +115,19 @@ class ForceSensorTable(Table):
     beyond: NotNegative = 0.0
     """Mass between sensor and tip, whose inertia is read as force [kg]."""
     roughness: NotNegative = 0.0
-    """By which share the noise grows for each m/s of the tip [s/m]."""
+    """Relative growth of the noise with the speed of the tip [s/m]."""
 
 
 class Filters(Table):
     """The controller's own low-passes [Hz]."""
 
     motion: Positive = 35.0
-    """Of Cartesian velocity and acceleration, and of joint 3 [Hz]."""
+    """Cut-off for Cartesian velocity and acceleration, and for joint 3 [Hz]."""
     force: Positive = 120.0
 
 
 class ApproachTable(Table):
-    """How the arm looks for the surface: a hold [s], then steps of x [m] each period [s]; the gains of the position."""
+    """Approach to the surface: a hold [s], then steps of x [m] each period [s]; gains of the position."""
 
     hold: NotNegative = 5.0
     first: float = 0.456
@@ -150,7 +150,7 @@ class ChirpTable(Table):
     seconds: Positive
     amplitude: float
     logarithmic: bool = False
-    """Its frequency grows by the same factor each second, not by the same difference."""
+    """The frequency grows by a constant factor per second instead of a constant difference."""
 
 
 class MultisineTable(Table):
@@ -166,7 +166,7 @@ class DesiredForce(Table):
 
     first: float = 20.0
     second: float | None = None
-    """Of every other interval; as the first when left out."""
+    """Force of every other interval [N]; the first if left out."""
     period: Positive = 2.5
     amplitude: float = 0.0
     frequency: NotNegative = 0.5
@@ -176,7 +176,7 @@ class DesiredForce(Table):
 
 
 class CompensationTable(Table):
-    """Of friction, by Coulomb's law with a blend through zero; level zero leaves it out."""
+    """Compensation of friction by Coulomb's law with a blend through zero; none at level zero."""
 
     level: NotNegativeTriple = (0.0, 0.0, 0.0)
     blend: PositiveTriple = (0.002, 0.002, 0.002)
@@ -193,7 +193,7 @@ class IdentificationTable(Table):
     touch: Positive = 2.0
     """Filtered force from which the matched estimator listens [N]."""
     cutoff: Positive = 35.0
-    """Of the matched estimator's state-variable filter [Hz]."""
+    """Cut-off of the matched estimator's state-variable filter [Hz]."""
 
 
 class Experiment(Table, kw_only=True):
@@ -267,11 +267,12 @@ def convert(tables: dict[str, Any], where: str, kind: type[T]) -> T:
     if bad is not None:
         raise InputError(f"{where}: {bad}")
     try:
-        own = _own_parts(tables) if kind is Experiment else {}
-        experiment = _as(kind, {**tables, **{key: _STAND_INS[key] for key in own}})
-        return msgspec.structs.replace(experiment, **own) if own else experiment
+        plugin_tables = _own_parts(tables) if kind is Experiment else {}
+        converted: Any = convert_table({**tables, **{key: _STAND_INS[key] for key in plugin_tables}}, kind)
     except InputError as error:
         raise type(error)(f"{where}: {error}") from error
+    experiment: T = msgspec.structs.replace(converted, **plugin_tables) if plugin_tables else converted
+    return experiment
 
 
 _STAND_INS = {
@@ -287,21 +288,14 @@ _STAND_INS = {
 
 def _own_parts(tables: Mapping[str, Any]) -> dict[str, Any]:
     """The tables that name a plug-in, each of the type that its part gives it."""
-    found = {}
+    plugin_tables = {}
     for key, role in ROLES.items():
         table = tables.get(key)
         if isinstance(table, dict) and is_plugin(table.get("kind")):
             try:
-                kind = table_of(role, table["kind"])
+                kind = plugin_table(role, table["kind"])
             except InputError as error:
                 raise PluginError(str(error)) from error
             holder = msgspec.defstruct("Holder", [(key, kind)])
-            found[key] = getattr(_as(holder, {key: table}), key)
-    return found
-
-
-def _as(kind: Any, tables: dict[str, Any]) -> Any:
-    try:
-        return msgspec.convert(tables, kind)
-    except msgspec.ValidationError as error:
-        raise InputError(explain(str(error), tables, kind)) from error
+            plugin_tables[key] = getattr(convert_table({key: table}, holder), key)
+    return plugin_tables

@@ -19,8 +19,8 @@ from palpate.records import Record
 from palpate.signals.samples import quantise
 
 Path = Callable[[Array], Array] | ArrayLike
-"""A function of times [s], or positions [m] at ticks, shape (n,), or at steps of the physics, shape (n, steps)."""
-LEAST = 4
+"""A function of times [s], or positions [m] at ticks, shape (n,)."""
+MIN_TICKS = 4
 """Ticks that a path must have: a cubic spline needs so many."""
 
 
@@ -37,7 +37,7 @@ def positions(path: Path, duration: float | None, tick: float, steps: int) -> Ar
             raise InputError(
                 "duration belongs to a path that is a function; an array has its own, leave it out"
             )
-        x = _extend(np.asarray(path, dtype=np.float64), steps)
+        x = _interpolate(np.asarray(path, dtype=np.float64), steps)
     if not np.isfinite(x).all():
         raise InputError("path must be finite numbers, got some that are not; look for NaN in it")
     return x
@@ -49,9 +49,9 @@ def _sample_function(
     tick: float,
     steps: int,
 ) -> Array:
-    if duration is None or not duration >= LEAST * tick:
+    if duration is None or not duration >= MIN_TICKS * tick:
         raise InputError(
-            f"duration must be at least {LEAST * tick:g} s for a path that is a function, got {duration}"
+            f"duration must be at least {MIN_TICKS * tick:g} s for a path that is a function, got {duration}"
         )
     times: Array = np.arange(-1.0, round(duration / tick) * steps + 1) * (tick / steps)
     x = np.asarray(path(times), dtype=np.float64)
@@ -60,24 +60,14 @@ def _sample_function(
     return x
 
 
-def _extend(path: Array, steps: int) -> Array:
-    if path.ndim not in {1, 2} or len(path) < LEAST or (path.ndim == 2 and path.shape[1] != steps):
-        raise InputError(
-            f"path must be of shape (n,), one position a tick, or (n, {steps}), one a step of the physics, with n at "
-            f"least {LEAST}; got {path.shape}"
-        )
-    if path.ndim == 1:
-        return _interpolate(path, steps)
-    flat = path.ravel()
-    # One step on at constant acceleration.
-    before, after = (3.0 * (a - b) + c for a, b, c in (flat[:3], flat[:-4:-1]))
-    return np.concatenate([[before], flat, [after]])
-
-
 def _interpolate(at_ticks: Array, steps: int) -> Array:
-    """By a cubic spline: acceleration has no jumps, which a mass would feel."""
+    """Interpolate by a cubic spline, whose acceleration has no jumps."""
     from scipy.interpolate import CubicSpline
 
+    if at_ticks.ndim != 1 or len(at_ticks) < MIN_TICKS:
+        raise InputError(
+            f"path must be of shape (n,), one position a tick, with n at least {MIN_TICKS}; got {at_ticks.shape}"
+        )
     if not np.isfinite(at_ticks).all():
         return at_ticks
     spline = CubicSpline(np.arange(len(at_ticks)), at_ticks)
@@ -145,20 +135,19 @@ class GivenMotion:
 
     @property
     def tick(self) -> float:
-        """Between two rows [s]."""
+        """Time between two rows [s]."""
         return self.steps / self.line.sensor.rate
 
     def run(
         self, path: Path, duration: float | None = None, seed: int = 0, *, compiled: bool = True
     ) -> Record:
-        """Moves the tip along a path that grows into the surface.
+        """Move the tip along a path that grows into the surface.
 
         A path that starts in contact starts as after a long rest there.
 
         Args:
             path: x of the tip [m]: a function of an array of times [s] (also of a step before 0 and after the end);
-                or an array, (n,) with one value a tick, between which it is interpolated by a cubic spline; or
-                (n, steps), with one value a step of the physics.
+                or an array, (n,) with one value a tick, between which it is interpolated by a cubic spline.
             duration: [s]; of a function only, an array has its own.
             seed: of the noise; the same seed gives the same record, bit for bit.
             compiled: False runs the same code in plain Python.
@@ -183,18 +172,20 @@ class GivenMotion:
         )
 
     def _march(self, x: Array, noise: Array, rows: Array, compiled: bool) -> list[float]:
-        """Fills the rows, surface by surface; the rest positions of those that were reached [m]."""
+        """Fill the rows, surface by surface; return the rest positions of the reached surfaces [m]."""
         march = compiled_march if compiled else march_path
-        rest, rests = self.wall, []
-        state, way = self._start(x, noise)
+        rest_position, rests = self.wall, []
+        state, line_state = self._start(x, noise)
         for i, (first, last) in enumerate(self._spans(len(rows))):
             surface = self.surfaces[i][1]
             if i > 0 and state.contact == 1.0:
-                rest, state = self._next_surface(i, state, x[first * self.steps :], rest)
-            rests.append(rest)
+                rest_position, state = self._next_surface(i, state, x[first * self.steps :], rest_position)
+            rests.append(rest_position)
             piece = x[first * self.steps : last * self.steps + 2]
             numbers = noise[first:last], rows[first:last]
-            state, way = march(surface, self.line, state, way, piece, rest, first, self.steps, *numbers)
+            state, line_state = march(
+                surface, self.line, state, line_state, piece, rest_position, first, self.steps, *numbers
+            )
         return rests
 
     def _spans(self, ticks: int) -> list[tuple[int, int]]:
@@ -211,28 +202,30 @@ class GivenMotion:
             force = max(surface.force(state, now, rate) + surface.mass * second, 0.0)
         return state, self.line.settled_at(force, noise[-1], noise[-2])
 
-    def _next_surface(self, i: int, state: SurfaceState, x: Array, rest: float) -> tuple[float, SurfaceState]:
+    def _next_surface(
+        self, i: int, state: SurfaceState, x: Array, rest_position: float
+    ) -> tuple[float, SurfaceState]:
         """Rest position [m] and state of the i-th surface, relaxed, under the force that there is already."""
         old, new = self.surfaces[i - 1][1], self.surfaces[i][1]
-        now, rate, second = self._motion(x, rest)
+        now, rate, second = self._motion(x, rest_position)
         force = old.force(state, now, rate) + old.mass * second
         depth = rest_for(new, force - new.mass * second, rate)
-        return rest + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
+        return rest_position + now - depth, SurfaceState(depth, rate, 0.0, 1.0)
 
-    def _motion(self, x: Array, rest: float) -> tuple[float, float, float]:
+    def _motion(self, x: Array, rest_position: float) -> tuple[float, float, float]:
         """Penetration, rate and acceleration at the second of these positions."""
         physics = float(self.line.sensor.rate)
-        before, now, after = (float(at) - rest for at in x[:3])
+        before, now, after = (float(at) - rest_position for at in x[:3])
         return now, (after - before) * 0.5 * physics, (after - 2.0 * now + before) * physics * physics
 
     def _description(self, rests: list[float]) -> dict[str, Any]:
         """Metadata of the record, in plain values."""
-        told = [
-            {"from_s": since, "rest_m": rest, "truth": _truth(surface)}
-            for (since, surface), rest in zip(self.surfaces, rests, strict=False)
+        described = [
+            {"from_s": since, "rest_m": rest_position, "truth": _truth(surface)}
+            for (since, surface), rest_position in zip(self.surfaces, rests, strict=False)
         ]
         instruments = {"force": self.line.description(), "position": {"lag_s": 0.0}}
-        return {"truth": told[-1]["truth"], "surfaces": told, "instruments": instruments}
+        return {"truth": described[-1]["truth"], "surfaces": described, "instruments": instruments}
 
 
 def given_motion(
@@ -273,7 +266,7 @@ def _in_turn(surface: Any | list[tuple[float, Any]]) -> tuple[tuple[float, Any],
             f"surfaces must start at growing times [s], the first at 0, got {[t for t, _ in turns]}"
         )
     return tuple(
-        (float(since), join(one) if type(one) in map(type, members()) else one) for since, one in turns
+        (float(since), join(part) if type(part) in map(type, members()) else part) for since, part in turns
     )
 
 

@@ -13,7 +13,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from types import NoneType
-from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -25,6 +25,7 @@ from palpate.files import read_text
 from palpate.plugins import Plugin, plugin, reason
 from palpate.signals.types import Table, Triple, alike, triple
 
+T = TypeVar("T")
 _KINDS = {
     "float": "a number",
     "int": "a whole number",
@@ -48,20 +49,32 @@ def explain(message: str, tables: Mapping[str, Any], kind: Any) -> str:
         tables: what was given, without types.
         kind: the type that it should have had.
     """
-    what, _, path = message.partition(" - at `$")
+    fault, _, path = message.partition(" - at `$")
     steps = re.findall(r"[^.\[\]`]+", path)
-    if found := _UNKNOWN_KEY.match(what):
-        return _unknown("key", found[1], _keys(kind, tables, steps), _place(steps))
-    if found := _MISSING.match(what):
-        choices = _choices(kind, tables, [*steps, found[1]])
-        those = f"; it is one of: {', '.join(choices)}" if choices else ""
-        return f"the key {found[1]!r} is missing{_place(steps)}{those}"
+    if match := _UNKNOWN_KEY.match(fault):
+        return _unknown("key", match[1], _keys(kind, tables, steps), _place(steps))
+    if match := _MISSING.match(fault):
+        choices = _choices(kind, tables, [*steps, match[1]])
+        choice_hint = f"; it is one of: {', '.join(choices)}" if choices else ""
+        return f"the key {match[1]!r} is missing{_place(steps)}{choice_hint}"
     given = _given_value(tables, steps)
-    if what.startswith("Invalid"):
+    if fault.startswith("Invalid"):
         return _unknown(steps[-1], str(given), _choices(kind, tables, steps), _place(steps[:-1]))
-    if found := _EXPECTED.match(what):
-        return f"{_name(steps)} must be {_allowed_value(*found.groups())}, got {given!r}"
-    return f"{what}{_place(steps)}"
+    if match := _EXPECTED.match(fault):
+        return f"{_name(steps)} must be {_allowed_value(*match.groups())}, got {given!r}"
+    return f"{fault}{_place(steps)}"
+
+
+def convert_table(tables: Any, kind: type[T]) -> T:
+    """A table of a TOML file as a struct of this kind.
+
+    Raises:
+        InputError: a key that does not exist, or a value out of range.
+    """
+    try:
+        return msgspec.convert(tables, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(explain(str(error), tables, kind)) from error
 
 
 def not_finite(tables: Any, steps: tuple[str, ...] = ()) -> str | None:
@@ -126,23 +139,23 @@ def _structs(
     for step in steps:
         kind = next(f.type for f in msgspec.structs.fields(kind) if f.encode_name == step)
     given = _given_value(tables, steps)
-    for one in get_args(kind) or (kind,):
-        if one is NoneType:  # a table that may be left out
+    for struct in get_args(kind) or (kind,):
+        if struct is NoneType:  # a table that may be left out
             continue
-        config = one.__struct_config__
+        config = struct.__struct_config__
         if of_any_kind or config.tag_field is None or given.get(config.tag_field) in {config.tag, None}:
-            yield one
+            yield struct
 
 
 @dataclass(frozen=True)
 class TomlFiles:
-    """Where they are.
+    """Files of one kind that come with palpate, and their folders.
 
     Args:
-        kind: what one of them is, as `experiment`.
+        kind: word for one file, as `experiment`.
         article: of that word.
-        package: that holds those of palpate.
-        folders: of it.
+        package: that holds the files.
+        folders: in that package.
     """
 
     kind: str
@@ -255,22 +268,22 @@ class OwnTable(Table, frozen=True):
 
 
 def _restore(role: str, known: Plugin, values: dict[str, Any]) -> OwnTable:
-    """As it was pickled, in another process."""
+    """Restore a pickled table in another process."""
     known.value()
-    return table_of(ROLES[role], known.name)(**values)
+    return plugin_table(ROLES[role], known.name)(**values)
 
 
-def table_of(role: Role, name: str) -> Any:
+def plugin_table(role: Role, name: str) -> Any:
     """The type of the table that asks for a plug-in.
 
     Raises:
         InputError: it cannot be imported, or is no such part.
     """
-    return _table_of(role.key, plugin(name))
+    return _plugin_table(role.key, plugin(name))
 
 
 @cache
-def _table_of(key: str, known: Plugin) -> Any:
+def _plugin_table(key: str, known: Plugin) -> Any:
     role, part = ROLES[key], known.value()
     check_protocol(role, part, known.name)
     if role.compiled:
@@ -292,7 +305,7 @@ def _table_of(key: str, known: Plugin) -> Any:
     )
 
 
-def role_of(name: str) -> Role:
+def find_role(name: str) -> Role:
     """Role of a plug-in, from its methods.
 
     Raises:
@@ -327,16 +340,19 @@ def check_protocol(role: Role, part: Any, name: str) -> None:
     if role is SURFACE and not hasattr(part, "mass"):
         raise InputError(f"{name} has no mass [kg]; a surface states it: give it a field 'mass: float = 0.0'")
     for method, (arguments, result) in {**role.methods, **role.optional}.items():
-        own, wanted = getattr(part, method, None), f"{method}(self{', ' if arguments else ''}{arguments})"
-        if own is None:
+        function, signature = (
+            getattr(part, method, None),
+            f"{method}(self{', ' if arguments else ''}{arguments})",
+        )
+        if function is None:
             if method in role.methods:
-                raise InputError(f"{name} has no method {method}; {a} has {wanted} -> {result}")
+                raise InputError(f"{name} has no method {method}; {a} has {signature} -> {result}")
             continue
         try:
-            inspect.signature(own).bind(None, *filter(None, arguments.split(", ")))
+            inspect.signature(function).bind(None, *filter(None, arguments.split(", ")))
         except (TypeError, ValueError):
-            got = inspect.signature(own) if callable(own) else "no function"
-            raise InputError(f"{method} of {name} is {got}; it must be {wanted} -> {result}") from None
+            got = inspect.signature(function) if callable(function) else "no function"
+            raise InputError(f"{method} of {name} is {got}; it must be {signature} -> {result}") from None
 
 
 def _kinds(part: Any, role: Role) -> dict[str, Any]:
@@ -344,17 +360,17 @@ def _kinds(part: Any, role: Role) -> dict[str, Any]:
     if role.compiled:
         hints = get_type_hints(part)
         return {name: hints.get(name, Any) for name in part._fields}
-    found = inspect.signature(part).parameters.values()
-    return {p.name: Any for p in found if p.kind in {p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY}}
+    parameters = inspect.signature(part).parameters.values()
+    return {p.name: Any for p in parameters if p.kind in {p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY}}
 
 
 def _field(known: Plugin, name: str, kind: Any) -> Any:
     if kind is Any:
         return Any
     if kind not in _FIELDS:
-        told = getattr(kind, "__name__", str(kind))
+        type_name = getattr(kind, "__name__", str(kind))
         raise InputError(
-            f"the field {name} of {known.name} is of type {told}; it may be float, int, bool or Vec3"
+            f"the field {name} of {known.name} is of type {type_name}; it may be float, int, bool or Vec3"
         )
     return _FIELDS[kind]
 
@@ -370,7 +386,7 @@ def _default(part: Any, role: Role, name: str) -> tuple[Any, ...]:
 
 
 def _value(value: Any, kind: Any) -> Any:
-    """As the part takes it: an integer would be another type to the compiler."""
+    """Convert a value to the field's type: an integer would be another type to the compiler."""
     if kind is Vec3:
         return alike(value) if isinstance(value, int | float) else triple(value)
     return float(value) if kind is float else value

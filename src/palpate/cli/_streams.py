@@ -32,10 +32,10 @@ def prepare() -> None:
     A stream that was closed before the program began is opened to the null device: otherwise the next opened file
     would take its descriptor. A letter that the encoding lacks is escaped.
     """
-    codecs.register_error(_ERRORS, _plainly)
+    codecs.register_error(_ERRORS, _replace_letters)
     for name, number, mode in (("stdin", 0, "r"), ("stdout", 1, "w"), ("stderr", 2, "w")):
         if getattr(sys, name) is None:
-            _to_nowhere(number)
+            _redirect_to_null(number)
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -44,22 +44,34 @@ def prepare() -> None:
         _silence_libraries()
 
 
+MIN_WIDTH = 20
+"""Narrowest terminal that is believed [columns]: narrower, a table has no room for one number and its unit."""
+
+
+def forget_impossible_size() -> None:
+    """Remove COLUMNS and LINES from the environment where no terminal has such a size: the terminal is asked then."""
+    for name, least in (("COLUMNS", MIN_WIDTH), ("LINES", 1)):
+        size = os.environ.get(name, "")
+        if not (size.isdecimal() and int(size[:9]) >= least):
+            os.environ.pop(name, None)
+
+
 def _silence_libraries() -> None:
     """Let nothing reach standard error but what palpate writes there.
 
-    A library warns, logs, writes to the descriptor from compiled code, or dies in a thread of its own: of all that the
-    reader of a command can change nothing, and what concerns them palpate says in its own line.
+    A library warns, logs, writes to the descriptor from compiled code, or fails in its own thread. The user can change
+    none of that; palpate reports what concerns the user in its own line.
     """
     warnings.showwarning = lambda *_, **__: None
     logging.disable()
-    threading.excepthook = _in_a_thread
-    own = os.dup(2)
+    threading.excepthook = _report_thread_error
+    descriptor = os.dup(2)
     encoding = getattr(sys.stderr, "encoding", None) or "utf-8"
-    sys.stderr = open(own, "w", buffering=1, encoding=encoding, errors=_ERRORS)  # noqa: SIM115, PTH123 - a number
-    _to_nowhere(2)
+    sys.stderr = open(descriptor, "w", buffering=1, encoding=encoding, errors=_ERRORS)  # noqa: SIM115, PTH123 - a number
+    _redirect_to_null(2)
 
 
-def _in_a_thread(died: threading.ExceptHookArgs) -> None:
+def _report_thread_error(died: threading.ExceptHookArgs) -> None:
     """A thread's error, where it is a defect of palpate."""
     package = os.path.dirname(os.path.dirname(__file__))  # noqa: PTH120 - as frames have it
     frames = traceback.extract_tb(died.exc_traceback)
@@ -67,12 +79,14 @@ def _in_a_thread(died: threading.ExceptHookArgs) -> None:
         threading.__excepthook__(died)
 
 
-def flush(stream: TextIO) -> None:
-    """Write the buffers; if that fails, drop them, so that nothing fails at exit.
+def flush(stream: TextIO | None) -> None:
+    """Write the buffers; if that fails, drop them, so that nothing fails at exit. A closed stream is None.
 
     Raises:
         OSError: the stream is full, or its reader has gone.
     """
+    if stream is None:
+        return
     try:
         stream.flush()
     except OSError:
@@ -83,31 +97,31 @@ def flush(stream: TextIO) -> None:
 def drop(stream: TextIO) -> None:
     """Discard the buffers and all later output."""
     with suppress(OSError):  # a stream without a file has nobody else to fail
-        _to_nowhere(stream.fileno())
+        _redirect_to_null(stream.fileno())
     with suppress(OSError):
         stream.flush()
 
 
-def _to_nowhere(number: int) -> None:
+def _redirect_to_null(number: int) -> None:
     nowhere = os.open(os.devnull, os.O_RDWR)
     if nowhere != number:
         os.dup2(nowhere, number)
         os.close(nowhere)
 
 
-def _plainly(error: UnicodeError) -> tuple[str | bytes, int]:
+def _replace_letters(error: UnicodeError) -> tuple[str | bytes, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = error.object[error.start : error.end]
     return "".join(_PLAIN.get(a) or ascii(a)[1:-1] for a in letters), error.end
 
 
-_AGAIN = 0.05
-"""Delay until it is raised again [s]."""
+_RETRY_DELAY = 0.05
+"""Delay until a postponed Ctrl-C is raised again [s]."""
 _CAUGHT = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT}
-_OF_TERMINALS = (signal.SIGTTIN, signal.SIGTTOU)
-"""Would halt a process in the background that reads or writes; ignored, the call itself fails or succeeds."""
-_LEFT = {
+_TERMINAL_SIGNALS = (signal.SIGTTIN, signal.SIGTTOU)
+"""Signals that halt a process in the background when it reads or writes; if ignored, the call itself fails."""
+_NOT_NOTICED = {
     *(signal.SIGKILL, signal.SIGSTOP),  # no program can catch them
     *(
         signal.SIGSEGV,
@@ -119,7 +133,7 @@ _LEFT = {
         signal.SIGABRT,
     ),
     *(signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH),  # they end nothing
-    *(signal.SIGPIPE, signal.SIGXFSZ, *_OF_TERMINALS),  # of a write, which fails by itself
+    *(signal.SIGPIPE, signal.SIGXFSZ, *_TERMINAL_SIGNALS),  # of a write, which fails by itself
 }
 
 
@@ -130,11 +144,11 @@ def keep() -> None:
     cases it is raised later.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _raise_or_put_off)
+        signal.signal(signal.SIGINT, _raise_or_postpone)
 
     def hook(unraisable: Any) -> None:
         if unraisable.exc_type is KeyboardInterrupt:
-            _put_off()
+            _postpone_interrupt()
         elif sys.warnoptions:  # else a finaliser's trouble is a library's, and concerns no reader
             sys.__unraisablehook__(unraisable)
 
@@ -151,7 +165,7 @@ class Noticed:
 
     @property
     def reason(self) -> str | None:
-        """Its sentence; None if no signal came."""
+        """Sentence about the signal; None if no signal came."""
         if not self.number:
             return None
         names = {int(known): known.name for known in signal.Signals} | {int(signal.SIGINT): "Ctrl-C"}
@@ -175,39 +189,39 @@ def notice_signals() -> Iterator[Noticed]:
     for a SIGHUP that is ignored (nohup). Of the others those are, whose default would end or halt the process. What no
     program can catch (SIGKILL, SIGSTOP), and faults of the process itself (SIGSEGV), are left.
     """
-    came = Noticed()
+    noticed = Noticed()
     if threading.current_thread() is not threading.main_thread():  # no signal gets here
-        yield came
+        yield noticed
         return
     before = {number: signal.getsignal(number) for number in signal.valid_signals()}
     caught = [number for number, handler in before.items() if _ends(number, handler)]
     try:
         for number in caught:
-            signal.signal(number, came.notice)
-        for number in _OF_TERMINALS:
+            signal.signal(number, noticed.notice)
+        for number in _TERMINAL_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
-        yield came
+        yield noticed
     finally:
-        for number in (*caught, *_OF_TERMINALS):
+        for number in (*caught, *_TERMINAL_SIGNALS):
             handler = before[number]
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _ends(number: int, handler: Any) -> bool:
-    """Whether a signal would end or halt this process, and can be caught."""
+    """True if a signal would end or halt this process, and can be caught."""
     if number in _CAUGHT:
         return number != signal.SIGHUP or handler != signal.SIG_IGN
-    return handler == signal.SIG_DFL and number not in _LEFT
+    return handler == signal.SIG_DFL and number not in _NOT_NOTICED
 
 
-def _raise_or_put_off(number: int, frame: FrameType | None) -> None:
-    if _importing(frame):
-        _put_off()
+def _raise_or_postpone(number: int, frame: FrameType | None) -> None:
+    if _is_importing(frame):
+        _postpone_interrupt()
     else:
         signal.default_int_handler(number, frame)
 
 
-def _importing(frame: FrameType | None) -> bool:
+def _is_importing(frame: FrameType | None) -> bool:
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
             return True
@@ -215,10 +229,10 @@ def _importing(frame: FrameType | None) -> bool:
     return False
 
 
-def _put_off() -> None:
+def _postpone_interrupt() -> None:
     main = threading.main_thread().ident
     assert main is not None
-    timer = threading.Timer(_AGAIN, signal.pthread_kill, (main, signal.SIGINT))
+    timer = threading.Timer(_RETRY_DELAY, signal.pthread_kill, (main, signal.SIGINT))
     timer.daemon = True
     timer.start()
 
@@ -234,6 +248,8 @@ _DANGEROUS = {"--replace", "--yes"}
 _REMEDIES = {
     errno.ENOSPC: "free some space, or choose another place",
     errno.EDQUOT: "free some space, or choose another place",
+    errno.EMFILE: "allow this process more open files, as with: ulimit -n 1024",
+    errno.ENFILE: "end other programs: this machine has no more open files",
     errno.EACCES: "check its permissions, or choose another place",
     errno.EPERM: "check its permissions, or choose another place",
     errno.EROFS: "choose another place",
@@ -254,7 +270,7 @@ def run_guarded(command: Callable[[], Any]) -> int:
         code = command()
         flush(sys.stdout)
     except BaseException as error:  # noqa: BLE001 - the last one out: exits and interrupts are codes too
-        return _settle(_code_of(error))
+        return _settle(_exit_code(error))
     return _settle(DONE if code is None else int(code))
 
 
@@ -266,7 +282,7 @@ def _settle(code: int) -> int:
     return code
 
 
-def _code_of(error: BaseException) -> int:
+def _exit_code(error: BaseException) -> int:
     match error:
         case SystemExit(__context__=BrokenPipeError()):  # rich's way of saying it
             return READER_GONE
@@ -278,27 +294,37 @@ def _code_of(error: BaseException) -> int:
             drop(sys.stdout)
             return READER_GONE
         case CycloptsError():
-            return _say(f"{_without_danger(error)} {_where_help_is(error)}", WRONG_INPUT)
+            return _say(f"{_drop_dangerous_hint(error)} {_help_hint(error)}", WRONG_INPUT)
         case PalpateError():
-            return _say(str(error), WRONG_INPUT)
+            return _say(str(error), WRONG_INPUT, error.longest)
         case OSError():
             return _say(_system_line(error), WRONG_INPUT)
         case MemoryError():
             return _say(f"not enough memory for this input: {error or 'give a shorter one'}", WRONG_INPUT)
         case _:
-            with suppress(OSError):
-                traceback.print_exception(error)
-            return _say("this is a defect of palpate; please report the lines above", DEFECT)
+            return _report_defect(error)
 
 
-def _say(text: str, code: int) -> int:
-    line = printable(shorten(" ".join(text.split()), LONGEST))
+def _report_defect(error: BaseException) -> int:
+    """Print the traceback of a defect; what the user's own code raises beside Exceptions is one line."""
+    if not isinstance(error, Exception):
+        from palpate.plugins import reason, where_it_fails
+
+        if where_it_fails(error):
+            return _say(f"{reason(error)}; let your code raise an Exception, or end by itself", WRONG_INPUT)
+    with suppress(OSError):
+        sys.stderr.write(printable("".join(traceback.format_exception(error))))
+    return _say("this is a defect of palpate; please report the lines above", DEFECT)
+
+
+def _say(text: str, code: int, longest: int = LONGEST) -> int:
+    line = printable(shorten(" ".join(text.split()), longest))
     with suppress(OSError):  # standard error is full or closed: the code still tells
         print(f"palpate: {line}", file=sys.stderr)  # noqa: T201
     return code
 
 
-def _without_danger(error: CycloptsError) -> str:
+def _drop_dangerous_hint(error: CycloptsError) -> str:
     """The error, without a suggestion of a flag that removes results or skips a question.
 
     A typing error must not suggest a destructive flag.
@@ -310,13 +336,13 @@ def _without_danger(error: CycloptsError) -> str:
     return text.replace(guess[0], "")
 
 
-def _where_help_is(error: CycloptsError) -> str:
+def _help_hint(error: CycloptsError) -> str:
     words = ["palpate", *(error.command_chain or ()), "--help"]
     return f"(see: {' '.join(words)})"
 
 
 def _system_line(error: OSError) -> str:
     where = error.filename if error.filename is not None else "standard output or a file"
-    what = error.strerror or str(error) or type(error).__name__
+    fault = error.strerror or str(error) or type(error).__name__
     remedy = _REMEDIES.get(error.errno or 0, "check the path and try again")
-    return f"{where}: {what}; {remedy}"
+    return f"{where}: {fault}; {remedy}"

@@ -8,26 +8,23 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import traceback
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from palpate.cli._streams import flush
+from palpate.errors import LONGEST, PalpateError
 from palpate.files import as_json
-from palpate.text import duration, printable
+from palpate.text import duration, printable, shorten
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-    from palpate.report.page import CommandAnswer, Table
 
-STYLE = "yellow"
-"""Style of warnings."""
-
-
-KINDS = {".html": "report", ".csv": "table", ".md": "table", ".tex": "table"}
+KINDS = {".html": "report", ".csv": "table"}
 """Written files of an identification, by their endings; the others are figures."""
 
 
@@ -50,6 +47,27 @@ def say(text: str) -> None:
     print(f"palpate: {printable(' '.join(text.split()))}", file=sys.stderr)  # noqa: T201
 
 
+@contextmanager
+def guard_picture(path: object) -> Iterator[None]:
+    """Turn a defect in drawing a figure or a page into one line on standard error: no answer depends on a picture.
+
+    Args:
+        path: of the picture.
+
+    Raises:
+        PalpateError, OSError, MemoryError: what the user can correct, as the place or a full disk.
+    """
+    try:
+        yield
+    except (PalpateError, OSError, MemoryError):
+        raise
+    except Exception as error:  # noqa: BLE001 - a drawing fails in as many ways as there are logs
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if "palpate" in f.filename]
+        where = f"{Path(frames[-1].filename).name}, line {frames[-1].lineno}"
+        text = f"{path} is not drawn: {type(error).__name__} in {where}: {error}"
+        say(shorten(f"{text}; the answer does not depend on it, and this defect can be reported", LONGEST))
+
+
 def console(*, stderr: bool = False) -> Console:
     """A console of rich that takes no markup from texts; styles are given beside them."""
     from rich.console import Console
@@ -64,7 +82,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def confirmed(console: Console, question: str) -> bool:
-    """Whether a person at the terminal agrees; an end of the input is a no."""
+    """True if a person at the terminal agrees; an end of the input is a no."""
     from rich.prompt import Confirm
 
     try:
@@ -74,69 +92,20 @@ def confirmed(console: Console, question: str) -> bool:
         return False
 
 
-def head(console: Console, title: str, rest: str) -> None:
-    """A title and its details, on one line."""
-    from rich.text import Text
-
-    console.print(Text.assemble((title, "bold"), rest))
-
-
-def show_table(console: Console, table: Table, styles: Sequence[str] = ()) -> None:
-    """A table: the first column names, the others hold figures.
-
-    Args:
-        console: where to.
-        table: its contents.
-        styles: of the rows' last cells, to distinguish them.
-    """
-    from rich import box
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
-    if table.title:
-        console.print(Text(table.title, style="italic"))
-    drawn = RichTable(box=box.SIMPLE_HEAD, show_edge=False, show_header=any(table.head))
-    for i, title in enumerate(table.head):
-        drawn.add_column(
-            title, justify="left" if i == 0 or styles or table.read(i) else "right", overflow="fold"
-        )
-    for i, row in enumerate(table.rows):
-        last = Text(row[-1], style=styles[i] if styles else "")
-        drawn.add_row(*row[:-1], last)
-    console.print(drawn)
-    console.print()
-
-
-def show_answer(answer: CommandAnswer) -> Console:
-    """Print an answer, whole or its title, sentence, tables and warnings; returns the console for further output."""
-    screen = console()
-    if answer.show is not None:
-        answer.show(screen)
-        return screen
-    for doubt in answer.doubts:
-        screen.print(doubt, style=STYLE, soft_wrap=True)
-    head(screen, answer.title, answer.sentence)
-    for table in answer.tables:
-        show_table(screen, table)
-    for note in answer.notes:
-        screen.print(note, style=STYLE, soft_wrap=True)
-    return screen
-
-
-def place(console: Console, what: str, where: object) -> None:
+def place(console: Console, label: str, path: object) -> None:
     """Path of a written file, not wrapped, so that it can be copied."""
-    console.print(f"{what} {where}", soft_wrap=True)
+    console.print(f"{label} {path}", soft_wrap=True)
 
 
 def kind_of(path: Path) -> str:
-    """The kind of a written file, by its ending."""
+    """Kind of a written file by its ending."""
     return KINDS.get(path.suffix.lower(), "figure")
 
 
 COMPILING = "compiling the loop: some ten seconds, once after installation"
 """Message while a loop is compiled."""
-_EVERY = 60.0
-"""Between two lines where there is no terminal [s]."""
+_LINE_INTERVAL = 60.0
+"""Time between two lines of progress without a terminal [s]."""
 
 
 class Counted(Protocol):
@@ -161,7 +130,7 @@ def bar(screen: Console, *columns: Any, **options: Any) -> Progress:
 def simulation_progress(
     screen: Console, interrupted: Callable[[], bool], start: str = "starting"
 ) -> Iterator[Callable[[float, str], None]]:
-    """Shows the progress of a simulation: its time [s] and phase.
+    """Show the progress of a simulation: its time [s] and phase.
 
     Raises:
         KeyboardInterrupt: it was interrupted; the run ends there and keeps the simulated part.
@@ -181,7 +150,7 @@ def simulation_progress(
 
 @contextmanager
 def progress_of_pieces(screen: Console) -> Iterator[Counted]:
-    """Shows pieces of work, part after part, with the time left in each."""
+    """Show the progress of a work of several parts, with the time left in each."""
     from rich.progress import MofNCompleteColumn, TimeRemainingColumn
 
     columns = MofNCompleteColumn(), TimeRemainingColumn()
@@ -189,13 +158,13 @@ def progress_of_pieces(screen: Console) -> Iterator[Counted]:
         task = progress.add_task("", total=None)
         parts: dict[str, _Lines] = {}
 
-        def show(what: str, done: int, of: int) -> None:
-            if what not in parts:
-                parts[what] = _Lines(screen, what, of)
-                progress.reset(task, total=of, description=what)
+        def show(name: str, done: int, of: int) -> None:
+            if name not in parts:
+                parts[name] = _Lines(screen, name, of)
+                progress.reset(task, total=of, description=name)
             progress.update(task, completed=done)
             if not screen.is_terminal:
-                parts[what].show(done)
+                parts[name].show(done)
 
         yield show
 
@@ -205,14 +174,14 @@ class _Lines:
 
     def __init__(self, screen: Console, what: str, of: int):
         self._screen, self._what, self._of = screen, what, of
-        self._begun = self._told = time.monotonic()
+        self._start = self._last_line = time.monotonic()
         self._first: int | None = None
 
     def show(self, done: int) -> None:
         self._first = done if self._first is None else self._first
         now = time.monotonic()
-        if now - self._told < _EVERY or done == self._first:
+        if now - self._last_line < _LINE_INTERVAL or done == self._first:
             return
-        self._told = now
-        left = duration((now - self._begun) / (done - self._first) * (self._of - done))
-        self._screen.print(f"{self._what}: {done} of {self._of}, some {left} left", soft_wrap=True)
+        self._last_line = now
+        remaining = duration((now - self._start) / (done - self._first) * (self._of - done))
+        self._screen.print(f"{self._what}: {done} of {self._of}, some {remaining} left", soft_wrap=True)

@@ -1,21 +1,25 @@
 """`palpate export`: an identified surface as the contact of a simulator's scene, or a law as C."""
 
-from collections.abc import Callable
-from importlib.metadata import entry_points
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from palpate.cli.options.common import WRITTEN, FileOptions
-from palpate.cli.options.values import FLAG, SIGNED, options
+from palpate.cli.options.common import WRITTEN, FileOptions, read_found
+from palpate.cli.options.values import FLAG, SIGNED, options, vector
+from palpate.cli.toolkit import STYLE, command, console, head, place, print_answer, show_table
 from palpate.errors import InputError
+from palpate.files import MADE, fresh_folder, whole, with_author, write_json
+
+if TYPE_CHECKING:
+    from palpate.export.exporting import Checked, Exported
 
 
 @options("The scene", 1)
 class SceneOptions:
     """The scene and its contact."""
 
-    to: Literal["mujoco", "drake", "newton", "mjcf-spring", "c"]
-    """mujoco, drake, newton, mjcf-spring: a plate on a slide joint; or c: a law, with the gains of palpate
+    to: Literal["mujoco", "drake", "mjcf-spring", "c"]
+    """mujoco, drake, mjcf-spring: a plate on a slide joint; or c: a law, with the gains of palpate
     tune."""
     model: Path | None = None
     "The scene: MJCF for mujoco, SDF or URDF for drake."
@@ -43,22 +47,13 @@ class LawOptions:
     """A law and its numbers."""
 
     law: str = "force-loop"
-    """force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; contact-identifier; or
-    recursive-least-squares."""
+    "force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; or recursive-least-squares."
     into: Annotated[str, SIGNED] = "0,0,-1"
     "Of sliding-loop: direction into the surface, x,y,z in the base's axes."
     parameters: Annotated[int, SIGNED] = 3
     "Of recursive-least-squares, 3 or 4."
     forgetting: Annotated[float, SIGNED] = 1.0
     "Of recursive-least-squares: its forgetting factor."
-    low_pass: str = "butterworth3:120"  # noqa: S105 - a filter
-    "Of contact-identifier: the force sensor's low-pass."
-    rate: Annotated[float, SIGNED] = 1000.0
-    "Of contact-identifier: ticks a second in Hz."
-    lag: Annotated[float, SIGNED] = 0.003
-    "Of contact-identifier: how late the force is, its low-pass included, in s."
-    sampling: Annotated[float | None, SIGNED] = None
-    "Of contact-identifier: samples of the force sensor a second in Hz, if not one a tick."
 
 
 @options(WRITTEN)
@@ -80,7 +75,7 @@ def export(
     /,
     *,
     scene: SceneOptions,
-    given: GivenOptions | None = None,
+    parameters: GivenOptions | None = None,
     law: LawOptions | None = None,
     output: ExportOutput | None = None,
 ) -> int:
@@ -99,21 +94,180 @@ def export(
     found
         The output of palpate identify --json; for a force loop in C the gains file of palpate tune.
     """
-    given, output = given or GivenOptions(), output or ExportOutput()
+    parameters, output = parameters or GivenOptions(), output or ExportOutput()
     if scene.to == "c":
-        return _exporter("law")(found, law or LawOptions(), output)
-    return _exporter("scene")(found, scene, given, output)
+        return export_law(found, law or LawOptions(), output)
+    return export_scene(found, scene, parameters, output)
 
 
-_EXPORTERS = {"scene": ("a simulator", "palpate-export"), "law": ("C", "palpate-native")}
-"""Target of each exporter, and the distribution that has it."""
+def export_scene(
+    found: Path | None, scene: SceneOptions, parameters: GivenOptions, output: ExportOutput
+) -> int:
+    """Write the contact of an identified surface, and press it if that is wanted.
 
+    Returns:
+        The exit code: 1 if a press was wanted and an error is above the tolerance, or none was possible.
 
-def _exporter(name: str) -> Callable[..., int]:
-    """The command of the distribution that exports a scene or a law."""
-    for entry in entry_points(group="palpate.exports", name=name):
-        return entry.load()
-    to, distribution = _EXPORTERS[name]
-    raise InputError(
-        f"export to {to} is of {distribution}, which is not installed: pip install {distribution}"
+    Raises:
+        InputError: nothing to export, a parameter that is not identified, a scene without such a surface.
+    """
+    from palpate.export.contact import contact_from
+    from palpate.export.exporting import Request, prepare
+
+    if found is None:
+        raise InputError("nothing to export; give the output of palpate identify --json")
+    request = Request(scene.to, scene.model, scene.geom, scene.probe)
+    out = output.out or request.default_place()
+    beside = out.with_name(f"{out.name}.json")
+    _check_places((out, beside), output, scene.model)
+    contact = contact_from(
+        read_found(found),
+        found.name,
+        damping=parameters.damping,
+        mass=parameters.mass,
+        working_point=parameters.working_point,
     )
+    exported = prepare(contact, request, out)
+    checked = _write(exported, out, output.check)
+    answer = _as_json(exported, out, checked)
+    write_json(beside, with_author(answer))
+    _print(exported, answer, checked, (out, beside), json=output.json)
+    verdicts = [check.within_tolerance for check in checked if check.within_tolerance is not None]
+    return 1 if output.check and not (verdicts and all(verdicts)) else 0
+
+
+def _check_places(places: tuple[Path, ...], output: ExportOutput, model: Path | None) -> None:
+    for path in places:
+        if model is not None and path.absolute() == model.absolute():
+            raise InputError(f"--out {path} is the scene itself; name another file")
+        output.check_new(path)
+
+
+def _write(exported: "Exported", out: Path, check: bool) -> "list[Checked]":
+    """Write the file and press its contact; a file that the engine refuses is removed."""
+    from palpate import __version__
+
+    mark = MADE.removeprefix("# ")
+    with whole(out) as draft:
+        draft.write_text(exported.with_comment(f"{mark} {__version__}"), encoding="utf-8", newline="\n")
+        exported.validate(draft)
+        return exported.check(draft) if check else []
+
+
+def _as_json(exported: "Exported", out: Path, checked: "list[Checked]") -> dict[str, Any]:
+    from palpate import __version__
+
+    return {
+        "file": str(out),
+        **exported.to_json(),
+        "check": [check.to_json() for check in checked] or None,
+        "command": command(),
+        "version": __version__,
+    }
+
+
+def _print(
+    exported: "Exported",
+    answer: dict[str, Any],
+    checked: "list[Checked]",
+    places: tuple[Path, ...],
+    *,
+    json: bool,
+) -> None:
+    if json:
+        print_answer(answer)
+        return
+    screen = console()
+    contact = exported.contact
+    head(screen, exported.target, f": K = {contact.stiffness}; B = {contact.damping}")
+    if checked:
+        show_table(screen, _table(checked, exported.target))
+        for check in checked:
+            if check.note:
+                screen.print(f"- pressed by {check.probe}: {check.note}", soft_wrap=True)
+    for note in exported.notes:
+        screen.print(f"- {note}", style=STYLE if "unstable" in note else "", soft_wrap=True)
+    for path in places:
+        place(screen, "written:", path)
+
+
+def _table(checked: "list[Checked]", target: str) -> Any:
+    from palpate.report.page import Table
+
+    title = f"pressed in {target}"
+    return Table(
+        title, ("by", "K [N/m]", "error", "B [N s/m]", "error", "check"), [_row(check) for check in checked]
+    )
+
+
+def _row(check: "Checked") -> tuple[str, ...]:
+    measured = check.pressed
+    if measured is None:
+        return check.probe, "-", "-", "-", "-", "failed" if check.reached else "not pressed"
+    errors = [f"{100 * (error or 0.0):.2g} %" for error in (check.error_K, check.error_B)]
+    numbers = f"{measured.stiffness:.7g}", errors[0], f"{measured.damping:.6g}", errors[1]
+    return (check.probe, *numbers, "passed" if check.within_tolerance else "failed")
+
+
+def export_law(gains: Path | None, options: LawOptions, output: ExportOutput) -> int:
+    """Write a law as C, or check it, or both.
+
+    Args:
+        gains: a gains file, of the laws that have one.
+        options: which law, and its numbers.
+        output: where to, and whether to check.
+
+    Returns:
+        The exit code: 1 if a tick differs in a bit.
+
+    Raises:
+        InputError: nothing to do, no such law, a folder that is not ours, no compiler for the check.
+    """
+    from palpate import __version__
+    from palpate.native.exporting import exported_law
+    from palpate.native.replay import compiler
+
+    if output.out is None and not output.check:
+        raise InputError("nothing to do: give --out FOLDER, or --check, or both")
+    into = vector("--into", options.into, "number")
+    using = compiler()[0] if output.check else None
+    with console(stderr=True).status("exporting") as status:
+        place_of = (
+            fresh_folder(output.out, replace=output.replace) if output.out is not None else nullcontext()
+        )
+        with place_of as draft:
+            law = exported_law(
+                options.law,
+                gains,
+                into=into,
+                parameters=options.parameters,
+                forgetting=options.forgetting,
+                progress=status.update,
+            )
+            if draft is not None:
+                law.fill(draft)
+        status.update(f"checking {law.module.name} by {using}")
+        ticks, unequal = law.check() if output.check else (0, 0)
+    if output.json:
+        checked = {"compiler": using, "ticks": ticks, "unequal": unequal} if output.check else None
+        out = str(output.out) if output.out is not None else None
+        print_answer(
+            {
+                "law": options.law,
+                "name": law.module.name,
+                "notes": list(law.module.notes),
+                "out": out,
+                "state_bytes": 8 * law.sources.numbers,
+                "check": checked,
+                "command": command(),
+                "version": __version__,
+            }
+        )
+        return int(unequal > 0)
+    screen = console()
+    head(screen, options.law, f": {law.module.name}, a state of {8 * law.sources.numbers} bytes")
+    if output.check:
+        screen.print(f"- {ticks} ticks by {using} beside Python: {unequal} differ in a bit", soft_wrap=True)
+    if output.out is not None:
+        place(screen, "written:", output.out)
+    return int(unequal > 0)

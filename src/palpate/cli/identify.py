@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,16 +14,15 @@ import numpy as np
 from cyclopts import Parameter
 
 from palpate.arrays import Array
-from palpate.cli._program import command, print_result
+from palpate.cli._program import OutputFile, command, print_result
 from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
-from palpate.cli.options.common import WRITTEN, CellOptions, PictureOptions
+from palpate.cli.options.common import WRITTEN, CellOptions, FigureFile, ReportOption
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, options
+from palpate.cli.options.values import FLAG, changed_fields, options, plain_value
 from palpate.errors import InputError, PalpateError
 from palpate.files import check_place, write_text
 from palpate.logs import formats
-from palpate.records import Record
 
 if TYPE_CHECKING:
     from palpate.from_log import LogIdentifier
@@ -33,14 +33,6 @@ if TYPE_CHECKING:
 
 
 _LOG, _FRAME, _ARM, _INDENTER = LogOptions(), FrameOptions(), ArmOptions(), IndenterOptions()
-
-
-def has_number(found: Identification) -> bool:
-    """Whether a number is identified, at the working point or a parameter, and no unit or column is doubtful."""
-    from palpate.report.identification.words import unit_warnings
-
-    point = [found.working_point.stiffness] if found.working_point else []
-    return not unit_warnings(found) and any(p.value is not None for p in (*point, *found.parameters.values()))
 
 
 @dataclass(frozen=True)
@@ -59,19 +51,14 @@ class OneLog:
         Raises:
             InputError: the log or an option is wrong, in one line.
         """
-        found, _, source = self.identification_along(log)
-        return found, source
-
-    def identification_along(self, log: Path) -> tuple[Identification, Record, Source]:
-        """The same, with the force and the position along the normal."""
         from palpate.contact_frame.arm import describe
-        from palpate.report.identification.words import sha256_of
+        from palpate.report.identification.words import file_digest
 
-        found, along = self.identifier.identify(log)
-        return found, along, self.source_of(log, sha256=sha256_of(log), notes=tuple(describe(along.meta)))
+        result, along = self.identifier.identify(log)
+        return result, self.log_source(log, sha256=file_digest(log), notes=tuple(describe(along.meta)))
 
-    def source_of(self, log: Path, **known: Any) -> Source:
-        """Where an identification is from: a log, these options, this command, now."""
+    def log_source(self, log: Path, **known: Any) -> Source:
+        """Source of an identification: a log, these options, this command, now."""
         from palpate.report.identification.words import Source
 
         now = datetime.now(UTC).isoformat(timespec="seconds")
@@ -84,9 +71,15 @@ class OneLog:
         from palpate.from_log import LogIdentifier
 
         return LogIdentifier(
-            self.source, self.frame.frame() or ContactFrame(), self.arm.arm(), self.arm.weighed_tool(),
-            self.arm.robot_stiffness_from, self.pressed_by.shape(), self.pressed_by.ratio, self.fitted.keywords(),
-        )  # fmt: skip
+            self.source,
+            self.frame.frame() or ContactFrame(),
+            self.arm.arm(),
+            self.arm.weighed_tool(),
+            self.arm.robot_stiffness_from,
+            self.pressed_by.shape(),
+            self.pressed_by.ratio,
+            self.fitted.keywords(),
+        )
 
     @property
     def parts(self) -> tuple[object, ...]:
@@ -96,18 +89,8 @@ class OneLog:
     @property
     def options(self) -> dict[str, Any]:
         """The options of logs, frame, arm and indenter, as plain values."""
-        return {
-            own.name: _plain(value)
-            for part in (self.source, self.frame, self.arm, self.pressed_by)
-            for own in fields(part)
-            if (value := getattr(part, own.name)) != own.default
-        }
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path | str):
-        return str(value)
-    return list(value) if isinstance(value, tuple) else value
+        parts = (self.source, self.frame, self.arm, self.pressed_by)
+        return {name: plain_value(value) for part in parts for name, value in changed_fields(part).items()}
 
 
 @dataclass(frozen=True)
@@ -119,14 +102,65 @@ class _OutputFiles:
     table: Path | None
     dpi: int | None
 
-    @property
-    def paths(self) -> list[Path]:
-        """Paths of those that are written."""
-        return [path for path in (self.figure, self.page, self.table) if path is not None]
+    def log_files(self, result: Identification, source: Source) -> list[OutputFile]:
+        """The files of one log, to be written."""
+
+        def write_figure(path: Path) -> None:
+            from palpate.report.identification.page import write_figure
+
+            write_figure(result, path, title=Path(source.file).name, dpi=self.dpi)
+
+        def write_page(path: Path) -> None:
+            from palpate.report.identification.page import page
+
+            write_text(path, page(result, source))
+
+        def write_table(path: Path) -> None:
+            from palpate.report.many.table import LogRow, write_table
+
+            write_table([LogRow(source, result)], None, path)
+
+        return self._with_writers(
+            write_figure if result.traces is not None else None, write_page, write_table
+        )
+
+    def pooled_files(self, rows: Sequence[LogRow], pooled: Pooled) -> list[OutputFile]:
+        """The files of many logs, to be written."""
+
+        def write_figure(path: Path) -> None:
+            from palpate.report.many.page import write_figure
+
+            write_figure(rows, pooled, path, self.dpi)
+
+        def write_page(path: Path) -> None:
+            from palpate.report.many.page import page_of_logs
+
+            write_text(path, page_of_logs(rows, pooled))
+
+        def write_table(path: Path) -> None:
+            from palpate.report.many.table import write_table
+
+            write_table(rows, pooled, path)
+
+        return self._with_writers(write_figure, write_page, write_table)
+
+    def _with_writers(self, *writers: Callable[[Path], None] | None) -> list[OutputFile]:
+        """The files that are asked for and can be written, each with what writes it."""
+        pairs = zip((self.figure, self.page, self.table), writers, strict=True)
+        return [
+            OutputFile(f"{kind_of(path)}:", path, partial(write, path))
+            for path, write in pairs
+            if path is not None and write is not None
+        ]
 
 
 def many(
-    logs: Sequence[Path], asked: OneLog, covariates: Mapping[str, Array], files: _OutputFiles, *, json: bool
+    logs: Sequence[Path],
+    log_options: OneLog,
+    covariates: Mapping[str, Array],
+    files: _OutputFiles,
+    *,
+    json: bool,
 ) -> int:
     """Identify many logs, and print a row for each and the pooled result.
 
@@ -135,13 +169,14 @@ def many(
 
     Args:
         logs: paths of them.
-        asked: options that are common to all.
+        log_options: options that are common to all.
         covariates: one number of each log, by name.
         files: to be written.
         json: whether the result is printed as JSON.
 
     Returns:
-        0 if a number is identified; 1 if none is; 130 if it was interrupted.
+        0 if something is identified, in a log or in all together, and no unit or column is doubtful or guessed; 1 if
+        not; 130 if it was interrupted.
 
     Raises:
         InputError: no log could be read; nothing is printed or written then.
@@ -149,31 +184,29 @@ def many(
     from palpate.identification.pooling import pool
     from palpate.report.identification.words import unit_warnings
 
-    rows = _rows(logs, asked)
+    rows = _rows(logs, log_options)
     interrupted = len(rows) < len(logs)
-    failed = [row for row in rows if row.found is None]
+    failed = [row for row in rows if row.result is None]
     if not interrupted and len(failed) == len(rows):
         one = len(rows) == 1
         raise InputError(
             failed[0].error if one else f"none of {len(rows)} logs can be identified: {failed[0].error}"
         )
-    found, names = [row.found for row in rows], [row.source.title for row in rows]
-    pooled = pool(found, asked.fitted.tolerance, names, None if interrupted else covariates)
+    results, names = [row.result for row in rows], [row.source.title for row in rows]
+    pooled = pool(results, log_options.fitted.tolerance, names, None if interrupted else covariates)
     if rows:
-        from palpate.report.many.table import answer_of
+        from palpate.report.many.table import build_answer
 
-        _write(rows, pooled, files)
-        written = [(f"{kind_of(path)}:", path) for path in files.paths]
-        print_result(answer_of(rows, pooled), json=json, files=written)
+        print_result(build_answer(rows, pooled), json=json, files=files.pooled_files(rows, pooled))
     if interrupted:
         say(f"interrupted: {len(rows)} of {len(logs)} logs were identified")
         return INTERRUPTED
-    doubtful = any(row.found and unit_warnings(row.found) for row in rows)
-    has_any = pooled.found or any(row.found and has_number(row.found) for row in rows)
-    return 0 if has_any and not doubtful else 1
+    doubtful = any(row.result and unit_warnings(row.result) for row in rows)
+    identified = pooled.identified or any(row.result and row.result.identified for row in rows)
+    return 0 if identified and not doubtful else 1
 
 
-def _rows(logs: Sequence[Path], asked: OneLog) -> list[LogRow]:
+def _rows(logs: Sequence[Path], log_options: OneLog) -> list[LogRow]:
     """A row of each log, up to an interruption."""
     from rich.progress import MofNCompleteColumn
 
@@ -181,48 +214,41 @@ def _rows(logs: Sequence[Path], asked: OneLog) -> list[LogRow]:
     with suppress(KeyboardInterrupt), bar(console(stderr=True), MofNCompleteColumn()) as progress:
         for log in progress.track(logs, description=""):
             progress.update(progress.task_ids[0], description=log.name)
-            rows.append(_row(log, asked))
+            rows.append(_row(log, log_options))
     return rows
 
 
-def _row(log: Path, asked: OneLog) -> LogRow:
+def _row(log: Path, log_options: OneLog) -> LogRow:
     from palpate.report.many.table import LogRow
 
     try:
-        found, source = asked.identification(log)
+        result, source = log_options.identification(log)
     except (PalpateError, OSError, MemoryError) as error:
-        return LogRow(asked.source_of(log), None, " ".join((str(error) or type(error).__name__).split()))
-    return LogRow(source, _light(found))
+        return LogRow(
+            log_options.log_source(log), None, " ".join((str(error) or type(error).__name__).split())
+        )
+    return LogRow(source, _light(result))
 
 
-def _light(found: Identification) -> Identification:
-    """Without the samples, which a row does not need: a thousand logs fit into memory."""
-    traces, none = found.traces, np.empty(0)
+def _light(result: Identification) -> Identification:
+    """The identification without its samples: a thousand logs fit into memory."""
+    traces, none = result.traces, np.empty(0)
     if traces is not None:
         traces = replace(
-            traces, time=none, force=none, fitted_time=none, fitted_position=none, fitted_force=none, predicted=none,
+            traces,
+            time=none,
+            force=none,
+            fitted_time=none,
+            fitted_position=none,
+            fitted_force=none,
+            predicted=none,
             columns={},
-        )  # fmt: skip
-    return replace(found, traces=traces, estimate=None)
-
-
-def _write(rows: Sequence[LogRow], pooled: Pooled, files: _OutputFiles) -> None:
-    if files.figure is not None:
-        from palpate.report.many.page import write_figure
-
-        write_figure(rows, pooled, files.figure, files.dpi)
-    if files.page is not None:
-        from palpate.report.many.page import page_of_logs as page_of
-
-        write_text(files.page, page_of(rows, pooled))
-    if files.table is not None:
-        from palpate.report.many.table import write_table
-
-        write_table(rows, pooled, files.table)
+        )
+    return replace(result, traces=traces)
 
 
 @options(WRITTEN)
-class IdentifyOutput(PictureOptions):
+class IdentifyOutput(ReportOption, FigureFile):
     """Files of an identification, and how much is printed."""
 
     figure: Path | None = None
@@ -231,21 +257,18 @@ class IdentifyOutput(PictureOptions):
     dpi: int | None = None
     "Of a PNG; 110 if not given."
     table: Path | None = None
-    """Where to write a table for a paper, as CSV, Markdown or LaTeX by its ending (.csv, .md, .tex): value and
-    95 % of each log; of several, n, mean, next press and deviation, too."""
+    """Where to write a table for a paper, a CSV file: value and 95 % of each log; of several, n, mean, next press
+    and deviation, too."""
     verbose: Annotated[bool, FLAG] = False
-    "Print all evidence: each reason, each warning, both intervals, the slopes of the press."
+    "Print all evidence: each reason, each warning, the slopes of the press."
     budget: Annotated[bool, FLAG] = False
     """Print the uncertainty budget of each number, too: sources, sensitivities, degrees of freedom, coverage
     factor."""
 
     def paper_table(self) -> Path | None:
         """Path of the table, checked before any work is done."""
-        from palpate.report.many.table import ENDINGS
-
         if self.table is not None:
-            ending = self.table.suffix.lower()
-            check_place(self.table, "--table", ending=ending if ending in ENDINGS else ENDINGS[0])
+            check_place(self.table, "--table", ending=".csv")
         return self.table
 
     def png(self, name: str) -> Path | None:
@@ -267,18 +290,10 @@ class CovariateOptions:
     covariate: Annotated[tuple[str, ...], Parameter(negative=())] = ()
     """A column of each log, such as temperature_C, whose mean is the log's; how the results depend on it is
     pooled, too. May be repeated."""
-    covariates: Path | None = None
-    "CSV table that has the covariates instead: a column log with the logs' file names, and one for each."
 
     def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
-        """One number of each log, by the covariate's name."""
-        if self.covariates is not None and not self.covariate:
-            raise InputError(
-                "--covariates names a table; name its columns, too, as in --covariate temperature_C"
-            )
-        return formats.read_covariates(
-            logs, self.covariate, self.covariates, source.missing, source.delimiter
-        )
+        """The mean of each covariate in each log, by the covariate's name."""
+        return formats.read_covariates(logs, self.covariate, source.missing, source.delimiter)
 
 
 # More than seven arguments: one for each group of options.
@@ -311,7 +326,7 @@ def identify(
 
     palpate identify presses/ --table presses.csv
 
-    palpate identify presses/ --covariate temperature_C --covariates conditions.csv
+    palpate identify presses/ --covariate temperature_C
 
     Options of a cell can be saved and loaded again:
 
@@ -326,54 +341,45 @@ def identify(
         of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
     """
     output, cell = output or IdentifyOutput(), cell or CellOptions()
-    asked = OneLog(
-        fitted or ModelOptions(), source or LogOptions(), frame or FrameOptions(), arm or ArmOptions(),
+    log_options = OneLog(
+        fitted or ModelOptions(),
+        source or LogOptions(),
+        frame or FrameOptions(),
+        arm or ArmOptions(),
         pressed_by or IndenterOptions(),
-    )  # fmt: skip
-    asked.pressed_by.check()
+    )
+    log_options.pressed_by.check()
     cell.check()
-    cell.save(asked.parts)
-    return _identify(logs, asked, beside or CovariateOptions(), output)
+    cell.save(log_options.parts)
+    return _identify(logs, log_options, beside or CovariateOptions(), output)
 
 
-def _identify(logs: tuple[Path, ...], asked: OneLog, beside: CovariateOptions, output: IdentifyOutput) -> int:
+def _identify(
+    logs: tuple[Path, ...], log_options: OneLog, beside: CovariateOptions, output: IdentifyOutput
+) -> int:
     """Identify one log, or many together."""
     if not logs:
         raise InputError(
             "no log is named; name a log, several, or a folder of them (see: palpate identify --help)"
         )
-    logs = formats.sheets_as_logs(logs, asked.source.names, asked.source.limits)
+    logs = formats.sheets_as_logs(logs, log_options.source.names, log_options.source.limits)
     if len(logs) == 1 and not formats.is_folder_of_logs(logs[0]):
         if beside != CovariateOptions():
             raise InputError("--covariate is of several logs; name more than one, or a folder of them")
-        return _one(formats.log_of(logs[0]), asked, output)
+        return _one(formats.log_of(logs[0]), log_options, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")
     files, logs = output.files("pooled"), formats.gather_logs(logs)
-    return many(logs, asked, beside.of(logs, asked.source), files, json=output.json)
+    return many(logs, log_options, beside.of(logs, log_options.source), files, json=output.json)
 
 
-def _one(log: Path, asked: OneLog, output: IdentifyOutput) -> int:
+def _one(log: Path, log_options: OneLog, output: IdentifyOutput) -> int:
     files = output.files(log.stem)
-    found, origin = asked.identification(log)
-    if found.traces is None:
-        files = replace(files, figure=None)
-    if files.figure is not None:
-        from palpate.report.identification.figure import write_figure
+    result, origin = log_options.identification(log)
+    from palpate.report.identification.answer import build_answer
+    from palpate.report.identification.words import unit_warnings
 
-        write_figure(found, files.figure, title=log.name, dpi=files.dpi)
-    if files.page is not None:
-        from palpate.report.identification.page import page as page_of
-
-        write_text(files.page, page_of(found, origin))
-    if files.table is not None:
-        from palpate.report.many.table import LogRow, write_table
-
-        write_table([LogRow(origin, found)], None, files.table)
-    from palpate.report.identification.answer import answer_of
-
-    more = "--verbose" if output.report else "--verbose, or --report PAGE.html"
-    written = [f"{kind_of(path)}: {path}" for path in files.paths]
-    answer = answer_of(found, origin, written, more, verbose=output.verbose, budget=output.budget)
-    print_result(answer, json=output.json)
-    return 0 if has_number(found) else 1
+    evidence_options = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+    answer = build_answer(result, origin, evidence_options, verbose=output.verbose, budget=output.budget)
+    print_result(answer, json=output.json, files=files.log_files(result, origin))
+    return 0 if result.identified and not unit_warnings(result) else 1

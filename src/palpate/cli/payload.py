@@ -1,11 +1,10 @@
-"""`palpate payload`: mass and centre of the tool on the force sensor, the sensor's bias and drift, and load files."""
+"""`palpate payload`: mass and centre of the tool on the force sensor, and the sensor's bias and drift."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from palpate.cli._program import print_result
+from palpate.cli._program import OutputFile, print_result
 from palpate.cli.options.common import WRITTEN, CellOptions, FileOptions, ReportOption
 from palpate.cli.options.log import FrameOptions, LogOptions
 from palpate.cli.options.values import Point, options, si
@@ -13,22 +12,16 @@ from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.records import Record
 
-if TYPE_CHECKING:
-    from palpate.contact_frame.tool_payload import Weighed
-
-
 _ENDINGS = (".toml", ".script", ".json", ".yaml")
 
 
 @options(WRITTEN)
 class PayloadOutput(ReportOption, FileOptions):
-    """Where the payload is written, and a load file that is compared with it."""
+    """The file of the payload."""
 
     out: Path | None = None
     """Where to write the payload: a .toml for --payload, or the load file of a controller: .script (UR), .json
     (Franka), .yaml (ROS 2)."""
-    check: Path | None = None
-    "A controller's load file, to be compared with the log. With --gravity-compensated the controller had it."
     flange: Point | None = None
     """The flange, from which a load file counts the centre of mass, in the tool's axes from the pose's origin: x,y,z in
     m, or with :mm. In a .yaml the sensor."""
@@ -59,10 +52,8 @@ def payload(
 
     palpate identify press.mcap --wrench-frame tool --payload tool.toml
 
-    palpate payload turning.mcap --wrench-frame tool --check endeffector-config.json
-
     Shake the tool at the end of the log: this shows whether the driver subtracts the tool's inertia. Exit code 1: the
-    poses do not determine the mass, and the output says how to move; or the checked file does not agree with the log.
+    poses do not determine the mass, and the output says how to move.
 
     Parameters
     ----------
@@ -78,23 +69,23 @@ def payload(
     report = output.page()
     if not 0.0 < tolerance <= 1.0:
         raise InputError(f"--tolerance must be above 0 and at most 1, got {tolerance:g}")
-    from palpate.contact_frame.load_files import compare, read_load
+    from palpate.contact_frame.payload import load_text
     from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.contact_frame.tool_payload import weigh
-    from palpate.report.payload import answer_of
+    from palpate.report.payload import build_answer, page
 
-    load = None if output.check is None else read_load(output.check)
     cell.save((source or LogOptions(), frame or FrameOptions()))
     contact = (frame or FrameOptions()).frame() or ContactFrame()
-    found = weigh(_wrench_and_pose(log, source or LogOptions()), contact, tolerance)
-    start = output.origin(contact.wrench_at)
-    written = _write(found, log.name, (output.out, report), ending, start)
-    rows = []
-    if load is not None and found.payload is not None:
-        rows = compare(found, load, start, compensated=contact.gravity_compensated)
-    answer = answer_of(found, log.name, output.check, rows)
-    print_result(answer, json=output.json, files=[("written:", path) for path in written])
-    return 0 if found.payload is not None and all(row.agrees for row in rows) else 1
+    weighed = weigh(_wrench_and_pose(log, source or LogOptions()), contact, tolerance)
+    written = []
+    if output.out is not None and weighed.payload is not None:
+        half, origin = float(weighed.parameters["mass"].half), output.origin(contact.wrench_at)
+        write_text(output.out, load_text(weighed.payload, half, ending, origin))
+        written.append(OutputFile("written:", output.out))
+    if report is not None:
+        written.append(OutputFile("written:", report, lambda: write_text(report, page(weighed, log.name))))
+    print_result(build_answer(weighed, log.name), json=output.json, files=written)
+    return 0 if weighed.payload is not None else 1
 
 
 def _wrench_and_pose(log: Path, source: LogOptions) -> Record:
@@ -104,22 +95,3 @@ def _wrench_and_pose(log: Path, source: LogOptions) -> Record:
             f"{log}: weighing a tool needs a wrench and a pose in three dimensions; name them with --wrench and --pose"
         )
     return record
-
-
-def _write(
-    found: Weighed,
-    name: str,
-    files: tuple[Path | None, Path | None],
-    ending: str,
-    start: tuple[float, float, float],
-) -> list[Path]:
-    """Write the payload and the page; returns the written files."""
-    from palpate.contact_frame.load_files import load_text
-    from palpate.report.payload import page
-
-    out, report = files if found.payload is not None else (None, files[1])
-    if out is not None:
-        write_text(out, load_text(found, ending, start))
-    if report is not None:
-        write_text(report, page(found, name))
-    return [path for path in (out, report) if path is not None]

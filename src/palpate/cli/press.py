@@ -7,176 +7,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli import _terminal
-from palpate.cli._program import command, option_of, print_result
+from palpate.cli._program import command, print_result
 from palpate.cli._streams import notice_signals
 from palpate.cli._terminal import console
-from palpate.cli.options import values
-from palpate.cli.options.common import QUIET, CellOptions, Controller, Mode, Physics, SerialArm
-from palpate.cli.options.values import FLAG, SIGNED, WHOLE, only, options, si
-from palpate.errors import InputError
+from palpate.cli.options.common import CellOptions
+from palpate.cli.options.press import AskOptions, LimitOptions, PhantomOptions, SimulatedOptions, WireOptions
+from palpate.cli.options.values import FLAG, only
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
-    from palpate.contact_frame.load import Payload
-    from palpate.environments.kelvin_voigt import KelvinVoigt
-    from palpate.press.prepare import Pressing, Question
+    from palpate.press.prepare import PreparedPress
     from palpate.records import Record
-
-
-@options("The press", 1)
-class AskOptions:
-    """The press, of any arm."""
-
-    force: values.Force | None = None
-    "Desired force, N, or with a unit as 20:N."
-    seconds: Annotated[float, SIGNED] = 6.0
-    "Duration of the press from the touch on."
-    gains: Path | None = None
-    """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
-    left out."""
-    normal: values.Direction | None = None
-    """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
-    arm presses where its tip points at home if left out."""
-    probe: Annotated[float | None, SIGNED] = None
-    """Share of the force by which it is lowered three times, to identify the surface: a constant force
-    contains little information for palpate identify. If left out, 0.2 for a simulated arm, 0 for a real
-    one."""
-    payload: Path | None = None
-    """File of palpate payload; the tool's mass is subtracted from M. A simulated arm carries that tool with
-    its sensor's bias; for a real arm the sensor's reading in free motion is compared with it."""
-
-    @property
-    def tool(self) -> Payload | None:
-        """The weighed tool; None if not given."""
-        from palpate.contact_frame.load import load_payload
-
-        return None if self.payload is None else load_payload(self.payload)
-
-    @property
-    def desired_force(self) -> float:
-        """Desired force F_d [N]."""
-        if self.force is None:
-            raise InputError("the desired force is missing; add --force, as 20:N")
-        force = self.force.si
-        if not force > 0.0:
-            raise InputError(f"--force must be above 0 N (pressing is positive), got {force:g} N")
-        return force
-
-
-@options("A simulated arm", 2)
-class SimulatedOptions:
-    """The simulated arm, its surface, and the results."""
-
-    arm: Annotated[SerialArm | None, QUIET] = None
-    "ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf."
-    surface: str | None = None
-    "The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass."
-    site: str | None = None
-    "The tip in the file: a site or a body of MJCF, a link of URDF."
-    mode: Annotated[Mode | None, QUIET] = None
-    "torque or position: the arm's input; its usual one when left out."
-    physics: Annotated[Physics, QUIET] = "own"
-    "own or mujoco (extra: arms)."
-    controller: Annotated[Controller, QUIET] = "cautious"
-    "cautious (with gains for any surface), or a torque law: hybrid, proportional-integral, impedance."
-    at: values.Point | None = None
-    "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
-    seed: Annotated[int, WHOLE] = 0
-    "Of the noise; the same seed gives the same numbers."
-    out: Path | None = None
-    """Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left
-    out."""
-    replace: Annotated[bool, FLAG] = False
-    "Replace the results at --out."
-
-    def question(self, asked: AskOptions, surface: KelvinVoigt | None = None) -> Question:
-        """The press to simulate, on a surface that is given here or by --surface."""
-        from palpate.press.prepare import Question, surface_of
-
-        if self.arm is None:
-            raise InputError(
-                "no arm is named; give --arm for a simulated one, as ur5e, or --wire for a real one"
-            )
-        if surface is None and self.surface is None:
-            raise InputError(
-                "the surface is missing; add --surface, as --surface K=5000,B=50 in N/m and N s/m"
-            )
-        touched = surface if surface is not None else surface_of(str(self.surface))
-        return Question(
-            arm=self.arm, force=asked.desired_force, surface=touched, site=self.site, mode=self.mode,
-            physics=self.physics, controller=self.controller, gains=asked.gains, at=si(self.at),
-            normal=si(asked.normal), seconds=asked.seconds,
-            probe=0.2 if asked.probe is None else asked.probe, seed=self.seed, payload=asked.tool,
-        )  # fmt: skip
-
-    @property
-    def folder(self) -> Path:
-        """Folder of the results."""
-        return (
-            self.out
-            if self.out is not None
-            else Path("runs") / f"press-{Path(str(self.arm)).stem}-{self.seed}"
-        )
-
-
-@options("A map of a phantom, by a simulated arm", 5)
-class PhantomOptions:
-    """The phantom and its map."""
-
-    map: Path | None = None
-    """A phantom, a TOML file: size, stiffness, damping and [[lumps]] with at, radius, stiffness and edge, in
-    m, N/m and N s/m."""
-    presses: Annotated[int, WHOLE] = 40
-    "How many presses: sixteen on a grid, then where the map is worst known."
-    stiffer_than: values.Stiffness | None = None
-    "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
-    page: Path | None = None
-    "Where to write the page after each map; it loads itself again until the last."
-
-
-@options("A real arm, over its wire", 3)
-class WireOptions:
-    """The wire, and its safeguards."""
-
-    wire: str | None = None
-    """rtde:ADDRESS of a UR, franka:ADDRESS, sim:HOST:PORT of a simulated arm in another process, or
-    ros2:DOMAIN?wrench=TOPIC&pose=TOPIC&command=TOPIC&as=twist&wrench-frame=tool&force-sign=action, as one
-    word; or module:Class?WHERE, the wire to your own robot. There is no default."""
-    dry_run: Annotated[bool, FLAG] = False
-    "Read the arm, print the planned motion, and end: nothing moves."
-    yes: Annotated[bool, FLAG] = False
-    "Do not ask for confirmation; for scripts."
-    record: Path | None = None
-    "Folder for all readings and commands; palpate identify reads its record.parquet."
-    certificate: Path | None = None
-    "File of palpate certify; without it the lateness is measured, and nothing is proved."
-    retreat: values.Length | None = None
-    "Distance of the retreat; 2 mm if left out, or the travel limit if that is shorter."
-    ordinary_priority: Annotated[bool, FLAG] = False
-    "Do not request real-time priority from the system."
-    recover: Path | None = None
-    "Build the record of a press that was killed, from the folder of its --record, and end."
-
-
-@options("Limits at which a real arm stops", 4)
-class LimitOptions:
-    """Limits that end a press over a wire."""
-
-    force_limit: values.Force | None = None
-    "Force of any axis, as 40:N."
-    speed_limit: values.Velocity | None = None
-    "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
-    travel_limit: values.Length | None = None
-    """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
-    stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
-    time_limit: values.Time | None = None
-    "Total duration, as 20:s."
 
 
 def press(
     *,
-    asked: AskOptions | None = None,
+    task: AskOptions | None = None,
     simulated: SimulatedOptions | None = None,
     wire: WireOptions | None = None,
     limits: LimitOptions | None = None,
@@ -204,60 +51,66 @@ def press(
 
     palpate press --wire rtde:192.168.0.10 --force 20:N --options my-cell.toml --record first
 
-    Keep a hand on the emergency stop: none of this was tested on hardware. The arm stops at each limit, on lost or
-    late readings, and on Ctrl-C. Exit code 1: the press ended early.
+    Keep a hand on the emergency stop: none of this was tested on hardware. At each limit, on lost or late readings, and
+    on Ctrl-C the tip retreats to free motion, and the arm rests. Exit code 1: the force was not reached, or not held
+    for --seconds.
 
     Parameters
     ----------
     json
         Print one JSON object and nothing else; for a real arm it needs --yes or --dry-run.
     """
-    asked, simulated = asked or AskOptions(), simulated or SimulatedOptions()
+    task, simulated = task or AskOptions(), simulated or SimulatedOptions()
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
     cell.check()
-    if wire.wire is None and wire.recover is None:
+    if wire.wire is not None or wire.recover is not None:
+        only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
+        from palpate.cli._press_over_wire import press_over
+
+        code = press_over(task, wire, limits, json=json)
+    else:
         for part in (wire, limits):
             only(part, "a real arm, and --wire is missing; add --wire")
         if phantom is not None and phantom.map is not None:
-            code = option_of("map", "maps")(asked, simulated, phantom, json=json)
+            from palpate.cli.map import press_map
+
+            code = press_map(task, simulated, phantom, json=json)
         else:
             only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
-            code = _simulate(asked, simulated, json)
-    else:
-        only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
-        code = option_of("wire", "wires")(asked, wire, limits, json=json)
-    cell.save((asked, simulated, wire, limits), "press")
+            code = _simulate(task, simulated, json)
+    cell.save((task, simulated, wire, limits), "press")
     return code
 
 
-def _simulate(asked: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+def _simulate(task: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.summary import DONE, INTERRUPTED
     from palpate.press.prepare import prepare_press
-    from palpate.report.press import answer_of
+    from palpate.report.press import build_answer
 
-    question, folder = simulated.question(asked), simulated.folder
+    spec, folder = simulated.spec(task), simulated.folder
     with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
-        pressing = prepare_press(question)
+        pressing = prepare_press(spec)
         start = "starting (the first run compiles, which takes some seconds)"
         with _terminal.simulation_progress(console(stderr=json), interrupted, start) as show:
             record = pressing.run(show)
         summary = _write(record, pressing, fresh)
-    answer = answer_of(pressing.asked.arm.title, summary)
-    print_result(answer, json=json, files=[("report:", folder / "report.html")])
+    answer, report = build_answer(pressing.request.arm.title, summary), folder / "report.html"
+    print_result(answer, json=json, files=[("report:", report)] if report.exists() else [])
     if interrupted() or summary["end"] == INTERRUPTED:
         return interrupted.code
     return 0 if summary["end"] == DONE else 1
 
 
-def _write(record: Record, pressing: Pressing, folder: Path) -> dict[str, Any]:
+def _write(record: Record, pressing: PreparedPress, folder: Path) -> dict[str, Any]:
     from palpate.logs.tables.parquet import write_record
-    from palpate.press.pressing import summarise
+    from palpate.press.summary import summarise
     from palpate.report.press import write_report
 
     record = replace(record, meta={**record.meta, "command": printable(command())})
-    summary = with_author({"command": printable(command()), **summarise(record, pressing.asked)})
+    summary = with_author({"command": printable(command()), **summarise(record, pressing.request)})
     write_record(record, folder / RECORD)
     write_json(folder / "summary.json", summary)
     if len(record):
-        write_report(record, pressing.asked, summary, folder)
+        with _terminal.guard_picture("report.html"):
+            write_report(record, pressing.request, summary, folder)
     return summary

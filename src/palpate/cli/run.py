@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.cli._program import print_result
 from palpate.cli._streams import notice_signals
-from palpate.cli._terminal import COMPILING, console, simulation_progress
+from palpate.cli._terminal import COMPILING, console, guard_picture, simulation_progress
 from palpate.cli.options import common
 from palpate.cli.options.values import WHOLE
 from palpate.errors import InputError
-from palpate.files import RECORD, fresh_folder, with_author, write_json, write_text
+from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
 if TYPE_CHECKING:
@@ -31,15 +31,15 @@ def run(
     *,
     seed: Annotated[int, WHOLE] = 0,
     known: common.KnownOptions | None = None,
-    own: common.PluginOptions | None = None,
+    plugins: common.PluginOptions | None = None,
     output: common.FolderOptions | None = None,
-    drawn: common.FigureOptions | None = None,
+    figure_options: common.FigureOptions | None = None,
 ) -> int:
     """Run an experiment: the arm approaches, touches, presses.
 
     palpate run foam-hybrid --seed 1 --out runs/foam
 
-    The folder holds record.parquet, summary.json, film.svg, figures and report.html; the default is runs/NAME-SEED.
+    The folder holds record.parquet, summary.json, figures and report.html; the default is runs/NAME-SEED.
 
     Parameters
     ----------
@@ -48,27 +48,29 @@ def run(
     seed
         Of the noise; the same seed gives the same numbers.
     """
-    known, output, drawn = (
+    known, output, figure_options = (
         known or common.KnownOptions(),
         output or common.FolderOptions(),
-        drawn or common.FigureOptions(),
+        figure_options or common.FigureOptions(),
     )
     from palpate.bench.from_experiment import FILES, load_any, parse_any
 
     if known.list_:
-        common.print_names(FILES, lambda one: load_any(one).title)
+        common.print_names(FILES, lambda experiment_name: load_any(experiment_name).title)
         return 0
-    source = common.source_of(FILES, name, "run", known.print_)
+    source = common.read_source(FILES, name, "run", known.print_)
     if name is None or source is None:
         return 0
     folder = output.out if output.out is not None else Path("runs") / f"{Path(name).stem}-{seed}"
     from palpate.bench.summary import DONE, INTERRUPTED
 
-    drawn.check()
-    with (own or common.PluginOptions()).consent():
+    figure_options.check()
+    with (plugins or common.PluginOptions()).consent():
         experiment = parse_any(source, name)  # before a Ctrl-C is only noted, which a question would wait for
         with notice_signals() as interrupted:
-            ran = _run(_RunRequest(name, source, experiment, seed), folder, output, drawn, interrupted)
+            ran = _run(
+                _RunRequest(name, source, experiment, seed), folder, output, figure_options, interrupted
+            )
     # All is in its place, so that a reader of the output who has gone loses nothing.
     _show(ran, folder, output.json)
     if ran.undrawn:
@@ -84,7 +86,7 @@ class _Ran:
 
     title: str
     summary: dict[str, Any]
-    found: Identification | None
+    identification: Identification | None
     undrawn: str
     record: Record
 
@@ -100,61 +102,49 @@ class _RunRequest:
 
 
 def _run(
-    asked: _RunRequest,
+    request: _RunRequest,
     folder: Path,
     output: common.FolderOptions,
-    drawn: common.FigureOptions,
+    figure_options: common.FigureOptions,
     interrupted: Callable[[], bool],
 ) -> _Ran:
-    """Runs and writes the folder of results."""
+    """Run an experiment, and write the folder of results."""
     from palpate.bench.one_direction import OneDirection
     from palpate.bench.summary import summarise
     from palpate.logs.tables.parquet import write_record
+    from palpate.report.run.page import write_report
 
     with fresh_folder(folder, replace=output.replace) as fresh:
-        command = printable(f"palpate run {shlex.quote(asked.name)} --seed {asked.seed}")
-        record = _record(console(stderr=output.json), asked, interrupted)
+        command = printable(f"palpate run {shlex.quote(request.name)} --seed {request.seed}")
+        record = _record(console(stderr=output.json), request, interrupted)
         record = replace(record, meta={**record.meta, "command": command})
         write_record(record, fresh / RECORD)
-        alone = isinstance(asked.experiment, OneDirection)  # nothing excites it, and no estimator watches
-        found, why = (None, "") if alone else _identify(fresh / RECORD)
-        said = {"identification": found.to_json() if found is not None else None, "not_identified": why}
-        about = {"experiment": printable(Path(asked.name).stem), "command": command}
-        summary = with_author({**about, **summarise(record), **said})
+        alone = isinstance(request.experiment, OneDirection)  # nothing excites it, and no estimator watches
+        identification, reason = (None, "") if alone else _identify(fresh / RECORD)
+        outcome = {
+            "identification": identification.to_json() if identification is not None else None,
+            "not_identified": reason,
+        }
+        about = {"experiment": printable(Path(request.name).stem), "command": command}
+        summary = with_author({**about, **summarise(record), **outcome})
         write_json(fresh / "summary.json", summary)
         undrawn = ""
         try:
             if len(record):
-                _draw(record, fresh, summary, found, asked.source, drawn)
+                with guard_picture("report.html"):
+                    write_report(
+                        record,
+                        summary,
+                        identification,
+                        request.source,
+                        fresh,
+                        figure_options.endings,
+                        figure_options.dpi,
+                    )
         except (MemoryError, OSError) as error:  # what was simulated is worth more than its pictures
-            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
-            undrawn = f"not enough memory or disk space to draw it ({printable(why)})"
-    return _Ran(asked.experiment.title, summary, found, undrawn, record)
-
-
-def _draw(
-    record: Record,
-    folder: Path,
-    summary: dict[str, Any],
-    found: Identification | None,
-    source: str,
-    drawn: common.FigureOptions,
-) -> None:
-    """Figures, page and film of a run."""
-    if "loop" in record.meta:
-        from palpate.report.run.figures import write_one_direction
-
-        write_one_direction(record, folder, summary, source, drawn.endings, drawn.dpi)
-        return
-    from palpate.report.identification.words import sha256_of
-    from palpate.report.run.figures import draw
-    from palpate.report.run.page import film, run_page
-
-    draw(record, folder, drawn.endings, drawn.dpi)
-    page = run_page(record, summary, found, source, sha256_of(folder / RECORD))
-    write_text(folder / "report.html", page)
-    if len(record) > 1:
-        write_text(folder / "film.svg", film(record))
+            reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            undrawn = f"not enough memory or disk space to draw it ({printable(reason)})"
+    return _Ran(request.experiment.title, summary, identification, undrawn, record)
 
 
 def _identify(record: Path) -> tuple[Identification | None, str]:
@@ -168,28 +158,27 @@ def _identify(record: Path) -> tuple[Identification | None, str]:
         return None, printable(str(error).replace(str(record), record.name))
 
 
-def _record(screen: Console, asked: _RunRequest, interrupted: Callable[[], bool]) -> Record:
+def _record(screen: Console, request: _RunRequest, interrupted: Callable[[], bool]) -> Record:
     from palpate.bench.from_experiment import build_any, check_parts
 
-    experiment = asked.experiment
+    experiment = request.experiment
     try:
         bench = build_any(experiment)
         check_parts(bench, lambda: screen.print(COMPILING))
     except InputError as error:
-        raise InputError(f"{asked.name}: {error}") from error
+        raise InputError(f"{request.name}: {error}") from error
     waiting = partial(screen.print, COMPILING)
     with simulation_progress(screen, interrupted) as show:
         return bench.run(
-            experiment.run.duration, asked.seed, press=experiment.run.press, progress=show, waiting=waiting
+            experiment.run.duration, request.seed, press=experiment.run.press, progress=show, waiting=waiting
         )
 
 
 def _show(ran: _Ran, folder: Path, as_json: bool) -> None:
-    from palpate.report.run.figures import one_direction_tables
-    from palpate.report.run.table import answer_of, tables
+    from palpate.report.run.page import tables_of_run
+    from palpate.report.run.table import build_answer
 
-    summary, record = ran.summary, ran.record
-    shown = one_direction_tables(record, summary) if "loop" in record.meta else tables(summary, ran.found)
+    summary, run_tables = ran.summary, tables_of_run(ran.record, ran.summary, ran.identification)
     report = folder / "report.html"
     written = ("report:", report) if report.exists() else ("nothing to draw; the record is in", folder)
-    print_result(answer_of(ran.title, summary, shown), json=as_json, files=[written])
+    print_result(build_answer(ran.title, summary, run_tables), json=as_json, files=[written])

@@ -1,29 +1,27 @@
 """Parts of commands, for those of other distributions too: output, progress, the answer as JSON."""
 
-from palpate.cli._program import command, option_of, print_answer, print_result
+from palpate.cli._program import OutputFile, command, print_answer, print_result
 from palpate.cli._terminal import (
     COMPILING,
-    STYLE,
     bar,
-    confirmed,
     console,
-    head,
+    guard_picture,
     place,
     print_lines,
     progress_of_pieces,
     say,
-    show_table,
 )
+from palpate.report.terminal import STYLE, head, show_table
 
 __all__ = [
     "COMPILING",
     "STYLE",
+    "OutputFile",
     "bar",
     "command",
-    "confirmed",
     "console",
+    "guard_picture",
     "head",
-    "option_of",
     "place",
     "print_answer",
     "print_lines",

@@ -48,65 +48,67 @@ def topics(
         Print one JSON object and nothing else.
     """
     from palpate.logs.listing import list_log
-    from palpate.report.page import CommandAnswer
+    from palpate.report.page import Answer
 
-    found = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits)
-    command = found.proposal.command(log)
-    proposal = {"command": command, "guesses": list(found.proposal.guesses)}
+    listing = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits)
+    command = listing.proposal.command(log)
+    proposal = {"command": command, "guesses": list(listing.proposal.guesses)}
     # A log of gigabytes is listed at once, and so is not read through for a digest.
     plain = {
-        "files": [{"file": str(log), "sha256": None}], "entries": [entry.to_json() for entry in found.entries],
-        "troubles": found.troubles, "identify": proposal,
-    }  # fmt: skip
-    lines = [*_table(log, found), *_proposal_lines(found, command)]
-    print_result(CommandAnswer(plain, show=lambda _: print_lines(*lines)), json=json)
+        "files": [{"file": str(log), "sha256": None}],
+        "entries": [entry.to_json() for entry in listing.entries],
+        "troubles": listing.troubles,
+        "identify": proposal,
+    }
+    lines = [*_table(log, listing), *_proposal_lines(listing, command)]
+    print_result(Answer(plain, show=lambda _: print_lines(*lines)), json=json)
     return 0
 
 
-def _table(log: Path, found: Listing) -> list[str]:
+def _table(log: Path, listing: Listing) -> list[str]:
     """One line for each entry, never wrapped, so that other programs can search it."""
-    begin = _begin(found.entries)
+    begin = _begin(listing.entries)
     rows = [("name", "type", "count", "rate", "first", "last", "values")]
-    for entry in found.entries:
+    for entry in listing.entries:
         times = (_number(None if time is None else time - begin, " s") for time in (entry.first, entry.last))
         words = (entry.name, entry.kind.replace("/msg/", "/"), str(entry.count), _number(entry.rate, " Hz"))
         rows.append((*words, *times, entry.about))  # type: ignore[arg-type]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     since = f", times from {_date(begin)} on" if begin else ""
-    lines = [f"{log.name}: {len(found.entries)} {_kind(found.entries)}{since}"]
-    for row, fields in zip(rows, [(), *(entry.fields for entry in found.entries)], strict=True):
+    lines = [f"{log.name}: {len(listing.entries)} {_kind(listing.entries)}{since}"]
+    for row, fields in zip(rows, [(), *(entry.fields for entry in listing.entries)], strict=True):
         cells = [
             cell.rjust(width) if place in _NUMBERS else cell.ljust(width)
             for place, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         lines.append("  ".join(cells).rstrip())
         lines += wrap(", ".join(fields), 110, initial_indent="    ", subsequent_indent="    ")
-    return [*lines, *found.facts, *found.troubles]
+    return [*lines, *listing.facts, *listing.troubles]
 
 
-def _proposal_lines(found: Listing, command: str | None) -> list[str]:
+def _proposal_lines(listing: Listing, command: str | None) -> list[str]:
     """The proposed command, and its guessed parts."""
-    guesses = [f"  {guess}" for guess in found.proposal.guesses]
+    guesses = [f"  {guess}" for guess in listing.proposal.guesses]
     if command is None:
         return ["", "no command is proposed:", *guesses]
     return [
         "",
         "to identify it:" if not guesses else "to identify it (guessed parts are listed below):",
         f"  {command}",
-        *(f"  {fact}" for fact in found.proposal.facts),
+        *(f"  {fact}" for fact in listing.proposal.facts),
         *guesses,
     ]
 
 
 _NUMBERS = range(2, 6)
-_UNIX = 1e8
-"""Seconds since 1970 from which on a clock counts from there: March 1973."""
+_MIN_UNIX_TIME = 1e8
+"""Time from which on a clock is taken to count from 1970 [s]: March 1973."""
 
 
 def _begin(entries: list[SignalEntry]) -> float:
     """Origin of the times: the first one if they are dates [s since 1970], else 0."""
     first = min((entry.first for entry in entries if entry.first is not None), default=0.0)
-    return first if first > _UNIX else 0.0
+    return first if first > _MIN_UNIX_TIME else 0.0
 
 
 def _date(seconds: float) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.cli._program import command, print_result
+from palpate.cli._program import OutputFile, command, print_result
 from palpate.cli.options import force
 from palpate.cli.options.common import ReportOption, read_found
 from palpate.cli.options.values import si
@@ -61,12 +62,17 @@ def tune(
     surface, columns = surface or force.SurfaceOptions(), columns or force.ColumnOptions()
     output, report = output or force.TuningOutputOptions(), (page or ReportOption()).page()
     output.check_new(output.out, ending=".toml")
-    from palpate.report.tuning import answer_of
+    from palpate.report.tuning import build_answer
 
     tuning, loop = _tune(arm, press, surface, columns, found)
     tuning = replace(tuning, gains=(slide or force.SlideTuningOptions()).tuned_for(tuning.gains))
-    written = _write(tuning, output.out, report)
-    print_result(answer_of(tuning, loop, written, verbose=output.verbose), json=output.json)
+    written = [output.out] if output.out is not None else []
+    for path in written:
+        write_text(path, tuning.gains.to_toml())
+    files = (
+        [OutputFile("report:", report, partial(_write_page, tuning, report))] if report is not None else []
+    )
+    print_result(build_answer(tuning, loop, written, verbose=output.verbose), json=output.json, files=files)
     return 0 if tuning.proved else 1
 
 
@@ -75,20 +81,19 @@ def _tune(
     press: force.PressOptions,
     surface: force.SurfaceOptions,
     columns: force.ColumnOptions,
-    found: Path | None,
+    source: Path | None,
 ) -> tuple[Tuning, dict[str, Any] | None]:
     """The tuned loop, and the inner loop that a log identifies, as plain JSON values."""
     from palpate.force import tune as tune_loop
 
-    one, inner = arm.load(columns)
-    theta = inner.theta(one) if inner is not None and inner.stiffness is not None else None
+    loaded_arm, inner = arm.load(columns)
+    theta = inner.theta(loaded_arm) if inner is not None and inner.stiffness is not None else None
     tuning = tune_loop(
-        one,
+        loaded_arm,
         press.force.si,
-        _surface_of(found, surface, columns),
+        _known_surface(source, surface, columns),
         cap=si(surface.stiffness_cap),
         peak=si(press.peak),
-        surface_speed=surface.surface_speed,
         theta=None if theta is None else theta.high,
     )
     return tuning, None if inner is None else inner.to_json() | (
@@ -96,32 +101,28 @@ def _tune(
     )
 
 
-def _surface_of(
-    found: Path | None, surface: force.SurfaceOptions, columns: force.ColumnOptions
+def _known_surface(
+    source: Path | None, surface: force.SurfaceOptions, columns: force.ColumnOptions
 ) -> Known | None:
     from palpate.force import Known, known_from
     from palpate.from_log import log_identifier
 
     highest = si(surface.damping_max)
-    if found is not None and surface.stiffness is not None:
+    if source is not None and surface.stiffness is not None:
         raise InputError("give a file or --stiffness, not both")
     if surface.stiffness is not None:
         return Known.of_range(surface.stiffness.si, highest)
-    if found is None:
+    if source is None:
         raise InputError(
             "the surface is missing; give FOUND.json of palpate identify --json, a log, or --stiffness LOW:HIGH"
         )
-    if found.suffix.lower() == ".json":
-        return known_from(read_found(found), str(found)).with_damping_up_to(highest)
-    identified, _ = log_identifier(columns.of_press).identify(found)
-    return known_from(identified.to_json(), str(found)).with_damping_up_to(highest)
+    if source.suffix.lower() == ".json":
+        return known_from(read_found(source), str(source)).with_damping_up_to(highest)
+    identified, _ = log_identifier(columns.press_roles).identify(source)
+    return known_from(identified.to_json(), str(source)).with_damping_up_to(highest)
 
 
-def _write(tuning: Tuning, out: Path | None, page: Path | None) -> list[Path]:
-    if out is not None:
-        write_text(out, tuning.gains.to_toml())
-    if page is not None:
-        from palpate.report.tuning import page as page_of
+def _write_page(tuning: Tuning, path: Path) -> None:
+    from palpate.report.tuning import page
 
-        write_text(page, page_of(tuning, command()))
-    return [path for path in (out, page) if path is not None]
+    write_text(path, page(tuning, command()))

@@ -1,4 +1,4 @@
-"""From a wrench and a pose in three dimensions to a force and a position along the contact's normal.
+"""Force and position along the contact's normal, from a wrench and a pose in three dimensions.
 
 A wrist's force sensor shows f = R^T (s F + w) + b: the force F that the tool exerts, turned into the tool's axes by
 its rotation R and with a sign s that drivers choose, the tool's weight w and the sensor's bias b. The pose p, R of a
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from palpate.lazy import importer
 
 if TYPE_CHECKING:
-    from palpate.contact_frame.arm import ArmDynamics, describe, identify_contact, robot_stiffness, with_arm
-    from palpate.contact_frame.load import Payload, load_payload
-    from palpate.contact_frame.load_files import compare, load_text, read_load
+    from palpate.contact_frame.arm import ArmDynamics, describe, robot_stiffness, with_arm
+    from palpate.contact_frame.payload import Payload, load_payload, load_text
+    from palpate.contact_frame.press_or_slide import identify_contact
     from palpate.contact_frame.projecting import project
     from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.contact_frame.tool_payload import Weighed, weigh
@@ -24,22 +24,20 @@ __all__ = [
     "ContactFrame",
     "Payload",
     "Weighed",
-    "compare",
     "describe",
     "identify_contact",
     "load_payload",
     "load_text",
     "project",
-    "read_load",
     "robot_stiffness",
     "weigh",
     "with_arm",
 ]
 
 _HOMES = {
-    "arm": ("ArmDynamics", "describe", "identify_contact", "robot_stiffness", "with_arm"),
-    "load": ("Payload", "load_payload"),
-    "load_files": ("compare", "load_text", "read_load"),
+    "arm": ("ArmDynamics", "describe", "robot_stiffness", "with_arm"),
+    "press_or_slide": ("identify_contact",),
+    "payload": ("Payload", "load_payload", "load_text"),
     "projecting": ("project",),
     "signals_in_base": ("ContactFrame",),
     "tool_payload": ("Weighed", "weigh"),

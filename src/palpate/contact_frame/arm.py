@@ -2,15 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import entry_points
 from typing import Any, Literal
 
 import numpy as np
 
-from palpate.contact_frame.signals_in_base import FORCE, ContactFrame, signals_of
 from palpate.errors import InputError
-from palpate.identification import Code, Identification, Parameter, Verdict, Warn, identify
-from palpate.records import Record
+from palpate.identification import Code, Identification, Parameter, Verdict, Warn
 from palpate.signals.types import NORMAL
 from palpate.units import GRAVITY
 
@@ -43,137 +40,7 @@ class ArmDynamics:
             raise InputError(f"the robot's mass must be 0 kg or more, got {self.mass[0]:g}:{self.mass[1]:g}")
 
 
-def identify_contact(
-    record: Record,
-    frame: ContactFrame | None = None,
-    arm: ArmDynamics | None = None,
-    *,
-    tolerance: float = 0.25,
-    calibration: float = 0.0,
-    **options: Any,
-) -> tuple[Identification, Record]:
-    """Find what an arm touched.
-
-    Args:
-        record: force and position, or wrench and pose, over time.
-        frame: how wrench and pose stand to each other and to the surface; not for a record of one axis.
-        arm: mass and stiffness between the sensors and the surface.
-        tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
-        calibration: relative standard deviation of the scales of force and position together.
-        options: of `palpate.identify`.
-
-    Returns:
-        The identification, and the record along the normal that it is of.
-
-    Raises:
-        InputError: the record or an argument is wrong, in one line.
-    """
-    arm = _complete(arm or ArmDynamics(), record.meta)
-    spread, inertia = 0.0, record.meta.get("tool_inertia_kg")
-    in_space = FORCE[0] in record.columns
-    if in_space:
-        from palpate.contact_frame.projecting import project
-
-        whole = record
-        record = project(record, frame or ContactFrame())
-        spread, inertia = (record.meta["contact_frame"][name] for name in ("scale_std", "free_inertia_kg"))
-    elif inertia is not None:
-        record = _note_inertia_sign(record, inertia)
-    if arm.stiffness is not None:
-        options |= {"series_stiffness": arm.stiffness[0], "series_std": arm.stiffness[1]}
-        options["series_mass"] = arm.mass
-    elif arm.mass is not None:
-        raise InputError("the robot's mass swings on the robot's own stiffness: give --robot-stiffness too")
-    scale = float(np.hypot(calibration, spread))
-    found = identify(record, tolerance=tolerance, calibration=scale, **options)
-    if in_space and not record.meta["contact_frame"]["normal_shown"]:
-        found = _refuse_direction(found)
-    if in_space and Code.NO_CONTACT.word in found.codes:
-        found, record = _all_free(found, record)
-    if inertia is not None:
-        found = _mistaken(found, inertia)
-    about = _about_arm(arm) | {"force_filter": str(options.get("force_filter") or "none")}
-    record = replace(record, meta={**record.meta, "arm": about})
-    found = with_arm(found, arm, tolerance, from_pose=in_space)
-    slid = None
-    if in_space:
-        slid = _slide(whole, (frame or ContactFrame(), arm, tolerance, calibration), found, record)
-    if slid is None or slid.slide is None:
-        return slid or found, record
-    meta = {key: value for key, value in record.meta.items() if key != "contact_frame"}  # of a press
-    return slid, replace(record, meta=meta)
-
-
-def _complete(arm: ArmDynamics, said: Mapping[str, Any]) -> ArmDynamics:
-    """An arm with what its record says of it; what is given goes first."""
-    return replace(
-        arm,
-        position_from=arm.position_from or said.get("position_from"),
-        tool_mass=arm.tool_mass or said.get("tool_mass_kg"),
-        stiffness=arm.stiffness or said.get("robot_stiffness_N_per_m"),
-        mass=arm.mass or said.get("robot_mass_kg"),
-    )
-
-
-def _slide(
-    record: Record,
-    asked: tuple[ContactFrame, ArmDynamics, float, float],
-    press: Identification,
-    along: Record,
-) -> Identification | None:
-    """The identification of a slide, by `palpate-slide`, or of a press without a K that may be a slide's; or None."""
-    for entry in entry_points(group="palpate.slides"):
-        found: Identification | None = entry.load()(signals_of(record, asked[0]), *asked, press, along)
-        return found
-    return None
-
-
-def _note_inertia_sign(record: Record, inertia: tuple[float, float]) -> Record:
-    """A record whose tool's inertia was weighed with the wrong sign says so."""
-    from palpate.contact_frame.free_motion import wrong_sign, wrong_sign_of
-
-    if not wrong_sign(inertia):
-        return record
-    note = {"code": Code.TOOL_INERTIA.word, "text": wrong_sign_of(inertia)}
-    return replace(record, meta={**record.meta, "notes": [*record.meta.get("notes", ()), note]})
-
-
-def _refuse_direction(found: Identification) -> Identification:
-    """If the force has no direction, a fit along any direction is chance."""
-    reason = "the force has no direction, so there seems to be no contact"
-    refused = {
-        name: Parameter(None, None, None, p.unit, Verdict.NOT_IDENTIFIABLE, reason)
-        for name, p in found.parameters.items()
-    }
-    warnings = [warn for warn in found.warnings if warn.code is not Code.NO_CONTACT]
-    return replace(found, parameters=refused, warnings=(*warnings, Warn(Code.NO_CONTACT, reason)))
-
-
-def _mistaken(found: Identification, inertia: tuple[float, float]) -> Identification:
-    """A contact alone cannot separate a mass compensated with the wrong sign from a lag and a damping."""
-    from palpate.contact_frame.free_motion import wrong_sign
-
-    if not wrong_sign(inertia):
-        return found
-    reason = "the tool's inertia is in the force with the wrong sign (tool-inertia), which a damping and a lag hide"
-    refused = {
-        name: replace(p, verdict=Verdict.REJECTED, value=None, std=None, ci95=None, reason=reason)
-        for name, p in found.parameters.items()
-        if name in {"B", "M"}
-    }
-    return replace(found, parameters={**found.parameters, **refused})
-
-
-def _all_free(found: Identification, record: Record) -> tuple[Identification, Record]:
-    """Where nothing is touched, there is no contact that the log could begin in, no normal and no side of a force."""
-    about = {**record.meta["contact_frame"], "untouched": True}
-    warnings = tuple(
-        w for w in found.warnings if w.code not in (Code.CONTACT_AT_START, Code.NORMAL_UNCERTAIN)
-    )
-    return replace(found, warnings=warnings), replace(record, meta={**record.meta, "contact_frame": about})
-
-
-def _about_arm(arm: ArmDynamics) -> dict[str, Any]:
+def arm_meta(arm: ArmDynamics) -> dict[str, Any]:
     """Properties of the arm, as plain values."""
     return {
         "tool_mass_kg": list(arm.tool_mass) if arm.tool_mass else None,
@@ -185,30 +52,33 @@ def _about_arm(arm: ArmDynamics) -> dict[str, Any]:
 
 LOWER_BOUND = "a lower bound of the surface's stiffness"
 """Begins the reason of a K that holds the arm's own compliance."""
-_STIFF = 1000.0
+_COMPLIANCE_MATTERS = 1000.0
 """Above this an arm's own compliance, of 20 to 100 kN/m in a light one, takes more than some percent [N/m]."""
 
 
-def with_arm(found: Identification, arm: ArmDynamics, tolerance: float, *, from_pose: bool) -> Identification:
+def with_arm(
+    identification: Identification, arm: ArmDynamics, tolerance: float, *, from_pose: bool
+) -> Identification:
     """An identification with the tool's mass taken out of M, and K bounded where the arm's compliance is in it.
 
     Args:
-        found: of force and position as they were measured.
+        identification: of force and position as they were measured.
         arm: what is known of it.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a share of its value.
         from_pose: the position is that of a pose, which most drivers make from the joints' encoders.
     """
-    parameters = dict(found.parameters)
+    parameters = dict(identification.parameters)
     if "M" in parameters and parameters["M"].unit == "kg":
-        parameters["M"] = _of_swing(_without_tool(parameters["M"], arm, tolerance), arm)
-    warnings, point = list(found.warnings), found.working_point
-    warning = _compliance(parameters, arm, from_pose)
+        parameters["M"] = _explain_negative_mass(_subtract_tool_mass(parameters["M"], arm, tolerance), arm)
+    warnings = list(identification.warnings)
+    point = identification.working_point
+    warning = _compliance_warning(parameters, arm, from_pose)
     if warning is not None:
         warnings.append(warning)
         if arm.position_from == "joints":
             parameters["K"] = _lower_bound(parameters["K"])
             point = point and replace(point, stiffness=_lower_bound(point.stiffness))
-    return replace(found, parameters=parameters, working_point=point, warnings=tuple(warnings))
+    return replace(identification, parameters=parameters, working_point=point, warnings=tuple(warnings))
 
 
 def robot_stiffness(wall: Identification, name: str) -> tuple[float, float]:
@@ -233,7 +103,7 @@ def robot_stiffness(wall: Identification, name: str) -> tuple[float, float]:
     return stiffness.value, stiffness.std
 
 
-def _without_tool(mass: Parameter, arm: ArmDynamics, tolerance: float) -> Parameter:
+def _subtract_tool_mass(mass: Parameter, arm: ArmDynamics, tolerance: float) -> Parameter:
     """M of the environment alone; said to be that of both, if the tool's is not known."""
     if arm.tool_mass is None:
         if mass.value is None:
@@ -250,22 +120,24 @@ def _without_tool(mass: Parameter, arm: ArmDynamics, tolerance: float) -> Parame
         )
     value = (mass.ci95[0] + mass.ci95[1]) / 2 - tool
     half = float(np.hypot((mass.ci95[1] - mass.ci95[0]) / 2, NORMAL * tool_std))
-    std, low, high = half / NORMAL, value - half, value + half
-    taken = f"the tool's {tool:.3g} kg taken off"
+    std = half / NORMAL
+    low = value - half
+    high = value + half
+    correction = f"the tool's {tool:.3g} kg taken off"
     if low <= 0 <= high:
         bounds = f"95 %: {low:.3g} to {high:.3g} {mass.unit}"
-        reason = f"{taken}, the log does not show the environment's ({bounds})"
+        reason = f"{correction}, the log does not show the environment's ({bounds})"
         return Parameter(None, None, (low, high), mass.unit, Verdict.NOT_IDENTIFIABLE, reason)
     if high < 0:
-        reason = f"{taken}, {value:.3g} kg are left, below zero: is the tool that heavy?"
+        reason = f"{correction}, {value:.3g} kg are left, below zero: is the tool that heavy?"
         return Parameter(None, None, None, mass.unit, Verdict.REJECTED, reason)
     if mass.verdict is Verdict.IDENTIFIED and half > tolerance * value:
-        reason = f"{taken}, the interval is wider than {tolerance:.0%}"
+        reason = f"{correction}, the interval is wider than {tolerance:.0%}"
         return Parameter(value, std, (low, high), mass.unit, Verdict.NOT_IDENTIFIABLE, reason)
-    return Parameter(value, std, (low, high), mass.unit, mass.verdict, f"{taken}; {mass.reason}")
+    return Parameter(value, std, (low, high), mass.unit, mass.verdict, f"{correction}; {mass.reason}")
 
 
-def _of_swing(mass: Parameter, arm: ArmDynamics) -> Parameter:
+def _explain_negative_mass(mass: Parameter, arm: ArmDynamics) -> Parameter:
     """M below zero, as caused by an undeclared swinging mass of the arm."""
     if arm.stiffness is None or arm.mass is not None or "below zero" not in mass.reason:
         return mass
@@ -273,7 +145,9 @@ def _of_swing(mass: Parameter, arm: ArmDynamics) -> Parameter:
     return replace(mass, reason=f"{mass.reason}; {why}")
 
 
-def _compliance(parameters: Mapping[str, Parameter], arm: ArmDynamics, from_pose: bool) -> Warn | None:
+def _compliance_warning(
+    parameters: Mapping[str, Parameter], arm: ArmDynamics, from_pose: bool
+) -> Warn | None:
     """Warning about an arm of unknown compliance."""
     stiffness = parameters.get("K")
     if arm.stiffness is not None or arm.position_from == "tip" or stiffness is None:
@@ -284,7 +158,12 @@ def _compliance(parameters: Mapping[str, Parameter], arm: ArmDynamics, from_pose
             " both; give --robot-stiffness, or a press on a rigid wall with --robot-stiffness-from"
         )
         return Warn(Code.SERIES_COMPLIANCE, text)
-    if from_pose and stiffness.unit == "N/m" and stiffness.value is not None and stiffness.value > _STIFF:
+    if (
+        from_pose
+        and stiffness.unit == "N/m"
+        and stiffness.value is not None
+        and stiffness.value > _COMPLIANCE_MATTERS
+    ):
         text = (
             "a pose made from the joints' encoders does not show how the arm gives way: then say --position-from joints"
             " and --robot-stiffness; if something sees the tip itself, say --position-from tip"
@@ -298,7 +177,7 @@ def _lower_bound(stiffness: Parameter) -> Parameter:
     if (
         stiffness.value is None
         or stiffness.ci95 is None
-        or stiffness.value < _STIFF
+        or stiffness.value < _COMPLIANCE_MATTERS
         or stiffness.unit != "N/m"
     ):
         return stiffness
@@ -309,9 +188,9 @@ def _lower_bound(stiffness: Parameter) -> Parameter:
     return replace(stiffness, verdict=Verdict.NOT_IDENTIFIABLE, reason=reason)
 
 
-_FAR = 0.01
-"""Of a line of action from the point that touches [m]: a probe touches off its point by its radius, some millimetres;
-a lever arm that is told wrong is off by centimetres."""
+_MAX_LEVER_ERROR = 0.01
+"""Largest distance of the line of action from the point that touches [m]. A probe touches off its point by its radius,
+some millimetres; a lever arm that is given wrongly is off by centimetres."""
 
 
 def describe(meta: Mapping[str, Any]) -> list[str]:
@@ -355,7 +234,8 @@ def _load(about: Mapping[str, Any]) -> str:
     if about["weight_N"] is None:
         what = "bias" if about["gravity_compensated"] else "bias and weight together"
         return f"{what} {_list_words(about['bias_N'])} N in the tool's axes (std {about['load_std_N']:.2g} N)"
-    weight, std = float(np.linalg.norm(about["weight_N"])), about["weight_std_N"]
+    weight = float(np.linalg.norm(about["weight_N"]))
+    std = about["weight_std_N"]
     if about.get("payload_said"):
         return (
             f"tool's weight {weight:.3g} N (std {std:.2g} N) by the payload file; bias {_list_words(about['bias_N'])} N"
@@ -369,7 +249,7 @@ def _lever(about: Mapping[str, Any]) -> list[str]:
     off = about["line_of_action_off_m"]
     if off is None:
         return []
-    doubt = "; are --tcp, --wrench-at and --wrench-frame right?" if off > _FAR else ""
+    doubt = "; are --tcp, --wrench-at and --wrench-frame right?" if off > _MAX_LEVER_ERROR else ""
     return [f"the force passes {1e3 * off:.2g} mm from the tool centre point, by the torque{doubt}"]
 
 

@@ -10,16 +10,18 @@ from typing import Any, Literal
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.contact_frame.free_motion import Vector, contact_rows, matrices, read_rows, rows_between
-from palpate.contact_frame.load import Load, Payload, known_load, load_of, no_load, robust_load, turns
+from palpate.contact_frame.free_motion import contact_rows, finite_rows, rows_between
+from palpate.contact_frame.load import Load, fit_load, fit_load_robustly, load_with_payload, turns, zero_load
+from palpate.contact_frame.payload import Payload, Vector
 from palpate.errors import InputError
 from palpate.identification.sample_clock import at_limit
 from palpate.records import Record
+from palpate.signals.rotations import matrices_from_quaternions, matrix_from_rpy, to_base
 
 
 @dataclass(frozen=True)
 class ContactFrame:
-    """How wrench and pose stand to each other and to the surface.
+    """Axes, points and signs of a wrench and a pose, and the normal.
 
     Args:
         wrench_frame: axes that the wrench is given in: the arm's base, the tool (the axes of the pose), or a sensor
@@ -65,8 +67,8 @@ class ContactFrame:
             self._check_axes(self.payload)
 
     def _check_axes(self, payload: Payload) -> None:
-        said = (self.wrench_frame, self.sensor_rpy)
-        if self.wrench_frame is not None and said != (payload.wrench_frame, payload.sensor_rpy):
+        declared = (self.wrench_frame, self.sensor_rpy)
+        if self.wrench_frame is not None and declared != (payload.wrench_frame, payload.sensor_rpy):
             raise InputError(
                 f"the payload was weighed with a wrench in the {payload.wrench_frame}'s axes, and this wrench is said"
                 f" to be in the {self.wrench_frame}'s: give the same --wrench-frame and --sensor-rpy, or weigh again"
@@ -89,10 +91,10 @@ class BaseSignals:
         force: in the tool's axes as the sensor shows it [N], shape (n, 3).
         torque: likewise [N m], about the point that the user named; None without one.
         rotations: of the tool in the base, shape (n, 3, 3).
-        place: of the point that touches, in the base [m], shape (n, 3).
+        position: of the point that touches, in the base [m], shape (n, 3).
         wrench_frame: the axes that the wrench was given in.
         guess: how that was concluded, if it was not said.
-        turned: whether the pose has an orientation.
+        oriented: True if the pose has an orientation.
     """
 
     time: Array
@@ -100,38 +102,39 @@ class BaseSignals:
     force: Array
     torque: Array | None
     rotations: Array
-    place: Array
+    position: Array
     wrench_frame: str
     guess: str | None
-    turned: bool
+    oriented: bool
 
 
-def signals_of(record: Record, frame: ContactFrame) -> BaseSignals:
+def base_signals(record: Record, frame: ContactFrame) -> BaseSignals:
     """Wrench and pose of a record in three dimensions.
 
     Raises:
         InputError: the wrench's axes are not known, or need an orientation that the record has not.
     """
-    time, place = record["time"], _vectors(record, POSITION)
-    turned = QUATERNION[0] in record.columns
-    if not turned:
+    time = record["time"]
+    position = _vectors(record, POSITION)
+    oriented = QUATERNION[0] in record.columns
+    if not oriented:
         _check_without_orientation(frame)
-    rotations = (
-        matrices(time, _vectors(record, QUATERNION)) if turned else np.tile(np.eye(3), (len(time), 1, 1))
-    )
-    wrench_frame, guess = _wrench_frame(record, frame, turned)
+    rotations = np.tile(np.eye(3), (len(time), 1, 1))
+    if oriented:
+        rotations = matrices_from_quaternions(time, _vectors(record, QUATERNION))
+    wrench_frame, guess = _wrench_frame(record, frame, oriented)
     torque = _vectors(record, TORQUE) if TORQUE[0] in record.columns else None
-    into_tool = _into_tool(wrench_frame, frame, rotations)
+    into_tool = _wrench_rotations(wrench_frame, frame, rotations)
     return BaseSignals(
         time=time,
         recorded=_vectors(record, FORCE),
-        force=np.einsum("nij,nj->ni", into_tool, _vectors(record, FORCE)),
-        torque=None if torque is None else np.einsum("nij,nj->ni", into_tool, torque),
+        force=to_base(into_tool, _vectors(record, FORCE)),
+        torque=None if torque is None else to_base(into_tool, torque),
         rotations=rotations,
-        place=place + rotations @ np.array(frame.tcp),
+        position=position + rotations @ np.array(frame.tcp),
         wrench_frame=wrench_frame,
         guess=guess,
-        turned=turned,
+        oriented=oriented,
     )
 
 
@@ -145,148 +148,145 @@ def _check_without_orientation(frame: ContactFrame) -> None:
         "a lever arm (--tcp)": any(frame.tcp),
         "a normal in the tool's axes": frame.normal is not None and frame.normal_frame == "tool",
     }
-    for what, wanted in needs.items():
-        if wanted:
+    for what, needed in needs.items():
+        if needed:
             raise InputError(
                 f"{what} needs the pose's orientation, and this pose has none; log a quaternion with it"
             )
 
 
-def _wrench_frame(record: Record, frame: ContactFrame, turned: bool) -> tuple[str, str | None]:
+def _wrench_frame(record: Record, frame: ContactFrame, oriented: bool) -> tuple[str, str | None]:
     """The axes of the wrench; and the reason for them, if they were not declared."""
     if frame.wrench_frame is not None:
         return frame.wrench_frame, None
-    if not turned:
+    if not oriented:
         return "base", "the pose has no orientation, so the wrench is taken to be in the base's axes"
-    own, pose = (record.meta.get("frames", {}).get(role, "") for role in (FORCE[0], POSITION[0]))
-    if not (own and pose):
+    wrench, pose = (record.meta.get("frames", {}).get(role, "") for role in (FORCE[0], POSITION[0]))
+    if not (wrench and pose):
         raise InputError(
             "the log does not name the axes of its wrench; say --wrench-frame base (the arm's base), tool (the axes of"
             " the pose) or sensor (turned against the tool by --sensor-rpy)"
         )
-    found = "base" if own == pose else "tool"
+    axes = "base" if wrench == pose else "tool"
     return (
-        found,
-        f"the wrench's header names {own!r} and the pose's {pose!r}: its axes are taken to be the {found}'s",
+        axes,
+        f"the wrench's header names {wrench!r} and the pose's {pose!r}: its axes are taken to be the {axes}'s",
     )
 
 
-def _into_tool(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Array:
+def _wrench_rotations(wrench_frame: str, frame: ContactFrame, rotations: Array) -> Array:
     """Rotations from the wrench's axes to the tool's, shape (n, 3, 3)."""
     if wrench_frame == "base":
         return rotations.transpose(0, 2, 1)
     if wrench_frame == "tool":
         return np.broadcast_to(np.eye(3), rotations.shape)
     assert frame.sensor_rpy is not None
-    return np.broadcast_to(turn_of(frame.sensor_rpy), rotations.shape)
+    return np.broadcast_to(matrix_from_rpy(frame.sensor_rpy), rotations.shape)
 
 
-def turn_of(sensor_rpy: Vector) -> Array:
-    """Rotation from the axes of a sensor into the tool's, shape (3, 3), of roll, pitch and yaw [rad]."""
-    from scipy.spatial.transform import Rotation
-
-    turn: Array = Rotation.from_euler("xyz", sensor_rpy).as_matrix()
-    return turn
-
-
-def saturated_rows(force: Array, place: Array, inside: Mask) -> Mask:
+def saturated_rows(force: Array, position: Array, inside: Mask) -> Mask:
     """Rows in contact in which an axis rests at exactly its extreme value while the tool moves on, shape (n,).
 
     Args:
         force: in the axes that it was recorded in [N], shape (n, 3); NaN where there is no reading.
-        place: of the tool [m], shape (n, 3), likewise.
+        position: of the tool [m], shape (n, 3), likewise.
         inside: rows in contact, shape (n,).
     """
-    stuck = np.zeros(len(force), bool)
+    saturated = np.zeros(len(force), bool)
     for axis in force.T:
-        there = np.isfinite(axis) & inside
-        if there.any() and np.ptp(np.float32(axis[there])):  # what is below its grain is rounding, no range
-            stuck |= at_limit(axis, place, (axis[there].max(), axis[there].min()), there)
-    return stuck
+        rows = np.isfinite(axis) & inside
+        if rows.any() and np.ptp(np.float32(axis[rows])):  # what is below its grain is rounding, no range
+            saturated |= at_limit(axis, position, (axis[rows].max(), axis[rows].min()), rows)
+    return saturated
 
 
-_ROUNDS = 4
-"""At most: the weight tells the free rows and they the weight, until neither changes."""
+_MAX_ROUNDS = 4
+"""Maximum rounds: the free rows give the weight, and the weight the free rows, until neither changes."""
 
 
 @dataclass(frozen=True)
-class Unloaded:
+class CompensatedForce:
     """The force in the base's axes without weight and bias.
 
     Args:
         force: [N], shape (n, 3).
-        there: rows with a force, shape (n,).
+        finite: rows with a force, shape (n,).
         inside: rows in contact, shape (n,).
         free: rows with a force in which nothing is touched, shape (n,).
         load: the subtracted weight and bias.
     """
 
     force: Array
-    there: Mask
+    finite: Mask
     inside: Mask
     free: Mask
     load: Load
 
 
-def in_range(signals: BaseSignals, frame: ContactFrame) -> tuple[BaseSignals, Unloaded, list[dict[str, Any]]]:
+def compensate(
+    signals: BaseSignals, frame: ContactFrame
+) -> tuple[BaseSignals, CompensatedForce, list[dict[str, Any]]]:
     """Take off weight and bias, and leave out the readings of a force at the end of its range.
 
     Returns:
         The signals without these readings, the force, and notes as a record's meta has them.
     """
-    freed = _remove_load(signals, frame)
-    stuck = saturated_rows(signals.recorded, signals.place, freed.inside)
-    if not stuck.any():
-        return signals, freed, []
-    signals = replace(signals, force=np.where(stuck[:, None], np.nan, signals.force))
-    text = f"an axis of the force rests at its extreme value for {int(stuck.sum())} rows; they are left out"
+    compensated = _remove_load(signals, frame)
+    saturated = saturated_rows(signals.recorded, signals.position, compensated.inside)
+    if not saturated.any():
+        return signals, compensated, []
+    signals = replace(signals, force=np.where(saturated[:, None], np.nan, signals.force))
+    text = (
+        f"an axis of the force rests at its extreme value for {int(saturated.sum())} rows; they are left out"
+    )
     return signals, _remove_load(signals, frame), [{"code": "saturated", "text": text}]
 
 
-def _remove_load(signals: BaseSignals, frame: ContactFrame) -> Unloaded:
-    there = read_rows(signals.force)
+def _remove_load(signals: BaseSignals, frame: ContactFrame) -> CompensatedForce:
+    finite = finite_rows(signals.force)
     if frame.free is None:
-        load, inside, free = _fit_load(signals, there, frame)
+        load, inside, free = _fit_load(signals, finite, frame)
     else:
-        free = rows_between(signals.time, frame.free) & there
+        free = rows_between(signals.time, frame.free) & finite
         load = _load(signals, free, frame)
         inside, _ = _contact(signals, load)
-    return Unloaded(load.taken_off(signals.force, signals.rotations), there, inside, free, load)
+    return CompensatedForce(load.taken_off(signals.force, signals.rotations), finite, inside, free, load)
 
 
 def _load(signals: BaseSignals, free: Mask, frame: ContactFrame) -> Load:
     """Weight and bias by the free rows; the weight is the payload's where there is one."""
-    force, rotations = signals.force[free], signals.rotations[free]
+    force = signals.force[free]
+    rotations = signals.rotations[free]
     if frame.payload is not None:
-        return known_load(force, rotations, frame.payload)
-    return load_of(force, rotations, weighs=not frame.gravity_compensated)
+        return load_with_payload(force, rotations, frame.payload)
+    return fit_load(force, rotations, weighs=not frame.gravity_compensated)
 
 
-def _fit_load(signals: BaseSignals, there: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
+def _fit_load(signals: BaseSignals, finite: Mask, frame: ContactFrame) -> tuple[Load, Mask, Mask]:
     """Weight and bias by the free rows; which rows these are, depends on the weight where the tool turns."""
-    turned = signals.turned and turns(signals.rotations[there])
-    none = there & False
+    turns_in_space = signals.oriented and turns(signals.rotations[finite])
+    none = finite & False
     weighs = not frame.gravity_compensated
     if frame.payload is not None:
         load = _load(signals, none, frame)
     else:
         load = (
-            robust_load(signals.force[there], signals.rotations[there], weighs=weighs)
-            if turned
-            else no_load()
+            fit_load_robustly(signals.force[finite], signals.rotations[finite], weighs=weighs)
+            if turns_in_space
+            else zero_load()
         )
     before = none
-    for _ in range(_ROUNDS if turned else 1):
+    for _ in range(_MAX_ROUNDS if turns_in_space else 1):
         inside, free = _contact(signals, load)
-        free &= there
+        free &= finite
         if free.any() and np.array_equal(free, before):
             break
         before = free
         if not free.any():
-            return _load(signals, none, frame) if frame.payload else no_load(), inside, free
+            return _load(signals, none, frame) if frame.payload else zero_load(), inside, free
         load = _load(signals, free, frame)
     return load, inside, free
 
 
 def _contact(signals: BaseSignals, load: Load) -> tuple[Mask, Mask]:
-    return contact_rows(signals.time, load.taken_off(signals.force, signals.rotations), signals.place)
+    return contact_rows(signals.time, load.taken_off(signals.force, signals.rotations), signals.position)

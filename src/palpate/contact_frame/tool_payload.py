@@ -1,4 +1,4 @@
-"""From a log of free motion to a payload, or to the missing orientations."""
+"""A payload from a log of free motion, or the orientations that the log lacks."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -8,23 +8,24 @@ import numpy as np
 
 from palpate.arrays import Array, Indices, Mask
 from palpate.contact_frame import weighing
-from palpate.contact_frame.free_motion import BLOCKS, FEWEST, Vector, free_inertia, read_rows
-from palpate.contact_frame.load import Payload
-from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, signals_of
-from palpate.contact_frame.weighing_checks import noise_of, notes_against
+from palpate.contact_frame.free_motion import BLOCKS, MIN_ROWS, finite_rows, free_inertia
+from palpate.contact_frame.payload import Payload, Vector
+from palpate.contact_frame.signals_in_base import BaseSignals, ContactFrame, base_signals
+from palpate.contact_frame.weighing_checks import force_noise, weighing_notes
 from palpate.errors import InputError
 from palpate.records import Record, Result
+from palpate.signals.rotations import to_base, to_tool
 
-_FEWEST = 3
+_MIN_POSES_FOR_DRIFT = 3
 """Orientations of three axes each: weight, bias and drift are nine numbers."""
-_UPRIGHT = 0.5**0.5
+_MIN_VERTICAL_COSINE = 0.5**0.5
 """Cosine of the angle to the vertical at which a base is as near to one on a wall as to one that stands or hangs."""
-_ROUNDS = 3
+_INERTIA_ROUNDS = 3
 """After a round the residual of the tool's acceleration is the relative error of its mass: of ten per cent
 three rounds leave a thousandth."""
-_SMOOTH = 0.1
-"""Of the window by which an acceleration is read off the positions [s]: what is slower than some 6 Hz passes, and no
-arm turns its tool faster."""
+_SMOOTHING_WINDOW = 0.1
+"""Length of the window in which an acceleration is fitted to the positions [s]. It passes motion below some 6 Hz, and
+no arm turns its tool faster."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,19 +51,22 @@ class Weighed(Result):
     shown: Array = field(repr=False)
 
     def to_json(self) -> dict[str, Any]:
-        """As plain JSON values."""
-        told = {
+        """The payload as plain JSON values."""
+        parameters = {
             name: {
-                "value": one.value.tolist(),
-                "std": one.std.tolist(),
-                "ci95": [(one.value - one.half).tolist(), (one.value + one.half).tolist()],
-                "unit": one.unit,
+                "value": parameter.value.tolist(),
+                "std": parameter.std.tolist(),
+                "ci95": [
+                    (parameter.value - parameter.half).tolist(),
+                    (parameter.value + parameter.half).tolist(),
+                ],
+                "unit": parameter.unit,
             }
-            for name, one in self.parameters.items()
+            for name, parameter in self.parameters.items()
         }
         return {
             "payload": None if self.payload is None else msgspec.to_builtins(self.payload),
-            "parameters": told,
+            "parameters": parameters,
             "lacking": self.lacking,
             "warnings": self.notes,
             "orientations": self.poses,
@@ -81,28 +85,31 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     Raises:
         InputError: the record has no orientation, or too few readings.
     """
-    signals = signals_of(record, replace(frame, tcp=(0.0, 0.0, 0.0)))
-    if not signals.turned:
+    signals = base_signals(record, replace(frame, tcp=(0.0, 0.0, 0.0)))
+    if not signals.oriented:
         raise InputError(
             "a tool is weighed by turning it, and this pose has no orientation; log one with it (--pose, --rotation)"
         )
-    there = read_rows(signals.force)
-    if there.sum() < FEWEST:
-        raise InputError(f"only {int(there.sum())} rows hold a force; at least {FEWEST} are needed")
+    finite = finite_rows(signals.force)
+    if finite.sum() < MIN_ROWS:
+        raise InputError(f"only {int(finite.sum())} rows hold a force; at least {MIN_ROWS} are needed")
     still = signals
-    for _ in range(_ROUNDS):  # what the tool's own acceleration does is taken off as far as it is known
-        fit = _fit(still, there, tolerance)
+    for _ in range(
+        _INERTIA_ROUNDS
+    ):  # what the tool's own acceleration does is taken off as far as it is known
+        fit = _fit(still, finite, tolerance)
         parameters = fit.parameters | _inertia(signals, fit, frame)
         still = _at_rest(signals, fit.fitted, parameters, frame)
         if still is signals:
             break
-    poses, fitted = fit.poses, fit.fitted
+    poses = fit.poses
+    fitted = fit.fitted
     lacking = _lacking(poses, fitted, tolerance)
     notes: list[dict[str, Any]] = []
     if np.isfinite(fitted.left_out).all():
-        notes = notes_against(record, frame, signals, there, replace(fit, parameters=parameters))
+        notes = weighing_notes(record, frame, signals, finite, replace(fit, parameters=parameters))
     return Weighed(
-        None if lacking else _payload(parameters, signals, frame, signals.force[there], poses.first),
+        None if lacking else _payload(parameters, signals, frame, signals.force[finite], poses.first),
         parameters,
         lacking,
         notes,
@@ -112,18 +119,19 @@ def weigh(record: Record, frame: ContactFrame, tolerance: float = 0.25) -> Weigh
     )
 
 
-def _fit(signals: BaseSignals, there: Mask, tolerance: float) -> weighing.PoseFit:
-    time = signals.time[there] - signals.time[there].mean()
-    turns, force = signals.rotations[there], signals.force[there]
+def _fit(signals: BaseSignals, finite: Mask, tolerance: float) -> weighing.PoseFit:
+    time = signals.time[finite] - signals.time[finite].mean()
+    turns = signals.rotations[finite]
+    force = signals.force[finite]
     poses = weighing.poses_of(time, turns, force, weighing.groups_of(turns))
     fitted = _fit_with_drift(poses, tolerance)
     parameters = {"mass": fitted.mass, "weight": fitted.weight, "bias": fitted.bias}
     if fitted.drift is not None:
         parameters["drift"] = fitted.drift
-    if np.isfinite(fitted.whole).all():
-        parameters |= _centre(signals, there, time, poses, fitted)
-    left = force - _model_force(time, turns, fitted)
-    means = np.add.reduceat(left, poses.first, axis=0) / poses.count[:, None]
+    if np.isfinite(fitted.solution).all():
+        parameters |= _centre(signals, finite, time, poses, fitted)
+    residual = force - _model_force(time, turns, fitted)
+    means = np.add.reduceat(residual, poses.first, axis=0) / poses.count[:, None]
     return weighing.PoseFit(poses, fitted, parameters, means)
 
 
@@ -136,16 +144,17 @@ def _at_rest(
     """Force and torque without the tool's inertia; unchanged if it is not determined."""
     from scipy.signal import savgol_filter
 
-    side, inertia = side_of(fitted.whole[:3]), parameters.get("inertia")
+    side = weight_sign(fitted.solution[:3])
+    inertia = parameters.get("inertia")
     dt = float(np.median(np.diff(signals.time)))
     if side is None or inertia is None or not abs(inertia.value) > inertia.half or not dt > 0.0:
         return signals
-    rows = max(round(_SMOOTH / dt) | 1, 5)
-    place = _centre_of(signals, parameters, frame)
-    if len(place) < rows or not np.isfinite(place).all():
+    rows = max(round(_SMOOTHING_WINDOW / dt) | 1, 5)
+    centre = _centre_of(signals, parameters, frame)
+    if len(centre) < rows or not np.isfinite(centre).all():
         return signals
-    acceleration = savgol_filter(place, rows, 3, deriv=2, delta=dt, axis=0)
-    added = side * float(inertia.value) * np.einsum("nji,nj->ni", signals.rotations, acceleration)
+    acceleration = savgol_filter(centre, rows, 3, deriv=2, delta=dt, axis=0)
+    added = side * float(inertia.value) * to_tool(signals.rotations, acceleration)
     torque = signals.torque
     if torque is not None and "centre" in parameters:
         torque = torque + np.cross(parameters["centre"].value, added)
@@ -153,17 +162,18 @@ def _at_rest(
 
 
 def _centre_of(signals: BaseSignals, parameters: dict[str, weighing.Estimated], frame: ContactFrame) -> Array:
-    """Where the centre of mass is, in the base [m], shape (n, 3); the sensor if it is not determined."""
+    """Place of the centre of mass in the base [m], shape (n, 3); that of the sensor if it is not determined."""
     at = np.array(frame.wrench_at) + (parameters["centre"].value if "centre" in parameters else 0.0)
-    place: Array = signals.place + signals.rotations @ at
-    return place
+    centre: Array = signals.position + signals.rotations @ at
+    return centre
 
 
 def _fit_with_drift(poses: weighing.Poses, tolerance: float) -> weighing.WeighingFit:
-    """With a drift if the poses determine it beside the weight, without one otherwise."""
-    if len(poses.count) < _FEWEST:
+    """Fit with a drift if the poses determine one beside the weight, without it otherwise."""
+    if len(poses.count) < _MIN_POSES_FOR_DRIFT:
         return weighing.fit_force(poses, drift=False)
-    with_drift, without = weighing.fit_force(poses, drift=True), weighing.fit_force(poses, drift=False)
+    with_drift = weighing.fit_force(poses, drift=True)
+    without = weighing.fit_force(poses, drift=False)
     return (
         with_drift if _determines(with_drift, tolerance) or not _determines(without, tolerance) else without
     )
@@ -175,9 +185,9 @@ def _determines(fitted: weighing.WeighingFit, tolerance: float) -> bool:
 
 
 def _model_force(time: Array, turns: Array, fitted: weighing.WeighingFit) -> Array:
-    whole = np.where(np.isfinite(fitted.whole), fitted.whole, 0.0)
-    force: Array = np.einsum("nji,j->ni", turns, whole[:3]) + whole[3:6]
-    return force + time[:, None] * whole[6:] if len(whole) > 6 else force
+    solution = np.where(np.isfinite(fitted.solution), fitted.solution, 0.0)
+    force: Array = to_tool(turns, solution[:3]) + solution[3:6]
+    return force + time[:, None] * solution[6:] if len(solution) > 6 else force
 
 
 def _lacking(poses: weighing.Poses, fitted: weighing.WeighingFit, tolerance: float) -> list[str]:
@@ -201,8 +211,8 @@ def _lacking(poses: weighing.Poses, fitted: weighing.WeighingFit, tolerance: flo
             f" turns it by {weak[0][0]:.2g} deg only; turn the tool by 30 deg and more about {_list_axes(across)} too"
         )
         return [text]
-    share = float(fitted.mass.half / fitted.mass.value) if np.isfinite(fitted.mass.half) else np.inf
-    wide = f"{share:.0%} of it" if np.isfinite(share) else "without bound"
+    fraction = float(fitted.mass.half / fitted.mass.value) if np.isfinite(fitted.mass.half) else np.inf
+    wide = f"{fraction:.0%} of it" if np.isfinite(fraction) else "without bound"
     text = (
         f"{listed}: leaving one out moves the mass by too much (95 %: {wide}); add orientations, six or more of a"
         " second each, and come back to the first at the end, which tells the drift"
@@ -211,25 +221,25 @@ def _lacking(poses: weighing.Poses, fitted: weighing.WeighingFit, tolerance: flo
 
 
 def _centre(
-    signals: BaseSignals, there: Mask, time: Array, poses: weighing.Poses, fitted: weighing.WeighingFit
+    signals: BaseSignals, finite: Mask, time: Array, poses: weighing.Poses, fitted: weighing.WeighingFit
 ) -> dict[str, weighing.Estimated]:
     """Centre of mass and bias of the torque, if there is one."""
     if (
         signals.torque is None
-        or not read_rows(signals.torque[there]).all()
-        or not np.ptp(signals.torque[there])
+        or not finite_rows(signals.torque[finite]).all()
+        or not np.ptp(signals.torque[finite])
     ):
         return {}
-    own = weighing.poses_of(time, signals.rotations[there], signals.torque[there], poses.first)
-    found = weighing.fit_centre(own, fitted.whole[:3], drift=fitted.drift is not None)
-    centre = found.jackknife(found.left_out[:, :3], found.whole[:3], "m")
+    torque_poses = weighing.poses_of(time, signals.rotations[finite], signals.torque[finite], poses.first)
+    torque_fit = weighing.fit_centre(torque_poses, fitted.solution[:3], drift=fitted.drift is not None)
+    centre = torque_fit.jackknife(torque_fit.left_out[:, :3], torque_fit.solution[:3], "m")
     if not np.isfinite(centre.half).all():
         return {}
     # The centre is c = torque over weight, so the weight's own share of error is the centre's too.
     scale = float(fitted.mass.std / fitted.mass.value)
     std = np.hypot(centre.std, scale * np.abs(centre.value))
     half = np.hypot(centre.half, float(fitted.mass.half / fitted.mass.value) * np.abs(centre.value))
-    bias = found.jackknife(found.left_out[:, 3:6], found.whole[3:6], "N m")
+    bias = torque_fit.jackknife(torque_fit.left_out[:, 3:6], torque_fit.solution[3:6], "N m")
     return {"centre": weighing.Estimated(centre.value, std, half, "m"), "torque_bias": bias}
 
 
@@ -239,17 +249,17 @@ def _inertia(
     """The mass by which the force follows the acceleration, if the tool is shaken."""
     from scipy.special import stdtrit
 
-    side = side_of(fit.fitted.whole[:3])
+    side = weight_sign(fit.fitted.solution[:3])
     if side is None:
         return {}
-    time = signals.time - signals.time[read_rows(signals.force)].mean()
-    left = signals.force - _model_force(time, signals.rotations, fit.fitted)
-    exerted = side * np.einsum("nij,nj->ni", signals.rotations, left)
-    place = _centre_of(signals, fit.parameters, frame)
-    found = free_inertia(signals.time, exerted, place, np.ones(len(time), bool))
-    if found is None:
+    time = signals.time - signals.time[finite_rows(signals.force)].mean()
+    unexplained = signals.force - _model_force(time, signals.rotations, fit.fitted)
+    exerted = side * to_base(signals.rotations, unexplained)
+    centre = _centre_of(signals, fit.parameters, frame)
+    inertia = free_inertia(signals.time, exerted, centre, np.ones(len(time), bool))
+    if inertia is None:
         return {}
-    value, std = found
+    value, std = inertia
     return {
         "inertia": weighing.Estimated(
             np.array(value), np.array(std), np.array(float(stdtrit(BLOCKS - 1, 0.975)) * std), "kg"
@@ -257,13 +267,13 @@ def _inertia(
     }
 
 
-def side_of(weight: Array) -> float | None:
+def weight_sign(weight: Array) -> float | None:
     """1 where a sensor shows what the tool exerts on it, so that its weight points down; -1 for the opposite.
 
     None where the weight lies across the base's z: the base may hang on a wall.
     """
     size = float(np.linalg.norm(weight))
-    if not (0.0 < size < np.inf) or abs(weight[2]) < _UPRIGHT * size:
+    if not (0.0 < size < np.inf) or abs(weight[2]) < _MIN_VERTICAL_COSINE * size:
         return None
     return 1.0 if weight[2] < 0 else -1.0
 
@@ -288,7 +298,7 @@ def _payload(
         weight_std=worst("weight"),
         bias=_three(parameters["bias"].value),
         bias_std=worst("bias"),
-        noise=noise_of(force, first),
+        noise=force_noise(force, first),
         wrench_frame=signals.wrench_frame,
         sensor_rpy=frame.sensor_rpy,
         drift=vector("drift"),

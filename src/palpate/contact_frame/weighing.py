@@ -16,11 +16,12 @@ from functools import cached_property
 import numpy as np
 
 from palpate.arrays import Array, Indices
+from palpate.signals.rotations import to_base, to_tool
 from palpate.units import GRAVITY
 
-APART = np.radians(30.0)
+GROUP_ANGLE = np.radians(30.0)
 """Orientations nearer than this are one group: what errs alike in them is not counted as many readings [rad]."""
-_SINGULAR = 1e-9
+_MIN_SCALED_EIGENVALUE = 1e-9
 """Least eigenvalue of scaled equations: the square of 3e-5 rad, and no pose is read finer."""
 
 
@@ -67,20 +68,20 @@ class Poses:
 
     @cached_property
     def effective(self) -> float:
-        """How many stretches of equal length are worth as much."""
+        """Number of stretches of equal length that would be worth as much."""
         return float(self.count.sum() ** 2 / (self.count**2).sum())
 
 
-def groups_of(rotations: Array, apart: float = APART) -> Indices:
+def groups_of(rotations: Array, apart: float = GROUP_ANGLE) -> Indices:
     """Rows at which another orientation begins, by so much [rad], of rotations of shape (n, 3, 3)."""
     begins, at = [0], 0
     limit = 1.0 + 2.0 * np.cos(apart)
     step = 4096
     while at < len(rotations):
         chunk = rotations[at : at + step]
-        away = np.flatnonzero(np.einsum("ij,nij->n", rotations[begins[-1]], chunk) < limit)
-        if len(away):
-            at += int(away[0])
+        turned_rows = np.flatnonzero(np.einsum("ij,nij->n", rotations[begins[-1]], chunk) < limit)
+        if len(turned_rows):
+            at += int(turned_rows[0])
             begins.append(at)
         else:
             at += len(chunk)
@@ -99,7 +100,7 @@ def poses_of(time: Array, rotations: Array, signal: Array, first: Indices) -> Po
     return Poses(
         first, count, mean(rotations), mean(rotations * time[:, None, None]),
         mean(np.column_stack([time, time**2])), mean(signal), mean(signal * time[:, None]),
-        mean(np.einsum("nij,nj->ni", rotations, signal)),
+        mean(to_base(rotations, signal)),
     )  # fmt: skip
 
 
@@ -108,7 +109,7 @@ class WeighingFit:
     """Weight, bias and drift, from all rows and with each stretch left out.
 
     Args:
-        whole: shape (9,): w, b, d; (6,) without the drift.
+        solution: w, b, d of all rows, shape (9,); (6,) without the drift.
         left_out: the same without each stretch, shape (g, 9).
         information: of the weight once all else is known, over the rows: about the square of the angle by which the
             tool turns each of three axes, shape (3,).
@@ -116,7 +117,7 @@ class WeighingFit:
         dof: degrees of freedom of Student's t.
     """
 
-    whole: Array
+    solution: Array
     left_out: Array
     information: Array
     axes: Array
@@ -128,7 +129,8 @@ class WeighingFit:
 
         g = len(replicas)
         if np.isfinite(replicas).all() and g > 1:
-            std = np.sqrt((g - 1) / g * np.sum((replicas - replicas.mean(axis=0)) ** 2, axis=0))
+            squares = np.sum((replicas - replicas.mean(axis=0)) ** 2, axis=0)
+            std = np.sqrt((g - 1) / g * squares)
         else:
             std = np.full(replicas.shape[1:], np.inf)
         half = np.full(np.shape(std), np.inf) if self.dof <= 0 else std * float(stdtrit(self.dof, 0.975))
@@ -137,23 +139,25 @@ class WeighingFit:
     @property
     def weight(self) -> Estimated:
         """The weight w of the tool [N]."""
-        return self.jackknife(self.left_out[:, :3], self.whole[:3], "N")
+        return self.jackknife(self.left_out[:, :3], self.solution[:3], "N")
 
     @property
     def bias(self) -> Estimated:
         """b in the middle of the log [N]."""
-        return self.jackknife(self.left_out[:, 3:6], self.whole[3:6], "N")
+        return self.jackknife(self.left_out[:, 3:6], self.solution[3:6], "N")
 
     @property
     def drift(self) -> Estimated | None:
         """The drift d of the bias [N/s]."""
-        return self.jackknife(self.left_out[:, 6:], self.whole[6:], "N/s") if len(self.whole) > 6 else None
+        return (
+            self.jackknife(self.left_out[:, 6:], self.solution[6:], "N/s") if len(self.solution) > 6 else None
+        )
 
     @property
     def mass(self) -> Estimated:
         """The mass |w|/g of the tool [kg]."""
         sizes = np.linalg.norm(self.left_out[:, :3], axis=1) / GRAVITY
-        return self.jackknife(sizes, np.asarray(np.linalg.norm(self.whole[:3]) / GRAVITY), "kg")
+        return self.jackknife(sizes, np.asarray(np.linalg.norm(self.solution[:3]) / GRAVITY), "kg")
 
 
 @dataclass(frozen=True)
@@ -184,61 +188,76 @@ def fit_force(poses: Poses, drift: bool) -> WeighingFit:
     """Weight, bias and drift of a force, with each orientation left out once."""
     A, r = _normal_equations(poses)
     n = 9 if drift else 6
-    A, r = A[:, :n, :n], r[:, :n]
-    whole, total = A.sum(axis=0), r.sum(axis=0)
-    left_out = np.array([_solve(whole - a, total - b) for a, b in zip(A, r, strict=True)])
-    rest = whole[3:, 3:]
-    schur = whole[:3, :3] - whole[:3, 3:] @ np.linalg.pinv(rest, hermitian=True) @ whole[3:, :3]
+    A = A[:, :n, :n]
+    r = r[:, :n]
+    normal_matrix = A.sum(axis=0)
+    coupling = normal_matrix[:3, 3:]
+    nuisance_inverse = np.linalg.pinv(normal_matrix[3:, 3:], hermitian=True)
+    schur = normal_matrix[:3, :3] - coupling @ nuisance_inverse @ normal_matrix[3:, :3]
     information, axes = np.linalg.eigh(schur / poses.count.sum())
     dof = poses.effective - 1.0
-    return WeighingFit(_solve(whole, total), left_out, np.maximum(information, 0.0), axes, dof)
+    solution = _solve(normal_matrix, r.sum(axis=0))
+    return WeighingFit(solution, _solve_without_each(A, r), np.maximum(information, 0.0), axes, dof)
 
 
 def fit_centre(poses: Poses, weight: Array, drift: bool) -> WeighingFit:
-    """Centre of mass, bias and drift of a torque, with the weight known; `whole` begins with the centre [m]."""
-    shown = np.einsum("gji,j->gi", poses.turns, weight)
-    shown_t = np.einsum("gji,j->gi", poses.turns_t, weight)
+    """Centre of mass, bias and drift of a torque, with the weight known; the solution begins with the centre [m]."""
+    weight_in_tool = to_tool(poses.turns, weight)
+    weight_in_tool_t = to_tool(poses.turns_t, weight)
     count, (t, tt) = poses.count, poses.times.T
     n = 9 if drift else 6
-    A, r = np.zeros((len(count), 9, 9)), np.zeros((len(count), 9))
-    arm, arm_t = -_crosses(shown), -_crosses(shown_t)  # c x f = -[f]x c
+    A = np.zeros((len(count), 9, 9))
+    r = np.zeros((len(count), 9))
+    arm, arm_t = -_crosses(weight_in_tool), -_crosses(weight_in_tool_t)  # c x f = -[f]x c
     eye = np.eye(3)
     A[:, :3, :3] = np.einsum("gji,gjk->gik", arm, arm)
-    A[:, :3, 3:6], A[:, :3, 6:] = arm.transpose(0, 2, 1), arm_t.transpose(0, 2, 1)
-    A[:, 3:6, :3], A[:, 6:, :3] = arm, arm_t
+    A[:, 3:6, :3] = arm
+    A[:, 6:, :3] = arm_t
     _fill_bias(A, eye, t, tt)
     r[:, :3] = np.einsum("gji,gj->gi", arm, poses.signal)
-    r[:, 3:6], r[:, 6:] = poses.signal, poses.signal_t
-    A, r = (A * count[:, None, None])[:, :n, :n], (r * count[:, None])[:, :n]
-    whole, total = A.sum(axis=0), r.sum(axis=0)
-    left_out = np.array([_solve(whole - a, total - b) for a, b in zip(A, r, strict=True)])
-    return WeighingFit(_solve(whole, total), left_out, np.ones(3), eye, poses.effective - 1.0)
+    r[:, 3:6] = poses.signal
+    r[:, 6:] = poses.signal_t
+    A = (A * count[:, None, None])[:, :n, :n]
+    r = (r * count[:, None])[:, :n]
+    solution = _solve(A.sum(axis=0), r.sum(axis=0))
+    return WeighingFit(solution, _solve_without_each(A, r), np.ones(3), eye, poses.effective - 1.0)
 
 
 def _normal_equations(poses: Poses) -> tuple[Array, Array]:
-    """Of each stretch, shape (g, 9, 9) and (g, 9)."""
+    """Normal equations of each stretch, shape (g, 9, 9) and (g, 9)."""
     count, (t, tt) = poses.count, poses.times.T
-    A, r = np.zeros((len(count), 9, 9)), np.zeros((len(count), 9))
+    A = np.zeros((len(count), 9, 9))
+    r = np.zeros((len(count), 9))
     eye = np.eye(3)
     A[:, :3, :3] = eye  # R R^T, summed
-    A[:, :3, 3:6], A[:, :3, 6:] = poses.turns, poses.turns_t
-    A[:, 3:6, :3], A[:, 6:, :3] = poses.turns.transpose(0, 2, 1), poses.turns_t.transpose(0, 2, 1)
+    A[:, 3:6, :3] = poses.turns.transpose(0, 2, 1)
+    A[:, 6:, :3] = poses.turns_t.transpose(0, 2, 1)
     _fill_bias(A, eye, t, tt)
-    r[:, :3], r[:, 3:6], r[:, 6:] = poses.in_base, poses.signal, poses.signal_t
+    r[:, :3] = poses.in_base
+    r[:, 3:6] = poses.signal
+    r[:, 6:] = poses.signal_t
     return A * count[:, None, None], r * count[:, None]
 
 
 def _fill_bias(A: Array, eye: Array, t: Array, tt: Array) -> None:
+    """Complete normal equations that have the columns of weight or centre alone."""
+    A[:, :3, 3:] = A[:, 3:, :3].transpose(0, 2, 1)
     A[:, 3:6, 3:6] = eye
     A[:, 3:6, 6:] = A[:, 6:, 3:6] = t[:, None, None] * eye
     A[:, 6:, 6:] = tt[:, None, None] * eye
+
+
+def _solve_without_each(A: Array, r: Array) -> Array:
+    """Solutions with each stretch left out, shape (g, n)."""
+    total, right = A.sum(axis=0), r.sum(axis=0)
+    return np.array([_solve(total - a, right - b) for a, b in zip(A, r, strict=True)])
 
 
 def _solve(A: Array, r: Array) -> Array:
     """The solution; not finite where there is none."""
     scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
     scaled = A / np.outer(scale, scale)
-    if np.linalg.eigvalsh(scaled)[0] < _SINGULAR:
+    if np.linalg.eigvalsh(scaled)[0] < _MIN_SCALED_EIGENVALUE:
         return np.full(len(r), np.nan)
     solution: Array = np.linalg.solve(scaled, r / scale) / scale
     return solution
@@ -248,4 +267,5 @@ def _crosses(vectors: Array) -> Array:
     """The matrices [v]x with [v]x u = v x u, shape (g, 3, 3)."""
     x, y, z = vectors.T
     o = np.zeros_like(x)
-    return np.stack([np.stack(row, axis=1) for row in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=1)
+    rows = [(o, -z, y), (z, o, -x), (-y, x, o)]
+    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)

@@ -5,6 +5,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt, KelvinVoigtSurface
 from palpate.environments.standard_linear_solid import StandardLinearSolid, StandardLinearSolidSurface
 from palpate.environments.stick_slip import StickSlip, StickSlipState
 from palpate.environments.surface import (
+    UNTOUCHED,
     Surface,
     SurfaceState,
     SurfaceTable,
@@ -17,6 +18,7 @@ from palpate.environments.surface import (
 )
 
 __all__ = [
+    "UNTOUCHED",
     "HuntCrossley",
     "HuntCrossleySurface",
     "KelvinVoigt",

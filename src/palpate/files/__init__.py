@@ -20,6 +20,7 @@ __all__ = [
     "SIGNATURE",
     "WRITTEN",
     "as_json",
+    "as_toml",
     "check_kept_folder",
     "check_place",
     "fresh_folder",
@@ -38,16 +39,16 @@ __all__ = [
 ]
 
 HIDDEN = ".palpate-part"
-"""Ends the name of what is being written."""
+"""Ending of the names of incomplete files and folders."""
 
 
 def draft_path(path: Path, ending: str = HIDDEN) -> Path:
-    """Where a file or a folder stands until it is whole."""
+    """Path of a file or a folder while it is incomplete."""
     return path.with_name(f".{path.name}{ending}")
 
 
 def locked(handle: int) -> bool:
-    """Whether the open file or folder could be locked; where there are no such locks, it counts as locked."""
+    """Lock an open file or folder: False if another process has it, True where locks are not supported."""
     try:
         import fcntl
     except ImportError:  # two processes at one place are then their user's care
@@ -72,12 +73,12 @@ def locking(path: Path, flags: int = os.O_RDONLY) -> Iterator[int | None]:
 
 
 def _stands(handle: int, path: Path) -> bool:
-    """Whether the opened file is still the one at its path, and was not replaced in the meantime."""
+    """True if the opened file is still at its path, and was not replaced in the meantime."""
     try:
-        there = os.lstat(path)
+        current = os.lstat(path)
     except FileNotFoundError:
         return False
-    return os.path.samestat(os.fstat(handle), there)
+    return os.path.samestat(os.fstat(handle), current)
 
 
 @contextmanager
@@ -138,6 +139,27 @@ def _encodable(value: Any) -> Any:
     if isinstance(value, dict):
         return {_encodable(key): _encodable(inner) for key, inner in value.items()}
     return [_encodable(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+def as_toml(table: Mapping[str, Any], name: str = "") -> str:
+    """A table as TOML; keys whose value is None are left out, and tables within it come last.
+
+    Args:
+        table: of texts, numbers, truth values, lists of them, and tables.
+        name: of the table, with those that it is in.
+    """
+    plain = {key: value for key, value in table.items() if not isinstance(value, dict) and value is not None}
+    lines = [f"[{name}]"] if name and plain else []
+    lines += [f"{key} = {_toml_value(value)}" for key, value in plain.items()]
+    text = "\n".join(lines) + "\n\n" if lines else ""
+    tables = {key: value for key, value in table.items() if isinstance(value, dict)}
+    return text + "".join(as_toml(inner, f"{name}.{key}".lstrip(".")) for key, inner in tables.items())
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    return as_json(value).decode() if isinstance(value, str | bool) else repr(value)
 
 
 def with_author(value: Mapping[str, Any]) -> dict[str, Any]:
@@ -208,9 +230,9 @@ def kept_folder(path: Path, begun: str, *, replace: bool) -> Iterator[None]:
     with locking(path) as handle:
         if handle is None:
             raise _busy(path)
-        for left in path.rglob(f".*{HIDDEN}"):
-            if left.is_file() and not left.is_symlink():
-                left.unlink()
+        for draft in path.rglob(f".*{HIDDEN}"):
+            if draft.is_file() and not draft.is_symlink():
+                draft.unlink()
         check_kept_folder(path, begun, replace=replace)
         if replace:
             (path / begun).unlink(missing_ok=True)  # first: what is left after a kill is then no results
@@ -229,7 +251,7 @@ def check_kept_folder(path: Path, begun: str, *, replace: bool) -> None:
         return
     if replace:
         check_all_ours(path)
-    elif not (path / begun).exists() and any(not own.name.endswith(HIDDEN) for own in path.iterdir()):
+    elif not (path / begun).exists() and any(not entry.name.endswith(HIDDEN) for entry in path.iterdir()):
         raise InputError(
             f"{path} holds other files; choose another --out, or add --replace to replace results"
         )
@@ -241,11 +263,11 @@ def check_all_ours(folder: Path) -> None:
     Raises:
         InputError: there is, and which.
     """
-    for place, folders, files in os.walk(folder):
-        inner = [Path(place, name) for name in folders]
-        for found in (*(p for p in inner if p.is_symlink()), *(Path(place, name) for name in files)):
-            if found.is_symlink() or not (found.name.endswith(HIDDEN) or ours(found)):
-                name = found.relative_to(folder)
+    for parent, folders, files in os.walk(folder):
+        inner = [Path(parent, name) for name in folders]
+        for entry in (*(p for p in inner if p.is_symlink()), *(Path(parent, name) for name in files)):
+            if entry.is_symlink() or not (entry.name.endswith(HIDDEN) or ours(entry)):
+                name = entry.relative_to(folder)
                 raise InputError(
                     f"{folder} holds {name}, which palpate did not write; move it, or choose another --out"
                 )
@@ -309,15 +331,13 @@ WRITTEN = "written_by"
 """The first key of a JSON object."""
 MADE = f"# Made by {SIGNATURE}"
 """Begins a line of a TOML file or of any other that has such comments."""
-SQLITE_ID = int.from_bytes(b"palp", "big")
-"""The application id of an SQLite file."""
 FORCE = ("time_s", "force_desired_N")
 """The columns of a desired force in a CSV file, which takes no comment."""
 
 _KINDS = {".json": "JSON file", ".png": "PNG", ".html": "HTML file", ".toml": "TOML file", ".csv": "CSV file",
           ".ply": "PLY file", ".mcap": "MCAP file", ".yaml": "YAML file"}  # fmt: skip
 _HEAD, _FOOT, _TAIL = 4096, 1 << 20, 8
-"""Bytes that are looked at; the last ones of a Parquet file say how long what stands before them is."""
+"""Bytes read at the start and at the end of a file, and those at the end that state the length of a Parquet footer."""
 _FEET = {
     b"PAR1": b"\x18\x07palpate\x18",  # a key and its value, as Thrift writes them
     b"%PDF-": b"/Creator (palpate)",
@@ -335,7 +355,6 @@ _MARKS = re.compile(
             rb"\A%s\r?\n" % ",".join(FORCE).encode(),
             rb"\ASQLite format 3\x00(?s:.{52})palp",  # where the application id stands
             rb'\A[0-9a-f]{8} \{"title":.*"palpate":',  # the head of a journal of runs
-            rb'\A\{"op_code":[^\n]*:"palpate ',  # a search, by Optuna
             rb'\A\[\s*(?:\]|\{\s*"id":[^}]*"claim":[^}]*"verdict":)',  # claims, whose form is fixed
         )
     ),
@@ -344,7 +363,7 @@ _MARKS = re.compile(
 
 
 def ours(path: Path) -> bool:
-    """Whether it is a file that palpate wrote; a link is not, wherever it leads."""
+    """True if palpate wrote the file; False for a link, wherever it leads."""
     if not stat.S_ISREG(os.lstat(path).st_mode):
         return False
     with path.open("rb") as file:

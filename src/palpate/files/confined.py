@@ -88,9 +88,9 @@ def _confine(size: int) -> None:
     except ImportError:  # not on Windows
         return
     _, allowed = resource.getrlimit(resource.RLIMIT_AS)
-    most = OWN + COPIES * size
-    most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    limit = OWN + COPIES * size
+    limit = limit if allowed == resource.RLIM_INFINITY else min(limit, allowed)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 

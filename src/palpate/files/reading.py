@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, BinaryIO, TypeVar
 
-from palpate.errors import InputError
+from palpate.errors import InputError, how_to_install
 
 T = TypeVar("T")
 LARGEST, DEEPEST = 1_000_000, 20
@@ -18,7 +18,8 @@ LARGEST, DEEPEST = 1_000_000, 20
 _WHOLE = 2**63
 """Whole numbers of TOML are of 64 bits, by its specification."""
 _DOTS = 200
-"""In one key, as in a.b.c: the library's time grows with their square, and a file of such keys takes 4 s."""
+"""Maximum dots in one key such as a.b.c: the parser's time grows with their square, to 4 s for a file of such
+keys."""
 
 
 def open_file(path: Path, what: str = "a file") -> BinaryIO:
@@ -46,7 +47,7 @@ def open_file(path: Path, what: str = "a file") -> BinaryIO:
 
 
 def read_bytes(path: Path, most: int, what: str) -> bytes:
-    """A file of at most so many bytes.
+    """Read a file of limited size.
 
     Args:
         path: of the file.
@@ -65,7 +66,7 @@ def read_bytes(path: Path, most: int, what: str) -> bytes:
 
 
 def read_text(path: Path, what: str, most: int = LARGEST) -> str:
-    """The text of such a file.
+    """Read a UTF-8 text file of limited size.
 
     Raises:
         InputError: it is larger, no regular file, or not UTF-8.
@@ -103,8 +104,8 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     return tables
 
 
-def read_yaml(path: Path, what: str = "a file") -> tuple[dict[str, Any], Any]:
-    """The names of a YAML file, and the parser that writes it again as it was, comments included.
+def read_yaml(path: Path, what: str = "a file") -> dict[str, Any]:
+    """The names of a YAML file.
 
     Args:
         path: of the file.
@@ -117,16 +118,14 @@ def read_yaml(path: Path, what: str = "a file") -> tuple[dict[str, Any], Any]:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import YAMLError
     except ImportError:
-        raise InputError(f"{what} in YAML needs ruamel.yaml: pip install palpate[bags]") from None
-    parser = YAML()
-    parser.width, parser.preserve_quotes = 4096, True
+        raise InputError(f"{what} in YAML needs ruamel.yaml: {how_to_install('palpate[yaml]')}") from None
     try:
-        file = parser.load(read_text(path, what))
+        file = YAML(typ="safe", pure=True).load(read_text(path, what))
     except (YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
     if not isinstance(file, dict):
         raise InputError(f"{path} is no {what.removeprefix('a ')}: it has no names at its top")
-    return file, parser
+    return file
 
 
 def read_table(
@@ -168,14 +167,14 @@ def _known_fields(error: str, kind: Any) -> str:
     tables: list[Any] = [type_info(kind)] if "unknown field" in what else []
     for step in re.findall(r"[^.\[\]`]+", path):
         inside = [field.type for table in tables for field in table.fields if field.encode_name == step]
-        tables = [table for each in inside for table in _tables_in(each)]
-    each = {table.tag: ", ".join(sorted(field.encode_name for field in table.fields)) for table in tables}
-    told = (
-        [*each.values()]
+        tables = [table for fields in inside for table in _tables_in(fields)]
+    fields = {table.tag: ", ".join(sorted(field.encode_name for field in table.fields)) for table in tables}
+    listed = (
+        [*fields.values()]
         if len(tables) == 1
-        else [f"{names} ({kind})" for kind, names in each.items() if kind]
+        else [f"{names} ({kind})" for kind, names in fields.items() if kind]
     )
-    return f"; there are: {'; '.join(told)}" if told else ""
+    return f"; there are: {'; '.join(listed)}" if listed else ""
 
 
 def _tables_in(kind: Any) -> list[Any]:
@@ -183,8 +182,8 @@ def _tables_in(kind: Any) -> list[Any]:
     if hasattr(kind, "fields"):
         return [kind]
     several = [*getattr(kind, "types", ()), *getattr(kind, "item_types", ())]
-    one = [getattr(kind, name) for name in ("item_type", "value_type") if hasattr(kind, name)]
-    return [table for each in several + one for table in _tables_in(each)]
+    inner = [getattr(kind, name) for name in ("item_type", "value_type") if hasattr(kind, name)]
+    return [table for item in several + inner for table in _tables_in(item)]
 
 
 def _check_finite(value: object, path: str) -> None:
@@ -197,17 +196,17 @@ def _check_finite(value: object, path: str) -> None:
 def _check(value: Any, where: str, depth: int) -> None:
     if isinstance(value, int) and not -_WHOLE <= value < _WHOLE:
         raise InputError(f"{where}: a whole number of {len(hex(value)) * 4} bits; TOML has those of 64")
-    inner = [own for _, own in _inner(value)]
+    inner = [item for _, item in _inner(value)]
     if depth == 0:
         raise _too_deep(where)
-    for own in inner:
-        _check(own, where, depth - 1)
+    for item in inner:
+        _check(item, where, depth - 1)
 
 
 def _inner(value: object) -> Iterable[tuple[str, Any]]:
     if isinstance(value, dict):
         return value.items()
-    return (("", own) for own in value) if isinstance(value, list) else ()
+    return (("", item) for item in value) if isinstance(value, list) else ()
 
 
 def _too_deep(where: str) -> InputError:
@@ -243,6 +242,28 @@ def check_address_space() -> None:
         raise InputError(
             f"this process may address {address_space() / GB:.2g} GB of memory, and its libraries need {OWN / GB:g} GB;"
             " raise the limit with: ulimit -v unlimited"
+        )
+
+
+MIN_OPEN_FILES = 64
+"""Files that a process may have open at least: of a figure, matplotlib keeps open some 15 fonts and libraries."""
+
+
+def check_open_files() -> None:
+    """Refuse to begin where a library would fail, or abort the process, for want of open files.
+
+    Raises:
+        InputError: this process may open fewer files than the libraries need.
+    """
+    try:
+        import resource
+    except ImportError:  # there are no such limits
+        return
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if 0 <= limit < MIN_OPEN_FILES:
+        raise InputError(
+            f"this process may have {limit} files open, and its libraries need {MIN_OPEN_FILES};"
+            " raise the limit with: ulimit -n 1024"
         )
 
 

@@ -49,18 +49,19 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
     damping: Positive
     """z."""
     delay: NotNegative
-    """Between sending a command and the arm's loop having it [s]."""
+    """Time between sending a command and the arm's loop having it [s]."""
     stiffness: Positive
-    """Of the arm itself, between what its encoders see and the surface [N/m]."""
+    """Stiffness of the arm itself, between its encoders and the surface [N/m]."""
     mass: Positive | None = None
-    """Of the tip along the normal, which swings on that stiffness [kg]; of a tip without mass when left out."""
+    """Mass of the tip along the normal, which swings on that stiffness [kg]; none if left out."""
     bandwidth_interval: Interval | None = None
     damping_interval: Interval | None = None
     delay_interval: Interval | None = None
 
     def __post_init__(self) -> None:
         for name in ("bandwidth", "damping", "delay"):
-            value, ends = getattr(self, name), getattr(self, f"{name}_interval")
+            value = getattr(self, name)
+            ends = getattr(self, f"{name}_interval")
             if ends is not None and not ends[0] <= value <= ends[1]:
                 raise InputError(
                     f"{name}_interval must be an interval around {name} = {value:g}, got {ends[0]:g} to {ends[1]:g}"
@@ -71,8 +72,8 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
     @property
     def squared(self) -> tuple[float, float]:
         """w^2 [1/s^2] and 2 z w [1/s], in which the equation of motion is linear."""
-        own = 2.0 * math.pi * self.bandwidth
-        return own**2, 2.0 * self.damping * own
+        w = 2.0 * math.pi * self.bandwidth
+        return w**2, 2.0 * self.damping * w
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -90,30 +91,25 @@ class PositionLoop(Table, tag="position", tag_field="kind", omit_defaults=True):
         return 0.0 if self.mass is None else 2.0 * math.pi * math.sqrt(self.mass / self.stiffness)
 
 
-class TorqueLoop(Table, tag="torque", tag_field="kind"):
+class SpringLoop(Table):
+    """A tip with a mass that a spring and a damper pull to the commanded position."""
+
+    mass: Positive
+    """Mass of the tip along the normal [kg]."""
+    stiffness: Positive
+    """K_p or K_s [N/m]."""
+    damping: Positive
+    """D [N s/m]."""
+    delay: NotNegative
+    """Time from reading the encoders to the torque, or from sending a command to the servo having it [s]."""
+
+
+class TorqueLoop(SpringLoop, tag="torque", tag_field="kind"):
     """A tip under K_p (x_c - x) - D xdot, which makes it a position with a spring in series."""
 
-    mass: Positive
-    """Of the tip [kg]."""
-    stiffness: Positive
-    """K_p [N/m]."""
-    damping: Positive
-    """D [N s/m]."""
-    delay: NotNegative
-    """From reading the encoders to the torque [s]."""
 
-
-class ServoLoop(Table, tag="servo", tag_field="kind"):
+class ServoLoop(SpringLoop, tag="servo", tag_field="kind"):
     """A tip that a servo pulls with K_s (x_c - x) - D xdot, between ticks too; its encoders show how it yields."""
-
-    mass: Positive
-    """Of the tip along the normal [kg]."""
-    stiffness: Positive
-    """K_s [N/m]."""
-    damping: Positive
-    """D [N s/m]."""
-    delay: NotNegative
-    """Between sending a command and the servo having it [s]."""
 
     @property
     def lag(self) -> float:
@@ -138,7 +134,7 @@ class Sensor(Table, omit_defaults=True):
     low_pass: str = "none"  # noqa: S105 - a filter
     """Before the sampling, as butterworth3:120."""
     accuracy: Positive | None = None
-    """Of a reading, as the maker states it [N]; a tare takes its constant part off."""
+    """Accuracy of a reading, as the maker states it [N]; a tare takes its constant part off."""
     resolution: Positive | None = None
     """Step in which it reads [N]; left out if it is finer than the noise."""
     drift: Positive | None = None
@@ -149,7 +145,7 @@ class Limits(Table):
     """Limits of the arm."""
 
     speed: Positive
-    """Of the tip along the normal [m/s]."""
+    """Largest speed of the tip along the normal [m/s]."""
     stiffness: Positive = 1e6
     """The stiffest surface that there may be, K + B/theta [N/m]."""
 

@@ -1,4 +1,4 @@
-"""Where a matrix that is affine in one number leaves stability: every crossing of the unit circle, without a grid."""
+"""Stability limits of a matrix that is affine in one number: every crossing of the unit circle, without a grid."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def crossings(start: Array, b: Array, c: Array) -> list[float]:
     from scipy.linalg import eigvals
 
     n = len(b)
-    E, F = np.zeros((2 * n + 1, 2 * n + 1)), np.zeros((2 * n + 1, 2 * n + 1))
+    E = np.zeros((2 * n + 1, 2 * n + 1))
+    F = np.zeros((2 * n + 1, 2 * n + 1))
     E[:n, :n], E[n : 2 * n, n : 2 * n], E[n : 2 * n, 2 * n] = np.eye(n), start, b
     F[:n, :n], F[:n, 2 * n], F[n : 2 * n, n : 2 * n] = start, b, np.eye(n)
     F[2 * n, :n], F[2 * n, n : 2 * n] = c, -c
@@ -36,8 +37,8 @@ def crossings(start: Array, b: Array, c: Array) -> list[float]:
     finite = np.abs(pairs[1]) > _SINGULAR * np.abs(pairs[0])
     z = pairs[0][finite] / pairs[1][finite]
     near = z[np.abs(np.log(np.abs(z) + 1e-300)) < _NEAR]
-    found = {_refine(float(np.angle(v)), start, b, c) for v in near if v.imag >= -_SINGULAR}
-    return sorted(s for s in found if s is not None)
+    gains = {_refine(float(np.angle(v)), start, b, c) for v in near if v.imag >= -_SINGULAR}
+    return sorted(s for s in gains if s is not None)
 
 
 def _refine(angle: float, start: Array, b: Array, c: Array) -> float | None:
@@ -94,14 +95,14 @@ def stable_between(start: Array, end: Array, high: float = np.inf) -> list[tuple
     b, c = rank_one(end - start)
     inside = [s for s in crossings(start, b, c) if s < high]
     edges = [0.0, *inside, high]
-    found: list[tuple[float, float]] = []
+    intervals: list[tuple[float, float]] = []
     for low, top in pairwise(edges):
         middle = (
             (low * top) ** 0.5 if low > 0.0 and top < np.inf else 0.5 * top if top < np.inf else 2 * low + 1.0
         )
         if radius(start + middle * (end - start)) < 1.0:
-            if found and found[-1][1] == low:
-                found[-1] = (found[-1][0], top)
+            if intervals and intervals[-1][1] == low:
+                intervals[-1] = (intervals[-1][0], top)
             else:
-                found.append((low, top))
-    return found
+                intervals.append((low, top))
+    return intervals

@@ -10,7 +10,7 @@ is bounded by its second derivatives.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
 
@@ -68,7 +68,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Prover:
-    """The loops that have to contract in every cell.
+    """Loops that have to contract in every cell.
 
     Args:
         loop: the sampled loop, of the oldest reading.
@@ -93,12 +93,10 @@ class Prover:
     fading: Literal["", "gain", "surface"] = ""
     parts: int = 1
     wider: float = 1.0
-    _known: dict[tuple[float, ...], list[Array]] = field(default_factory=dict, compare=False)
-    _loops: dict[int, list[SampledLoop]] = field(default_factory=dict, compare=False)
 
     @property
     def exact(self) -> bool:
-        """Whether the matrix is affine in all that may vary, so that corners tell everything."""
+        """True if the matrix is affine in all that may vary, so that its corners decide."""
         inner = self.loop.arm.inner
         return isinstance(inner, PositionLoop) and len(inner.corners) == 1
 
@@ -123,9 +121,11 @@ class Prover:
             ends = [self.at(bound) for bound in (box.low / high, box.high / low)]
             return [(replace(a, gain=b.gain), loss) for a, b, loss in product(ends, ends, losses)]
         if self.relative:
-            low, high = low * self._gain(box.high), high * self._gain(box.low)
+            low = low * self._gain(box.high)
+            high = high * self._gain(box.low)
         if self.fading == "gain":
-            low, high = low / (1.0 + box.most / self.theta), high / (1.0 + box.least / self.theta)
+            low = low / (1.0 + box.most / self.theta)
+            high = high / (1.0 + box.least / self.theta)
         lead = law_for(self.loop.arm, 0.0, self.bound)
         return [(replace(lead, gain=g), loss) for g, loss in product(dict.fromkeys((low, high)), losses)]
 
@@ -141,21 +141,12 @@ class Prover:
         return (series + 1.0 / bound) / self.theta
 
     def matrices(self, box: Box) -> list[Array]:
-        """Of all corners, shape (size, size) each."""
-        laws = self.laws(box)
-        if self.relative:
-            return [
-                loop.phi(K, B, law, loss)
-                for loop in self.loops(box.part)
-                for K, B in self.corners(box)
-                for law, loss in laws
-            ]
-        loops = self.loops(box.part)
+        """Matrices of a tick at all corners, shape (size, size) each."""
         return [
-            Phi
-            for i, loop in enumerate(loops)
+            loop.phi(K, B, law, loss)
+            for loop in self.loops(box.part)
             for K, B in self.corners(box)
-            for Phi in self._of((box.part, i, box.loss, K, B), loop, laws)
+            for law, loss in self.laws(box)
         ]
 
     def equilibrium(self, box: Box) -> Array:
@@ -164,18 +155,9 @@ class Prover:
             return self.loop.phi(0.0, 0.0, Law(self.gains[0]), box.loss)
         return self.loop.phi(box.high, 0.0, Law(0.0))
 
-    def _of(self, key: tuple[float, ...], loop: SampledLoop, laws: list[tuple[Law, int]]) -> list[Array]:
-        """Of one corner, which neighbouring cells share."""
-        if key not in self._known:
-            self._known[key] = [loop.phi(key[-2], key[-1], law, loss) for law, loss in laws]
-        return self._known[key]
-
     def loops(self, part: int) -> list[SampledLoop]:
         """One for each corner of a part of what the inner loop may be."""
-        if part not in self._loops:
-            corners = self.inner(part)
-            self._loops[part] = [self.loop if c is None else replace(self.loop, inner=c) for c in corners]
-        return self._loops[part]
+        return [self.loop if c is None else replace(self.loop, inner=c) for c in self.inner(part)]
 
     def contraction(self, box: Box, L: Array) -> tuple[float, float]:
         """A bound of |L^T Phi L^-T| within the box, and how far rounding may have moved it.
@@ -185,12 +167,12 @@ class Prover:
         back = np.asarray(np.linalg.inv(L.T))
         condition = float(np.linalg.norm(L) * np.linalg.norm(back))
         matrices = self.matrices(box)
-        turned = np.array([L.T @ Phi @ back for Phi in matrices])
+        transformed = np.array([L.T @ Phi @ back for Phi in matrices])
         size = max(float(np.linalg.norm(Phi)) for Phi in matrices)
-        worst = float(np.linalg.norm(turned, 2, axis=(1, 2)).max())
-        if not self.exact and worst < 1.0:
-            worst = _with_rest(turned, self._rest(box, L, back), worst)
-        return worst, 16.0 * len(L) * EPS * condition * size
+        largest = float(np.linalg.norm(transformed, 2, axis=(1, 2)).max())
+        if not self.exact and largest < 1.0:
+            largest = _with_rest(transformed, self._rest(box, L, back), largest)
+        return largest, 16.0 * len(L) * EPS * condition * size
 
     def _rest(self, box: Box, L: Array, back: Array) -> Array:
         """R with |L^T D x| <= |R L^T x| for D the distance of any matrix of the box from its corners' hull."""
@@ -202,7 +184,7 @@ class Prover:
         return np.array([sizes[:, None] * (f @ back) for f in fed])
 
     def _input_map(self, law: Law, loss: int) -> Array:
-        """From the state to z and the held input, shape (p + 1, size): what the exponential acts on.
+        """Map from the state to z and the held input, shape (p + 1, size), on which the exponential acts.
 
         For a position arm z's first number is counted from the held input: at rest it is nothing.
         """
@@ -224,10 +206,11 @@ def _with_rest(turned: Array, rests: Array, alone: float) -> float:
         rests: R, shape (r, k, n).
         alone: the largest norm of a T.
     """
-    rest = float(np.linalg.norm(rests, 2, axis=(1, 2)).max())
-    if rest == 0.0:
+    rest_norm = float(np.linalg.norm(rests, 2, axis=(1, 2)).max())
+    if rest_norm == 0.0:
         return alone
-    best, room = alone + rest, max(1.0 - alone**2, 1e-300)
+    best = alone + rest_norm
+    room = max(1.0 - alone**2, 1e-300)
     if best < 1.0:
         return best
     wide = rests.reshape(-1, rests.shape[2])  # all of them at once bound each of them
@@ -239,7 +222,7 @@ def _with_rest(turned: Array, rests: Array, alone: float) -> float:
 
 
 def curvature_bound(prover: Prover, box: Box) -> Array:
-    """How far E = exp(T A) may lie from the multilinear function through its corners, by element, shape (p, p + 1).
+    """Bound of the distance of E = exp(T A) from the multilinear function through its corners, shape (p, p + 1).
 
     The parameters are w^2 and 2 z w for a position arm, K + B/theta and 1/(1 + B/(K theta)) for others: A is
     affine in each alone, so that the distance is at most sum of h^2/8 |E''|, and |E''| at most twice the last block of
@@ -264,21 +247,25 @@ def curvature_bound(prover: Prover, box: Box) -> Array:
 
 
 def _directions(prover: Prover, box: Box, rates: list[Array]) -> list[Array]:
-    """How much A changes from one end of each parameter to the other, by element."""
+    """Change of A from one end of each parameter to the other, by element."""
     if prover.loop.arm.kind == "position":
         square, rate = zip(*(corner for corner in prover.inner(box.part) if corner is not None), strict=True)
         unit = prover.loop.rate_unit
-        first, second = np.zeros_like(rates[0]), np.zeros_like(rates[0])
+        first = np.zeros_like(rates[0])
+        second = np.zeros_like(rates[0])
         first[1, 0], second[1, 1] = (max(square) - min(square)) / unit, max(rate) - min(rate)
         return [first, second]
-    theta, loop = prover.theta, prover.loop
+    theta = prover.theta
+    loop = prover.loop
     none = _rates(loop, 0.0, 0.0)
-    K, B = np.abs(_rates(loop, 1.0, 0.0) - none), np.abs(_rates(loop, 0.0, 1.0) - none)
-    share = [1.0 / (1.0 + t / theta) for t in (box.most, box.least)]
+    K = np.abs(_rates(loop, 1.0, 0.0) - none)
+    B = np.abs(_rates(loop, 0.0, 1.0) - none)
+    fractions = [1.0 / (1.0 + t / theta) for t in (box.most, box.least)]
     along = (box.high - box.low) * np.maximum(
-        share[0] * K + theta * (1.0 - share[0]) * B, share[1] * K + theta * (1.0 - share[1]) * B
+        fractions[0] * K + theta * (1.0 - fractions[0]) * B,
+        fractions[1] * K + theta * (1.0 - fractions[1]) * B,
     )
-    return [along, (share[1] - share[0]) * box.high * (K + theta * B)]
+    return [along, (fractions[1] - fractions[0]) * box.high * (K + theta * B)]
 
 
 def _rates(loop: SampledLoop, K: float, B: float) -> Array:

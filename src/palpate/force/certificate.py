@@ -13,8 +13,7 @@ from palpate.errors import InputError
 from palpate.files import read_bytes, with_author, write_json
 from palpate.force.arm import PositionLoop, Table
 from palpate.force.cells import Prover
-from palpate.force.claims import Claim
-from palpate.force.cover import Cell
+from palpate.force.claims import Claim, ProvedCell
 from palpate.force.gains import Gains
 
 FORM: Literal["palpate force certificate 2"] = "palpate force certificate 2"
@@ -64,7 +63,7 @@ class Certificate(Table):
 
     @classmethod
     def load(cls, path: Path) -> Certificate:
-        """From its file.
+        """Read a certificate from its file.
 
         Raises:
             InputError: no certificate.
@@ -78,26 +77,26 @@ class Certificate(Table):
             raise InputError(f"{path}: {error}") from None
 
     def save(self, path: Path) -> None:
-        """Writes the file, whole or not at all."""
+        """Write the file, whole or not at all."""
         write_json(
             path, with_author({k: v for k, v in msgspec.to_builtins(self).items() if v not in ("", None)})
         )
 
     def check_of(self, gains: Gains) -> None:
-        """Refuses to speak of other gains.
+        """Refuse gains that the certificate is not of.
 
         Raises:
             InputError: another arm, rate, law, lag or cap.
         """
-        own = self.gains
+        certified = self.gains
         for name, mine, other in (
-            ("rate", own.arm.rate, gains.arm.rate),
-            ("law", own.law, gains.law),
-            ("arm", own.arm, gains.arm),
-            ("theta", own.theta, gains.theta),
-            ("alpha", own.alpha, gains.alpha),
-            ("relief", own.relief, gains.relief),
-            ("cap", own.cap, gains.cap),
+            ("rate", certified.arm.rate, gains.arm.rate),
+            ("law", certified.law, gains.law),
+            ("arm", certified.arm, gains.arm),
+            ("theta", certified.theta, gains.theta),
+            ("alpha", certified.alpha, gains.alpha),
+            ("relief", certified.relief, gains.relief),
+            ("cap", certified.cap, gains.cap),
         ):
             if mine != other:
                 what = f" ({mine:g} and {other:g})" if isinstance(mine, float) else ""
@@ -106,8 +105,10 @@ class Certificate(Table):
                 )
 
     def check(self) -> CertificateVerdict:
-        """Whether it holds, by norms alone."""
-        worst, rounding, count = 0.0, 0.0, 0
+        """Check the certificate by norms alone."""
+        worst = 0.0
+        rounding = 0.0
+        count = 0
         if not self.claims:
             return CertificateVerdict(False, np.inf, 0.0, 0, "it claims nothing")
         for claim in self.claims:
@@ -120,17 +121,19 @@ class Certificate(Table):
                 return CertificateVerdict(
                     False, np.inf, 0.0, count, f"the cells of its {claim.kind} claim leave a gap"
                 )
-            for proved in claim.cells:
-                if [len(row) for row in proved.norm] != [prover.loop.size] * prover.loop.size:
+            for cell in claim.cells:
+                if [len(row) for row in cell.norm] != [prover.loop.size] * prover.loop.size:
                     return CertificateVerdict(False, np.inf, 0.0, count, "a norm is not of the loop's size")
-                size, moved = _contraction(prover, proved.cell)
-                worst, rounding, count = max(worst, size), max(rounding, moved), count + 1
-                if not size + moved < 1.0:
+                size, error = _contraction(prover, cell)
+                worst = max(worst, size)
+                rounding = max(rounding, error)
+                count = count + 1
+                if not size + error < 1.0:
                     return CertificateVerdict(False, worst, rounding, count, "a cell does not contract")
         return CertificateVerdict(True, worst, rounding, count)
 
 
-def _contraction(prover: Prover, cell: Cell) -> tuple[float, float]:
+def _contraction(prover: Prover, cell: ProvedCell) -> tuple[float, float]:
     try:
         return prover.contraction(cell.box, cell.L)
     except (np.linalg.LinAlgError, FloatingPointError, ValueError):

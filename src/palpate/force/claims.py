@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from palpate.arrays import Array
 from palpate.force.arm import Table
 from palpate.force.cells import Box, Prover
-from palpate.force.cover import Cell
 from palpate.force.gains import Gains
 from palpate.force.sampled_loop import SampledLoop, law_for
 
@@ -25,10 +25,10 @@ end that can be; ticks by which its readings may be later than the jitter that i
 Down to next to nothing, Popov's and the circle criterion end at theta/(alpha times the sum of all lags), which is 2.0
 for the UR5e without jitter: hence two claims. Down to the cap, a servo's lead that goes to and fro between those of a
 stiff and of a soft surface makes the loop grow (tests/force/test_servo.py)."""
-FADED = 0.01
+FADING_SHARE = 0.01
 """Share below which the gain of a claim counts as one that may fade."""
-GONE = 1e-4
-"""Of the cap: what is left of a surface that the tip has left, see `one_sided_claim`."""
+LOST_CONTACT_FRACTION = 1e-4
+"""Fraction of the cap that is left of a surface after the tip has left it, see `one_sided_claim`."""
 Finite = Annotated[float, Meta(ge=-1e300, le=1e300)]
 Number = Annotated[float, Meta(ge=0, le=1e300)]
 Age = Annotated[int, Meta(ge=0, le=200)]
@@ -45,12 +45,21 @@ class ProvedCell(Table):
     part: Annotated[int, Meta(ge=0, le=10_000)] = 0
     loss: Annotated[int, Meta(ge=0, le=100)] = 0
 
+    @classmethod
+    def of(cls, box: Box, L: Array) -> ProvedCell:
+        """A box with its norm."""
+        rows = tuple(tuple(map(float, row)) for row in L)
+        return cls(box.low, box.high, box.least, box.most, rows, box.part, box.loss)
+
     @property
-    def cell(self) -> Cell:
-        """As `cover` has it."""
-        return Cell(
-            Box(self.low, self.high, self.least, self.most, self.part, self.loss), np.array(self.norm)
-        )
+    def box(self) -> Box:
+        """The surfaces, the part of the inner loop and the loss of delay."""
+        return Box(self.low, self.high, self.least, self.most, self.part, self.loss)
+
+    @property
+    def L(self) -> Array:
+        """The norm, shape (n, n)."""
+        return np.array(self.norm)
 
 
 class Claim(Table):
@@ -72,11 +81,11 @@ class Claim(Table):
     most: Number
     shares: tuple[Number, Number]
     ages: tuple[Age, Age]
-    """Of the reading in use, youngest and oldest [ticks]; the sensor's own period counts, rounded up."""
+    """Youngest and oldest age of the reading in use [ticks]; the sensor's own period counts, rounded up."""
     state: tuple[str, ...] = ()
     """Order of the numbers in which the norms are, see `SampledLoop.state`."""
     units: dict[str, Number] = msgspec.field(default_factory=dict)
-    """Theirs, see `SampledLoop.units`."""
+    """Units of these numbers, see `SampledLoop.units`."""
     parts: Annotated[int, Meta(ge=1, le=100)] = 1
     cells: tuple[ProvedCell, ...] = ()
 
@@ -105,14 +114,15 @@ class Claim(Table):
 
     def prover(self, gains: Gains) -> Prover:
         """Prover of the claim: the loops that have to contract."""
-        own = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
-        loop = SampledLoop(gains.arm, self.jitter(gains), own)
-        relative, servo = self.kind == "adapting", gains.arm.kind == "servo"
+        unit_of_force = gains.seen_cap if gains.arm.kind == "position" else _between(gains)
+        loop = SampledLoop(gains.arm, self.jitter(gains), unit_of_force)
+        relative = self.kind == "adapting"
+        servo = gains.arm.kind == "servo"
         unit = (1.0 if servo else gains.alpha) if relative else gains.gain
         ends = self.shares[0] * unit, self.shares[1] * unit
         younger = self.ages[1] - self.ages[0] + gains.arm.unsure_ticks
         fading: Literal["", "gain", "surface"] = "surface" if self.kind == "one-sided" else ""
-        if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADED:
+        if self.kind == "adapting" and gains.arm.kind == "position" and self.shares[0] < FADING_SHARE:
             fading = "gain"
         return Prover(
             loop, gains.theta, ends, younger, bound=gains.seen_cap,
@@ -121,11 +131,11 @@ class Claim(Table):
         )  # fmt: skip
 
     def tiled(self, box: Box) -> bool:
-        """Whether the cells cover one of its boxes: every rectangle between two neighbouring edges lies in a cell."""
-        own = [c for c in self.cells if (c.part, c.loss) == (box.part, box.loss)]
-        if not own:
+        """True if the cells cover a box: every rectangle between two neighbouring edges lies in a cell."""
+        cells = [c for c in self.cells if (c.part, c.loss) == (box.part, box.loss)]
+        if not cells:
             return False
-        edges = np.array([[c.low, c.high, c.least, c.most] for c in own])
+        edges = np.array([[c.low, c.high, c.least, c.most] for c in cells])
         if self.kind == "one-sided" and not (
             (edges[:, 0] <= self.low).all() and (edges[:, 1] >= self.high).all()
         ):
@@ -147,24 +157,21 @@ def _cuts(ends: np.ndarray, low: float, high: float) -> list[tuple[float, float]
     return [(a, b) for a, b in pairwise(all_of.tolist())]
 
 
-def held_claim(gains: Gains, low: float, high: float, most: float, margin: float = 1.0) -> Claim:
-    """That the loop with K_u = cap is stable on surfaces as the measured position feels them.
+def held_claim(gains: Gains, low: float, high: float, most: float) -> Claim:
+    """Claim that the loop with K_u = cap is stable on surfaces as the measured position feels them.
 
     Args:
         gains: of the loop.
         low: K + B/theta from [N/m].
         high: to [N/m].
         most: longest B/K [s].
-        margin: factor that all gains may grow by.
     """
     ages = (gains.arm.sensor_ticks,) * 2
-    return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, margin), ages=ages)
+    return Claim(kind="held", low=low, high=high, least=0.0, most=most, shares=(1.0, 1.0), ages=ages)
 
 
-def adapting_claims(
-    gains: Gains, low: float, most: float, jitter: int = 0, margin: float = 1.0
-) -> list[list[Claim]]:
-    """That the loop is stable whatever the estimator does; of each list, the first that can be proved.
+def adapting_claims(gains: Gains, low: float, most: float, jitter: int = 0) -> list[list[Claim]]:
+    """Claims that the loop is stable whatever the estimator does; of each list, the first provable one counts.
 
     Args:
         gains: of the loop.
@@ -172,9 +179,9 @@ def adapting_claims(
         most: longest B/K [s].
         jitter: ticks by which a reading may be older than the sensor's period, rounded up; the highest gain comes
             first, with fewer ticks where it has to.
-        margin: factor that all gains may grow by.
     """
-    high, oldest = gains.seen_cap, gains.arm.sensor_ticks
+    high = gains.seen_cap
+    oldest = gains.arm.sensor_ticks
     low = high if gains.arm.kind == "position" else low
     youngest = (
         0 if gains.arm.low_pass.sections else 1
@@ -182,7 +189,7 @@ def adapting_claims(
     return [
         [
             Claim(
-                kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top * margin),
+                kind="adapting", low=low, high=high, least=0.0, most=most, shares=(least, top),
                 ages=(youngest, oldest + late),
             )
             for top in tops
@@ -192,8 +199,8 @@ def adapting_claims(
     ]  # fmt: skip
 
 
-def one_sided_claim(gains: Gains, most: float, margin: float = 1.0) -> Claim:
-    """That a position arm's loop with K_u = cap is stable also where contact is lost and found again.
+def one_sided_claim(gains: Gains, most: float) -> Claim:
+    """Claim that a position arm's loop with K_u = cap is stable also where contact is lost and found again.
 
     About the state of rest under F_d, a force max(K x + B xdot, 0) is k (K x~ + B xdot~) with k between 0 and 1: a
     sector. It is F_d/(F_d + K gap) at least, over a gap to the surface.
@@ -201,11 +208,19 @@ def one_sided_claim(gains: Gains, most: float, margin: float = 1.0) -> Claim:
     Args:
         gains: of the loop.
         most: longest B/K [s].
-        margin: factor that all gains may grow by.
     """
     cap = gains.seen_cap
-    ends, ages = (1.0, margin), (gains.arm.sensor_ticks,) * 2
-    return Claim(kind="one-sided", low=GONE * cap, high=cap, least=0.0, most=most, shares=ends, ages=ages)
+    ends = (1.0, 1.0)
+    ages = (gains.arm.sensor_ticks,) * 2
+    return Claim(
+        kind="one-sided",
+        low=LOST_CONTACT_FRACTION * cap,
+        high=cap,
+        least=0.0,
+        most=most,
+        shares=ends,
+        ages=ages,
+    )
 
 
 def _between(gains: Gains) -> float:

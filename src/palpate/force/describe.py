@@ -1,14 +1,20 @@
-"""A certificate in words and as plain JSON values."""
+"""A certificate in words, for a terminal, and as plain JSON values."""
 
+from collections.abc import Iterator
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.text import Text
 
 from palpate.force.certificate import Certificate, CertificateVerdict
 from palpate.force.claims import Claim
 from palpate.force.gains import Gains
-from palpate.force.sliding.slide_proof import slide_proof, slide_proof_sentence
+from palpate.force.sliding.slide_proof import slide_proof
+from palpate.force.tuning import RIGID, surface_ends
+from palpate.text import printable
+from palpate.units import quantity
 
 UNCOVERED = (
     "the backstop, the feed-forward of dF_d/dt",
@@ -31,71 +37,15 @@ def bounds(claim: Claim, gains: Gains) -> tuple[float, float]:
     if gains.arm.kind != "torque":
         return 1.0 / claim.shares[1], 1.0 / claim.shares[0]
     times = np.geomspace(1e-3, 1e3, 6001)
-    least, most = times[0], times[-1]
+    least = times[0]
+    most = times[-1]
     for K in np.geomspace(max(claim.low, 1e-9), claim.high, 61).tolist():
-        share = (
+        gain_fraction = (
             gains.theta * gains.arm.seen(K) / gains.alpha * np.array([gains.gain_at(r * K) for r in times])
         )
-        least = max(least, times[share <= claim.shares[1]][0])
-        most = min(most, times[share >= claim.shares[0]][-1])
+        least = max(least, times[gain_fraction <= claim.shares[1]][0])
+        most = min(most, times[gain_fraction >= claim.shares[0]][-1])
     return float(least), float(most) if most < times[-1] else np.inf
-
-
-def ages(claim: Claim, gains: Gains) -> str:
-    """Ages of readings that a claim covers, in words."""
-    young, old = claim.ages
-    if claim.kind != "adapting":
-        return f"a reading that is always {old} ticks old"
-    own = gains.arm.rate / gains.arm.sensor.sampling
-    return f"a reading of any age from {young} to {old} ticks, from tick to tick (the sensor's own are 0 to {own:.3g})"
-
-
-def sentence(claim: Claim, gains: Gains) -> str:
-    """A claim in words."""
-    times = f"B/K from {claim.least:g} to {claim.most:.4g} s" if claim.most > 0.0 else "no damping (B = 0)"
-    factor = f", or up to {claim.shares[1]:g} times that gain" if claim.shares[1] > 1.0 else ""
-    if claim.kind == "held":
-        held = "the gain and the lead" if gains.arm.kind == "servo" else "the gain"
-        return (
-            f"{held} held at that of the stiffest surface{factor}: every surface whose K + B/theta, as the measured "
-            f"position shows it, is {claim.low:.4g} to {claim.high:.4g} N/m, {times}, with {ages(claim, gains)}; K and "
-            "B may change from tick to tick within a cell"
-        )
-    if claim.kind == "one-sided":
-        damper = "; the damper acts before the tip touches, too" if claim.most > 0.0 else ""
-        return (
-            f"the gain held at that of the stiffest surface{factor}, with loss of contact at ticks over gaps of up to "
-            f"F_d/({claim.low:.3g} N/m): every surface whose K + B/theta, as the measured position shows it, is up to "
-            f"{claim.high:.4g} N/m, {times}, with {ages(claim, gains)}: the force is max(K x + B xdot, 0){damper}"
-        )
-    which = (
-        "every constant stiffness"
-        if gains.arm.kind == "position"
-        else f"every constant stiffness from {claim.low:.4g} to {claim.high:.4g} N/m"
-    )
-    least, most = bounds(claim, gains)
-    end = f" to {most:.3g}" if most < np.inf else " and more"
-    return (
-        f"adapting gain, for any estimate while g theta K_eff/alpha is within {claim.shares[0]:g} to "
-        f"{claim.shares[1]:g} (K_u is {least:.3g}{end} times K + B/theta), with {ages(claim, gains)}: {which}, "
-        f"{times}"
-    )
-
-
-def lines(certificate: Certificate, verdict: CertificateVerdict) -> list[str]:
-    """The certificate in words."""
-    gains = certificate.proved_gains
-    found = [f"proved stable, {sentence(c, gains)} ({len(c.cells)} cells)" for c in certificate.claims]
-    if not found:
-        found = ["nothing could be proved"]
-    if (slide := slide_proof(certificate)) is not None:
-        found.append(slide_proof_sentence(slide))
-    state = "holds" if verdict.holds else f"does not hold: {verdict.why}"
-    found.append(
-        f"the certificate {state}; {verdict.cells} cells contract by at least {1.0 - verdict.contraction:.3g} a tick, "
-        f"rounding is at most {verdict.rounding:.2g}"
-    )
-    return [*found, "not covered: " + "; ".join(UNCOVERED)]
 
 
 def as_json(certificate: Certificate, verdict: CertificateVerdict) -> dict[str, Any]:
@@ -120,3 +70,85 @@ def as_json(certificate: Certificate, verdict: CertificateVerdict) -> dict[str, 
         "slide": slide_proof(certificate),
         "uncovered": list(UNCOVERED),
     }
+
+
+def proof_lines(
+    certificate: Certificate,
+    verdict: CertificateVerdict,
+    written: Path | None = None,
+    *,
+    verbose: bool = False,
+) -> Iterator[Text]:
+    """A certificate: whether it holds, and the surfaces that each of its claims covers, a line each.
+
+    Args:
+        certificate: to be described.
+        verdict: of its check.
+        written: where it was written.
+        verbose: add the contraction, the rounding error, and the cases that are not covered.
+    """
+    gains = certificate.gains
+    place = f"   written: {written}" if written else ""
+    if not certificate.claims:
+        yield Text("✕ Nothing could be proved.", "bold red")
+    elif verdict.holds:
+        title = (
+            f"✓ The certificate holds: {verdict.cells} cells, each contracts by more than its rounding error."
+        )
+        yield Text(title, "bold green").append(printable(place), "default")
+        yield Text(f"Stable on surfaces with K + B/theta (theta {1e3 * gains.theta:.2g} ms) of")
+    else:
+        yield Text(printable(f"✕ The certificate does not hold: {verdict.why}."), "bold red")
+    for i, claim in enumerate(certificate.claims):
+        if claim.kind != "held" or i == 0:  # a later one is that of a slide, below
+            yield Text(f"  {claim_title(claim):24}{claim_scope(claim, gains)}")
+    if (slide := slide_proof(certificate)) is not None:
+        yield Text(f"  {'slide':24}{_slide_scope(slide, gains)}")
+    if not verbose:
+        yield Text(f"Not covered: {len(UNCOVERED)} cases, which --verbose lists.")
+        return
+    yield Text(
+        f"Each cell contracts by at least {1.0 - verdict.contraction:.3g} a tick; rounding is at most "
+        f"{verdict.rounding:.2g}."
+    )
+    yield Text("Not covered: " + "; ".join(UNCOVERED))
+
+
+_CLAIMS = {"held": "constant gain", "one-sided": "contact lost and found", "adapting": "adapting gain"}
+
+
+def claim_title(claim: Claim) -> str:
+    """The kind of a claim in words."""
+    return _CLAIMS[claim.kind]
+
+
+def claim_scope(claim: Claim, gains: Gains) -> str:
+    """Surfaces, gains, ages of readings and damping that a claim covers."""
+    low, high = surface_ends(gains.arm, claim.low, claim.high)
+    if claim.kind == "adapting":
+        least, most = bounds(claim, gains)
+        end = f" to {most:.3g}" if isfinite(most) else " and more"
+        span = "any stiffness" if gains.arm.kind == "position" else _stretch(low, high)
+        gain = f", K_u {least:.3g}{end} times theirs, readings {claim.ages[0]} to {claim.ages[1]} ticks old"
+    else:
+        span = _stretch(low, high)
+        if claim.kind == "one-sided":
+            gap = quantity(gains.force / claim.low, "m")
+            span = f"up to {quantity(high, 'N/m')}, over gaps of up to {gap}"
+        gain = f", at up to {claim.shares[1]:g} times the gain" if claim.shares[1] > 1.0 else ""
+    damping = f"; B/K up to {quantity(claim.most, 's')}" if claim.most else "; B = 0"
+    return f"{span}{gain}{damping}"
+
+
+def _slide_scope(slide: dict[str, Any], gains: Gains) -> str:
+    ends, (least, most) = slide["felt_stiffness"], slide["gain_factor"]
+    span = "no surface" if ends is None else _stretch(*surface_ends(gains.arm, *ends))
+    errors = (
+        f"normal off by up to {slide['angle_deg']:g}\N{DEGREE SIGN}, friction up to {slide['friction']:g}"
+    )
+    return f"{span}, {errors}, both changing (gain x {least:.2g} to {most:.3g}); B = 0"
+
+
+def _stretch(low: float, high: float) -> str:
+    end = "up" if high >= RIGID else f"to {quantity(high, 'N/m')}"
+    return f"{quantity(low, 'N/m')} {end}"

@@ -47,12 +47,12 @@ def settling_bound(gains: Gains, stiffness: float, damping: float = 0.0) -> floa
         damping: B [N s/m].
     """
     travel = gains.force / (stiffness * gains.arm.limits.speed)
-    found = RISES * rise(gains, stiffness)
+    rise_time = RISES * rise(gains, stiffness)
     return (
         LAGS * gains.theta
         + travel
         + DECAYS * damping / stiffness
-        + found
+        + rise_time
         + LEVELS * level_time(gains, stiffness)
     )
 
@@ -81,7 +81,7 @@ STIFFENING_AT = (0.05, 0.5)
 
 
 def stiffening(gains: Gains, step: Step, error: float, overshoot: float = OVERSHOOT) -> float:
-    """How many times stiffer, as felt, a surface may become while the force is so far below F_d.
+    """Largest factor by which a surface may stiffen, as felt, while the force is so far below F_d.
 
     For a lag theta whatever comes is decided by readings of before, so that the tip goes on as it would have: on a
     surface n times stiffer the force then rises n times as far, by n (F(t + theta) - F(t)). theta stands for the whole
@@ -100,7 +100,7 @@ def stiffening(gains: Gains, step: Step, error: float, overshoot: float = OVERSH
 
 
 BAND = 0.05
-"""Of F_d, within which a press counts as settled."""
+"""Error over F_d within which a press counts as settled."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Step:
 
     @property
     def settling(self) -> float:
-        """When it enters the band for good [s]; infinite if it does not."""
+        """Time at which the force enters the band for good [s]; infinite if it does not."""
         outside = np.flatnonzero(np.abs(self.force - 1.0) > BAND)
         if len(outside) == len(self.force) or (len(outside) and outside[-1] == len(self.force) - 1):
             return inf
@@ -131,7 +131,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Margins:
-    """How far the loop is from growing.
+    """Stability margins of the loop.
 
     Args:
         gain: factor.
@@ -169,8 +169,8 @@ def step_of(gains: Gains, bound: float, held: float | None = None) -> Step:
         x[2] = -1.0
     x[p : p + loop.lines[0]] = -1.0
     first = p + loop.lines[0] + 1
-    seen = loop.arm.seen(bound) if loop.arm.kind != "position" else bound
-    x[first : first + loop.lines[1]] = -loop.force_unit / seen
+    series = loop.arm.seen(bound) if loop.arm.kind != "position" else bound
+    x[first : first + loop.lines[1]] = -loop.force_unit / series
     if loop.arm.kind == "torque":
         x[first + 1 : first + loop.lines[1]] = -1.0
     force = np.empty(n)
@@ -185,7 +185,8 @@ def frequency_response(gains: Gains, bound: float) -> tuple[Array, NDArray[np.co
     loop = SampledLoop(gains.arm)
     start, closed = (loop.phi(bound, 0.0, law_for(gains.arm, g, bound)) for g in (0.0, gains.gain_at(bound)))
     b, c = rank_one(closed - start)
-    low, high = 0.01 / gains.theta / (2.0 * pi), 0.5 * gains.arm.rate
+    low = 0.01 / gains.theta / (2.0 * pi)
+    high = 0.5 * gains.arm.rate
     frequencies = np.geomspace(low, high, 2000)
     z = np.exp(2j * pi * frequencies / gains.arm.rate)
     eye = np.eye(loop.size)
@@ -193,10 +194,10 @@ def frequency_response(gains: Gains, bound: float) -> tuple[Array, NDArray[np.co
 
 
 def margins(gains: Gains, bound: float) -> Margins:
-    """Of the loop on a surface of this stiffness, K_u being just that."""
-    most = ultimate_gain(SampledLoop(gains.arm), bound)
-    seen = bound if gains.arm.kind == "position" else gains.arm.seen(bound)
-    gain = most / (gains.gain_at(bound) * seen)
+    """Stability margins on a surface of this stiffness, with K_u equal to it."""
+    ultimate = ultimate_gain(SampledLoop(gains.arm), bound)
+    series = bound if gains.arm.kind == "position" else gains.arm.seen(bound)
+    gain = ultimate / (gains.gain_at(bound) * series)
     frequencies, L = frequency_response(gains, bound)
     above = np.abs(L) >= 1.0
     crossing = np.flatnonzero(above[:-1] & ~above[1:])

@@ -8,19 +8,23 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from palpate._jit import kernel, law, part
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate._vector import Vec3
 from palpate.errors import InputError
 from palpate.files import write_text
 from palpate.force.contact_evidence import FREE_MOTION
-from palpate.force.flat import (
+from palpate.force.gains import Gains, load_gains
+from palpate.force.guard import (
     BOUND,
     DRIFT,
     GUARD,
+    LEAST,
     PHASE,
     REST,
     STATE,
     STD,
     TROUBLE,
+    TROUBLES,
     VALUE,
     VARIANCE,
     flatten,
@@ -28,10 +32,9 @@ from palpate.force.flat import (
     law_in,
     put_guard,
     put_state,
+    safe_step,
     state_in,
 )
-from palpate.force.gains import Gains, load_gains
-from palpate.force.guard import LEAST, TROUBLES, safe_step
 from palpate.force.stage import LEARNING, LOCKED
 from palpate.records import Readable
 
@@ -81,7 +84,43 @@ def surface_estimate(cap, theta, found, std, bound):
     return SurfaceEstimate(cap * found.x, cap * std.x, cap * theta * found.y, cap * theta * std.y, bound)
 
 
-class ForceLoop(Readable):
+def check_speed(speed: float, gains: Gains) -> float:
+    """A speed that a loop may be limited to [m/s].
+
+    Raises:
+        InputError: it is below the approach of the gains, or no finite number.
+    """
+    value = cast_number("the speed", speed)
+    if not gains.approach <= value < np.inf:
+        raise InputError(f"the speed must be at least the approach of {gains.approach:g} m/s, got {value:g}")
+    return value
+
+
+class PressingLoop(Readable):
+    """A loop of some gains with a desired force."""
+
+    gains: Gains
+    _desired: float
+
+    @property
+    def desired(self) -> float:
+        """Desired force F_d [N]."""
+        return self._desired
+
+    @desired.setter
+    def desired(self, force: float) -> None:
+        value = cast_number("the desired force", force)
+        least = LEAST * self.gains.arm.sensor.noise
+        most = self.gains.force_limit
+        if not least <= value < most:
+            raise InputError(
+                f"the desired force must be from {least:g} N (8 standard deviations of the noise) to below the force "
+                f"limit of {most:g} N, got {value:g} N"
+            )
+        self._desired = value
+
+
+class ForceLoop(PressingLoop):
     """Presses with the force asked for, on any surface within the gains' cap, from free motion on.
 
     In the user's own loop, once a tick::
@@ -107,7 +146,8 @@ class ForceLoop(Readable):
     def __init__(self, gains: Gains, certificate: Certificate | None = None):
         if certificate is not None:
             certificate.check_of(gains)
-        self.gains, self.certificate = gains, certificate
+        self.gains = gains
+        self.certificate = certificate
         self._desired = gains.force
         self._numbers = flatten(gains.cautious())
         self._state = np.zeros(STATE + GUARD)
@@ -116,7 +156,7 @@ class ForceLoop(Readable):
 
     @classmethod
     def load(cls, path: str | Path, certificate: str | Path | None = None) -> ForceLoop:
-        """From the files that `palpate tune` and `palpate certify` wrote.
+        """Load a loop from the files that `palpate tune` and `palpate certify` wrote.
 
         Raises:
             InputError: a file that is none, or a certificate of other gains.
@@ -127,42 +167,22 @@ class ForceLoop(Readable):
         return cls(load_gains(Path(path)), proof)
 
     def save(self, path: str | Path) -> None:
-        """Writes the gains, the file there whole or not at all."""
+        """Write the gains, the file whole or not at all."""
         write_text(Path(path), self.gains.to_toml())
 
     def reset(self) -> None:
-        """Returns to free motion and forgets the surface."""
+        """Return to free motion and forget the surface."""
         self._state[:] = 0.0
         self._state[:STATE] = flatten(self.gains.cautious().start())
 
-    @property
-    def desired(self) -> float:
-        """Desired force F_d [N]."""
-        return self._desired
-
-    @desired.setter
-    def desired(self, force: float) -> None:
-        value = float(force)
-        least, most = LEAST * self.gains.arm.sensor.noise, self.gains.force_limit
-        if not least <= value < most:
-            raise InputError(
-                f"the desired force must be from {least:g} N (8 standard deviations of the noise) to below the force "
-                f"limit of {most:g} N, got {value:g} N"
-            )
-        self._desired = value
-
     def limit_speed(self, speed: float) -> None:
-        """Lets no command be faster than this [m/s], where that is below the arm's own limit.
+        """Limit the speed of the command [m/s], where that is below the arm's own limit.
 
         Raises:
-            InputError: it is below the approach.
+            InputError: it is below the approach, or no finite number.
         """
-        if not speed >= self.gains.approach:
-            raise InputError(
-                f"the speed must be at least the approach of {self.gains.approach:g} m/s, got {speed:g}"
-            )
-        own = self.gains.cautious()
-        self._numbers = flatten(own._replace(speed=min(own.speed, speed)))
+        numbers = self.gains.cautious()
+        self._numbers = flatten(numbers._replace(speed=min(numbers.speed, check_speed(speed, self.gains))))
 
     def update(self, force: float, position: float, missed: float = 0.0) -> float:
         """The speed of the commanded position for this tick [m/s].
@@ -171,17 +191,25 @@ class ForceLoop(Readable):
             force: on the surface, positive where it presses [N].
             position: of the tip along the normal as the arm's encoders have it, growing into the surface [m].
             missed: ticks that were lost since the last call.
+
+        Raises:
+            InputError: an argument that is no number of any type; the state is unchanged.
         """
-        return self._one(self._numbers, self._state, self._desired, force, position, missed)
+        return self._one(
+            self._numbers, self._state, self._desired, cast_number("force", force),
+            cast_number("position", position), cast_number("missed", missed),
+        )  # fmt: skip
 
     @property
     def estimate(self) -> SurfaceEstimate | None:
         """Estimate of the surface; None in free motion and until there is one."""
-        s, cap, theta = self._state, self.gains.seen_cap, self.gains.theta
+        s = self._state
+        cap = self.gains.seen_cap
+        theta = self.gains.theta
         if s[PHASE] == FREE_MOTION or s[STD] == 0.0:
             return None
-        found, std = (Vec3(*s[at : at + 3].tolist()) for at in (VALUE, STD))
-        return surface_estimate(cap, theta, found, std, float(s[BOUND]))
+        value, std = (Vec3(*s[at : at + 3].tolist()) for at in (VALUE, STD))
+        return surface_estimate(cap, theta, value, std, float(s[BOUND]))
 
     @property
     def phase(self) -> str:
@@ -215,12 +243,8 @@ class ForceLoop(Readable):
 
     @state.setter
     def state(self, numbers: Any) -> None:
-        given = np.array(numbers, dtype=np.float64)
-        if (
-            given.shape != self._state.shape
-            or not np.isfinite(given).all()
-            or float(given[PHASE]) not in PHASES
-        ):
+        given = cast_array("a state", numbers, self._state.shape)
+        if not np.isfinite(given).all() or float(given[PHASE]) not in PHASES:
             raise InputError(
                 f"a state is {len(self._state)} finite numbers from ForceLoop.state; give those back"
             )
@@ -228,12 +252,7 @@ class ForceLoop(Readable):
 
     def _bind(self) -> None:
         """The compiled step without the look-up by type that half of a short call's time goes into."""
-        import numba
-
-        example = (self._numbers, self._state.copy(), 1.0, 0.0, 0.0, 0.0)
-        _step(*example)
-        entry = _step.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
-        self._one = entry
+        self._one = machine_code(_step, self._numbers, self._state.copy(), 1.0, 0.0, 0.0, 0.0)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_one"}

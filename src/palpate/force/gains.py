@@ -14,53 +14,52 @@ from msgspec import Meta
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.files import read_text
+from palpate.files import as_toml, read_text
 from palpate.force.arm import Arm, PositionLoop, Positive, ServoLoop, Table, from_toml
-from palpate.force.lag import lag_of
-from palpate.force.law import Cautious
+from palpate.force.lag import lag_of, relief_of
+from palpate.force.law import Cautious, gain
 from palpate.force.sampled_loop import filter_of
-from palpate.force.sensitivity import relief_of
 from palpate.force.slide_table import Slide
 
 ALPHA = 0.42
-"""Of L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
+"""Gain in units of 1/theta, L = alpha e^(-s theta)/(theta s): 0.42 gives a gain margin of pi/(2 alpha) = 3.7.
 Measured by benchmarks/force/first_touches.py: 0.45 overshoots by 9 % on the stiffest surfaces, 0.36 is a
 quarter slower."""
 LAW = "cautious adaptive control 7"
-"""Its name in adaptive control (a gain that the estimate's uncertainty lowers), and which form of it.
+"""Name of the law in adaptive control (a gain that the estimate's uncertainty lowers), and its version.
 A certificate of another one is refused."""
-LEVEL = 0.0075
-"""Of F_d, that a sensor may show in free motion either way, or two standard deviations if that is more.
+LEVEL_FRACTION = 0.0075
+"""Fraction of F_d that a sensor may show in free motion, or two standard deviations if that is more.
 Measured by benchmarks/force/free_motion.py: twice as much costs 0.05 s on the softest surfaces, hums exceed half as
 much."""
-BIAS = 0.1
-"""Of F_d, that is taken out of the readings as bias: pressed too hard by that, if it was a surface's."""
-DRIFT = 0.35
+BIAS_FRACTION = 0.1
+"""Fraction of F_d that is taken out of the readings as bias: the press is too hard by that if it was a surface's."""
+MIN_DRIFT = 0.35
 """Drift that is followed, whatever a sensor's maker states [N/s]: what rises more slowly at the approach is no surface.
 Above the 0.3 N/s that benchmarks/force/free_motion.py puts to it; the softest surface is this over the approach."""
-_DIGIT = 1e-5
-"""Of F_d: the least noise that is believed, so that a simulated sensor without noise has information that is finite."""
-_TOUCH = 0.5
+_MIN_NOISE_FRACTION = 1e-5
+"""Least noise over F_d that is believed, so that a simulated sensor without noise has finite information."""
+_MOMENTUM_FRACTION = 0.5
 """Share of F_d that the tip's own momentum, v sqrt(K m), may add at the touch; on a surface with a damping ratio of 1
 the damping's 2 v sqrt(K m) is then F_d."""
-_BRISK = 1.15
-"""Of the speed that the law itself asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
+_APPROACH_FACTOR = 1.15
+"""Approach speed over the speed that the law asks for at the cap; 1.3 overshoots by 7.6 % there, 1.6 by 13.6 %
 (benchmarks/force/first_touches.py)."""
-_SLOWEST = 0.02
+_FLOOR_FRACTION = 0.02
 """Lowest K_u in alpha F_d/(theta v_max): there the speed leaves its limit at an error of 2 % of F_d, within half of the
 band of 5 % that counts as settled, so that a higher gain would change nothing that counts."""
-_SURE, _ROOM = 1.5, 0.03
+_BOUND_DEVIATIONS, _BOUND_MARGIN = 1.5, 0.03
 """Standard deviations, and a relative room, from the estimate to K_u.
 Measured by benchmarks/force/first_touches.py, as K_eff(K_u)/K_eff: in one touch of some thousand it is below the half
 that the proof asks for."""
-CREEP = 1e-6
+MIN_APPROACH = 1e-6
 """Slowest approach that is tuned for [m/s]: a micrometre a second, the step of an encoder of many arms."""
-LONGEST = 2000
+MAX_LAG_TICKS = 2000
 """Ticks of lag that are tuned for: a press is foretold tick by tick, for tens of lags."""
-_FORGOTTEN = 5.0
+_FORGETTING_DECAYS = 5.0
 """Decay times of the sensor's low-pass after which an edge counts as forgotten: e^-5 of it, 0.7 %, is left."""
 
-SWING = 0.5
+SWING_FRACTION = 0.5
 """Share of the swing of a position arm's tip for which nothing is learned after a touch: in its first half the force
 grows at another pace than the command's, so that a stiff surface would pass for a soft one.
 Measured by benchmarks/arms/touches.py."""
@@ -125,7 +124,7 @@ class Gains(Table):
 
     @property
     def compliance(self) -> float:
-        """Of the spring between commanded and measured position [m/N]."""
+        """Compliance of the spring between commanded and measured position [m/N]."""
         return 0.0 if self.arm.kind == "position" else 1.0 / self.arm.series
 
     @property
@@ -135,31 +134,31 @@ class Gains(Table):
 
     def gain_at(self, bound: float) -> float:
         """g for K_u = bound [m/(s N)]."""
-        felt = self.compliance * bound
-        lag = self.theta * (1.0 - self.relief * (felt + 0.5) / (felt + 1.0))
-        return self.alpha / lag * (self.compliance + 1.0 / bound)
+        return float(gain(self, bound))  # type: ignore[no-untyped-call]
 
     @property
     def floor(self) -> float:
         """Lowest K_u that the law uses [N/m]."""
-        return max(_SLOWEST * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
+        return max(_FLOOR_FRACTION * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
 
     @property
     def bias(self) -> float:
         """Largest force at rest that is taken out of the readings [N]."""
-        return BIAS * self.force
+        return BIAS_FRACTION * self.force
 
     @property
     def drift(self) -> float:
         """Slowest rise that counts as a surface's [N/s]."""
-        return max(DRIFT, self.arm.sensor.drift or 0.0)
+        return max(MIN_DRIFT, self.arm.sensor.drift or 0.0)
 
     def cautious(self) -> Cautious:
         """Numbers of the compiled law."""
         arm = self.arm
         low_pass = arm.low_pass
-        memory = (_FORGOTTEN / low_pass.decay if low_pass.sections else arm.tick) + 1.0 / arm.sensor.sampling
-        swing = SWING * arm.inner.swing if isinstance(arm.inner, PositionLoop) else 0.0
+        memory = (
+            _FORGETTING_DECAYS / low_pass.decay if low_pass.sections else arm.tick
+        ) + 1.0 / arm.sensor.sampling
+        swing = SWING_FRACTION * arm.inner.swing if isinstance(arm.inner, PositionLoop) else 0.0
         servo = arm.inner if isinstance(arm.inner, ServoLoop) else None
         E, e0, e1, c = followed(arm)
         step = arm.sensor.resolution or 0.0
@@ -169,23 +168,23 @@ class Gains(Table):
             "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
             "approach": self.approach, "level": 2.0 * self.level, "bias": self.bias, "drift": self.drift,
             "noise": arm.sensor.noise, "resolution": step,
-            "least": max((0.25 * arm.sensor.noise) ** 2, step**2 / 12.0, (_DIGIT * self.force) ** 2),
+            "least": max((0.25 * arm.sensor.noise) ** 2, step**2 / 12.0, (_MIN_NOISE_FRACTION * self.force) ** 2),
             "memory": memory, "blind": memory + swing,
             "period": max(1.0 / arm.sensor.sampling, arm.tick), "E": E, "e0": e0, "e1": e1, "c": c,
-            "d": 0.0 if low_pass.sections else 1.0, "z": _SURE, "eps": _ROOM, "full_scale": arm.sensor.full_scale,
-            "force_limit": self.force_limit, "locking": 1.0, "bounding": 1.0, "backing": 1.0,
+            "d": 0.0 if low_pass.sections else 1.0, "z": _BOUND_DEVIATIONS, "eps": _BOUND_MARGIN,
+            "full_scale": arm.sensor.full_scale, "force_limit": self.force_limit,
         }  # fmt: skip
         return Cautious(**numbers)
 
     @cached_property
     def digest(self) -> str:
-        """Of everything that a proof rests on: arm, rate, lag, law and gain."""
+        """SHA-256 of everything that a proof rests on: arm, rate, lag, law and gain."""
         known = {key: value for key, value in msgspec.to_builtins(self).items() if key != "slide"}
         return hashlib.sha256(msgspec.json.encode(known)).hexdigest()
 
     def to_toml(self) -> str:
         """Text of the gains file."""
-        return "# Made by palpate tune; ForceLoop.load takes it.\n" + _toml(msgspec.to_builtins(self))
+        return "# Made by palpate tune; ForceLoop.load takes it.\n" + as_toml(msgspec.to_builtins(self))
 
 
 def load_gains(path: Path) -> Gains:
@@ -220,7 +219,7 @@ def gains_for(
     theta = known_lag(arm) if theta is None else theta
     cap = arm.limits.stiffness if cap is None else cap
     approach = approach_speed(arm, force, theta, cap)
-    if approach < CREEP:
+    if approach < MIN_APPROACH:
         raise InputError(
             f"surfaces of up to {cap:g} N/m allow an approach of {approach:.2g} m/s, which comes nowhere; lower the "
             "stiffness cap, or press harder"
@@ -234,7 +233,7 @@ def gains_for(
 
 def free_motion_level(arm: Arm, force: float) -> float:
     """Largest force that a sensor is taken to show in free motion [N], for a desired force [N]."""
-    return max(LEVEL * force, 2.0 * arm.sensor.noise)
+    return max(LEVEL_FRACTION * force, 2.0 * arm.sensor.noise)
 
 
 def known_lag(arm: Arm) -> float:
@@ -244,10 +243,10 @@ def known_lag(arm: Arm) -> float:
         InputError: a lag of so many ticks that the loop is to be run slower.
     """
     theta = _known_lag(_any_noise(arm))
-    if theta * arm.rate > LONGEST:
+    if theta * arm.rate > MAX_LAG_TICKS:
         raise InputError(
-            f"{arm.title}: the loop's lag of {theta:.3g} s is {theta * arm.rate:.3g} ticks; at most {LONGEST} are "
-            "taken: check [inner], or run the force loop slower"
+            f"{arm.title}: the loop's lag of {theta:.3g} s is {theta * arm.rate:.3g} ticks; at most {MAX_LAG_TICKS} "
+            "are taken: check [inner], or run the force loop slower"
         )
     return theta
 
@@ -277,11 +276,11 @@ def approach_speed(arm: Arm, force: float, theta: float, cap: float, alpha: floa
         cap: K_cap of the surface [N/m].
         alpha: gain in units of 1/theta.
     """
-    speed = min(arm.limits.speed, _BRISK * alpha * force / (theta * arm.seen(cap)))
+    speed = min(arm.limits.speed, _APPROACH_FACTOR * alpha * force / (theta * arm.seen(cap)))
     mass = arm.inner.mass
     if isinstance(arm.inner, ServoLoop):
         return min(speed, force / touch_peak(arm.inner, theta, cap))
-    return speed if mass is None else min(speed, _TOUCH * force / float(np.sqrt(cap * mass)))
+    return speed if mass is None else min(speed, _MOMENTUM_FRACTION * force / float(np.sqrt(cap * mass)))
 
 
 def touch_peak(servo: ServoLoop, theta: float, stiffness: float) -> float:
@@ -291,15 +290,18 @@ def touch_peak(servo: ServoLoop, theta: float, stiffness: float) -> float:
     """
     from scipy.linalg import expm
 
-    n, own = 200, servo.stiffness / servo.mass
+    n = 200
+    rate_squared = servo.stiffness / servo.mass
     rates = np.zeros((4, 4))  # of x, xdot, x_c and the constant speed of the command
     rates[0, 1] = rates[2, 3] = 1.0
-    rates[1, :3] = -own - stiffness / servo.mass, -servo.damping / servo.mass, own
-    step, state, most = expm(theta / n * rates), np.array([0.0, 1.0, servo.lag, 1.0]), 0.0
+    rates[1, :3] = -rate_squared - stiffness / servo.mass, -servo.damping / servo.mass, rate_squared
+    step = expm(theta / n * rates)
+    state = np.array([0.0, 1.0, servo.lag, 1.0])
+    peak = 0.0
     for _ in range(n):
         state = step @ state
-        most = max(most, stiffness * float(state[0]))
-    return most
+        peak = max(peak, stiffness * float(state[0]))
+    return peak
 
 
 def followed(arm: Arm) -> tuple[Mat3, Vec3, Vec3, Vec3]:
@@ -313,26 +315,12 @@ def followed(arm: Arm) -> tuple[Mat3, Vec3, Vec3, Vec3]:
     both = expm(M)
     wide = np.zeros((3, 3))
     wide[:n, :n] = both[:n, :n]
-    full, ramp = both[:n, n], both[:n, n + 1]
-    return Mat3(*map(_three, wide)), _three(full - ramp), _three(ramp), _three(c)
+    full = both[:n, n]
+    ramp = both[:n, n + 1]
+    E = Mat3(*map(padded_vector, wide))
+    return E, padded_vector(full - ramp), padded_vector(ramp), padded_vector(c)
 
 
-def _three(values: Array) -> Vec3:
+def padded_vector(values: Array) -> Vec3:
+    """Up to three numbers as a vector, zeros behind them."""
     return Vec3(*(float(v) for v in np.concatenate([values, np.zeros(3 - len(values))])))
-
-
-def _toml(table: dict[str, Any], path: str = "") -> str:
-    plain = {k: v for k, v in table.items() if not isinstance(v, dict) and v is not None}
-    lines = [f"[{path}]"] if path and plain else []
-    lines += [f"{key} = {_value(value)}" for key, value in plain.items()]
-    text = "\n".join(lines) + "\n\n" if lines else ""
-    inner = (_toml(v, f"{path}.{k}" if path else k) for k, v in table.items() if isinstance(v, dict))
-    return text + "".join(inner)
-
-
-def _value(value: Any) -> str:
-    return (
-        msgspec.json.encode(value).decode()
-        if isinstance(value, str)
-        else repr(list(value) if isinstance(value, tuple) else value)
-    )

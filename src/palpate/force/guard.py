@@ -1,13 +1,16 @@
 """The guard around the force law: readings that are none, when the tip stops or withdraws, a last check of speed."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from palpate._jit import law, part
-from palpate.force.backstop import MOST
+import numpy as np
+
+from palpate._jit import law, part, reader, writer
+from palpate._jit.overloads import leaves, places
+from palpate.arrays import Array
 from palpate.force.contact_estimate import ContactEstimate
 from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch
 from palpate.force.law import Cautious, CautiousState
-from palpate.force.stage import LEARNING, LOCKED, follows_no_tip
+from palpate.force.stage import LEARNING, LOCKED, MOST, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
 
 FINE, BLIND, STALE, SATURATED, LIMITED, LATE, UNREACHED, PULLED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
@@ -194,8 +197,9 @@ def restart(law, state):
         law.period / law.tick, w.steepest,
     )  # fmt: skip
     return CautiousState(
-        s.ticks, s.desired, watch, s.follow, s.stage, s.estimate, s.starts, s.bound, state.backstop, s.pace
-    )
+        s.ticks, s.desired, watch, s.follow, s.stage, s.estimate, s.starts, s.bound, state.backstop, s.pace,
+        s.recall,
+    )  # fmt: skip
 
 
 @law
@@ -205,5 +209,27 @@ def after_gap(state):
     estimate = ContactEstimate(k.slow, k.fast, 0.0, k.origin, k.shown, k.value, k.std)
     return CautiousState(
         state.ticks, state.desired, state.watch, state.follow, state.stage, estimate, state.starts, state.bound,
-        state.backstop, state.pace,
+        state.backstop, state.pace, state.recall,
     )  # fmt: skip
+
+
+def flatten(tree: Any) -> Array:
+    """Every number of nested tuples, in their order, shape (n,)."""
+    return np.array(list(leaves(tree)))
+
+
+law_in = reader(Cautious)
+state_in = reader(CautiousState)
+put_state = writer(CautiousState)
+guard_in = reader(SafetyState)
+put_guard = writer(SafetyState)
+
+_PLACES = places(CautiousState)
+STATE = len(_PLACES)
+"""Numbers of a state."""
+VARIANCE, REST, DRIFT = (_PLACES.index(("watch", name)) for name in ("variance", "rest", "drift"))
+PHASE = _PLACES.index(("stage", "phase"))
+VALUE, STD = (_PLACES.index(("estimate", name, "x")) for name in ("value", "std"))
+BOUND = _PLACES.index(("bound", "used"))
+GUARD, TROUBLE = len(places(SafetyState)), STATE + places(SafetyState).index(("trouble",))
+"""Numbers of a guard's state behind it, and the place of the trouble."""

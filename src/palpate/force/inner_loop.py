@@ -20,15 +20,15 @@ from palpate.signals.types import NORMAL
 
 BLOCKS = 8
 """Parts of a log whose scores tell how far each number may be off, whatever the noise's colour."""
-FEWEST = 50 * BLOCKS
+MIN_ROWS = 50 * BLOCKS
 """Samples of a log."""
-TOLERANCE = 0.25
+MAX_HALF_WIDTH = 0.25
 """Largest half-width of a number that counts as identified, as a share of its value: as for `palpate identify`."""
 _STARTS = ((3.0, 1.0), (10.0, 0.7), (30.0, 0.7), (5.0, 4.0))
 """w/2 pi [Hz] and z from which a fit starts, a servo's last; the delay starts from what is left of the whole lag."""
 _THETA_STEPS = (1e-3, 1e-3, 1e-5, 1e-3)
-"""Of log w, log z, delay [s] and log K_s, for the slope of theta."""
-ONE_MASS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
+"""Steps of log w, log z, delay [s] and log K_s, for the slope of theta."""
+ONE_MASS_ERRORS = {"lag": 0.015, "stiffness": 0.006, "delay": 0.08, "theta": 0.025}
 """Deviations by which one mass misses an arm of several joints: shares of the number, of the delay of m/D.
 Chosen on 79 logs of the kind of `benchmarks/arms/servo_logs.py`, which counts on others how often they hold."""
 
@@ -47,7 +47,7 @@ class LoopParameter:
         return 0.5 * (self.high - self.low)
 
     def to_json(self) -> dict[str, object]:
-        """As plain JSON values."""
+        """Values and intervals as plain JSON values."""
         return {"value": self.value, "ci95": [self.low, self.high]}
 
     def beside(self, std: float) -> LoopParameter:
@@ -98,7 +98,7 @@ class InnerLoop:
     stiffness: LoopParameter | None
 
     def to_json(self) -> dict[str, object]:
-        """As plain JSON values."""
+        """Values and intervals as plain JSON values."""
         named = {
             "bandwidth_hz": self.bandwidth,
             "damping": self.damping,
@@ -124,15 +124,18 @@ class InnerLoop:
                 f"kind {arm.kind}: record a push and name the column of its force with --push, which makes it "
                 "a servo, or set [inner] by hand"
             )
-        own = {name: getattr(self, name) for name in ("bandwidth", "damping", "delay")}
-        ends = {f"{name}_interval": (p.low, p.high) for name, p in own.items()}
-        inner = msgspec.structs.replace(arm.inner, **{name: p.value for name, p in own.items()}, **ends)
+        parameters = {name: getattr(self, name) for name in ("bandwidth", "damping", "delay")}
+        ends = {f"{name}_interval": (p.low, p.high) for name, p in parameters.items()}
+        inner = msgspec.structs.replace(
+            arm.inner, **{name: p.value for name, p in parameters.items()}, **ends
+        )
         return msgspec.structs.replace(arm, inner=inner, title=title)
 
     def _servo(self, shift: Array) -> ServoLoop:
         """The servo, its log w, log z, delay and log K_s shifted by so much, shape (4,)."""
         assert self.stiffness is not None
-        w, z = 2.0 * pi * self.bandwidth.value * exp(shift[0]), self.damping.value * exp(shift[1])
+        w = 2.0 * pi * self.bandwidth.value * exp(shift[0])
+        z = self.damping.value * exp(shift[1])
         K = self.stiffness.value * exp(shift[3])
         delay = max(self.delay.value + float(shift[2]), 0.0)
         return ServoLoop(mass=K / w**2, stiffness=K, damping=2.0 * z / w * K, delay=delay)
@@ -144,17 +147,18 @@ class InnerLoop:
             InputError: an interval wider than 25 % of it.
         """
         K = worst_stiffness(arm)
-        value, slope = yielding_lag(arm, self._servo(np.zeros(4)), K), np.empty(4)
+        value = yielding_lag(arm, self._servo(np.zeros(4)), K)
+        slope = np.empty(4)
         for i, step in enumerate(_THETA_STEPS):
             ends = (yielding_lag(arm, self._servo(sign * step * np.eye(4)[i]), K) for sign in (1.0, -1.0))
             slope[i] = (next(ends) - next(ends)) / (2.0 * step)
         half = self.errors.half(slope)
-        if half > TOLERANCE * value:
+        if half > MAX_HALF_WIDTH * value:
             raise InputError(
                 f"{arm.title}: the lag of the force loop is {1e3 * value:.3g} +- {1e3 * half:.2g} ms; record steps, or "
                 f"a sweep to {self.bandwidth.value:.2g} Hz and more, for longer"
             )
-        return LoopParameter(value, value - half, value + half).beside(ONE_MASS["theta"] * value)
+        return LoopParameter(value, value - half, value + half).beside(ONE_MASS_ERRORS["theta"] * value)
 
 
 # More than five arguments: the columns of a log, and its name.
@@ -179,18 +183,20 @@ def identify_inner_loop(
     log_ = _Log.of(time, command, position, force, where)
     p = _fit_loop(log_)
     errors, best, gain_std = _errors(log_, p, [_fit_loop(part, p) for part in log_.cut(2)])
-    w, z, late, gain = exp(p[0]), exp(p[1]), float(p[2]), float(best[0])
+    w = exp(p[0])
+    z = exp(p[1])
+    late = float(p[2])
+    gain = float(best[0])
     half = errors.half(np.eye(len(errors.halves))[2])
-    delay, lag = (
-        LoopParameter(late, max(late - half, 0.0), late + half),
-        errors.factor(2.0 * z / w, -1.0, 1.0),
-    )
+    delay = LoopParameter(late, max(late - half, 0.0), late + half)
+    lag = errors.factor(2.0 * z / w, -1.0, 1.0)
     stiffness = None
     if force is not None:
         K = 1.0 / abs(float(best[4]))
-        stiffness = errors.factor(K, 0.0, 0.0, 0.0, 1.0).beside(ONE_MASS["stiffness"] * K)
-        delay, lag = delay.beside(ONE_MASS["delay"] * 0.5 / (z * w)), lag.beside(ONE_MASS["lag"] * lag.value)
-    found = InnerLoop(
+        stiffness = errors.factor(K, 0.0, 0.0, 0.0, 1.0).beside(ONE_MASS_ERRORS["stiffness"] * K)
+        delay = delay.beside(ONE_MASS_ERRORS["delay"] * 0.5 / (z * w))
+        lag = lag.beside(ONE_MASS_ERRORS["lag"] * lag.value)
+    loop = InnerLoop(
         bandwidth=errors.factor(w / (2.0 * pi), 1.0),
         damping=errors.factor(z, 0.0, 1.0),
         delay=delay,
@@ -201,35 +207,35 @@ def identify_inner_loop(
         errors=errors,
         stiffness=stiffness,
     )
-    _check(found, where)
-    return found
+    _check(loop, where)
+    return loop
 
 
-def _check(found: InnerLoop, where: str) -> None:
-    if found.explained < 0.5:
+def _check(loop: InnerLoop, where: str) -> None:
+    if loop.explained < 0.5:
         raise InputError(
-            f"{where}: a second-order inner loop explains {100.0 * max(found.explained, 0.0):.0f} % of how the "
+            f"{where}: a second-order inner loop explains {100.0 * max(loop.explained, 0.0):.0f} % of how the "
             "position lags the command, so it is none; check that both columns are of one axis, in free motion and "
             "below the speed limit"
         )
-    if abs(found.gain.value - 1.0) > TOLERANCE:
+    if abs(loop.gain.value - 1.0) > MAX_HALF_WIDTH:
         raise InputError(
-            f"{where}: the position moves {found.gain.value:.4g} times as far as the command; name the units of both "
+            f"{where}: the position moves {loop.gain.value:.4g} times as far as the command; name the units of both "
             "(as --command x_mm:mm), or check that both are of one axis"
         )
-    lag = found.lag.value + found.delay.value
-    sizes = {"bandwidth": found.bandwidth.value, "damping": found.damping.value, "delay": lag}
-    sizes = sizes if found.stiffness is None else {"lag": found.lag.value}  # theta counts the rest of a servo
-    wide = [name for name, size in sizes.items() if getattr(found, name).half > TOLERANCE * size]
+    lag = loop.lag.value + loop.delay.value
+    sizes = {"bandwidth": loop.bandwidth.value, "damping": loop.damping.value, "delay": lag}
+    sizes = sizes if loop.stiffness is None else {"lag": loop.lag.value}  # theta counts the rest of a servo
+    wide = [name for name, size in sizes.items() if getattr(loop, name).half > MAX_HALF_WIDTH * size]
     if wide:
         raise InputError(
-            f"{where}: its motion does not tell {', '.join(wide)} to {100.0 * TOLERANCE:.0f} %; record steps, or a "
-            f"sweep up to {2.0 * found.bandwidth.value:.2g} Hz and more, in free motion, for longer"
+            f"{where}: its motion does not tell {', '.join(wide)} to {100.0 * MAX_HALF_WIDTH:.0f} %; record steps, or "
+            f"a sweep up to {2.0 * loop.bandwidth.value:.2g} Hz and more, in free motion, for longer"
         )
-    if found.stiffness is not None and found.stiffness.half > TOLERANCE * found.stiffness.value:
+    if loop.stiffness is not None and loop.stiffness.half > MAX_HALF_WIDTH * loop.stiffness.value:
         raise InputError(
-            f"{where}: its push does not tell how the servo yields to {100.0 * TOLERANCE:.0f} %; push harder and for "
-            "longer, or leave --push out for an arm whose encoders do not show it"
+            f"{where}: its push does not tell how the servo yields to {100.0 * MAX_HALF_WIDTH:.0f} %; push harder and "
+            "for longer, or leave --push out for an arm whose encoders do not show it"
         )
 
 
@@ -248,8 +254,8 @@ class _Log:
         )
         if not all(np.isfinite(a).all() for a in (t, u, x, f)):
             raise InputError(f"{where}: a row has no number; leave it out (--start, --end), or fill the gap")
-        if len(t) < FEWEST:
-            raise InputError(f"{where}: {len(t)} rows are too few; record at least {FEWEST}")
+        if len(t) < MIN_ROWS:
+            raise InputError(f"{where}: {len(t)} rows are too few; record at least {MIN_ROWS}")
         tick = float(t[-1] - t[0]) / (len(t) - 1)
         if not tick > 0.0 or np.abs(t - t[0] - tick * np.arange(len(t))).max() > 0.5 * tick:
             raise InputError(
@@ -298,21 +304,21 @@ def _fit_loop(log_: _Log, start: Array | None = None) -> Array:
     high = [log(pi / log_.tick), log(20.0), max(longest, 2.0 * log_.tick)]
     starts = [start] if start is not None else [_start(log_, f, z) for f, z in _STARTS]
     scale = [0.1, 0.1, log_.tick]
-    found = [
+    fits = [
         least_squares(
             lambda p: _residual(log_, p), np.clip(s, np.array(low) + 1e-9, np.array(high) - 1e-9),
             bounds=(low, high), x_scale=scale, diff_step=1e-5, max_nfev=60, gtol=None,
         )
         for s in starts
     ]  # fmt: skip
-    return np.asarray(min(found, key=lambda f: float(f.cost)).x)
+    return np.asarray(min(fits, key=lambda f: float(f.cost)).x)
 
 
 def _start(log_: _Log, hertz: float, z: float) -> Array:
     """A start of this bandwidth, late by what is left of the lag that a straight line through the rates tells."""
     rate = np.gradient(log_.command, log_.tick)
-    whole = max(float(rate @ log_.behind / max(float(rate @ rate), 1e-300)), 0.0)
-    return np.array([log(2.0 * pi * hertz), log(z), max(whole - z / (pi * hertz), 0.0)])
+    lag = max(float(rate @ log_.behind / max(float(rate @ rate), 1e-300)), 0.0)
+    return np.array([log(2.0 * pi * hertz), log(z), max(lag - z / (pi * hertz), 0.0)])
 
 
 def _residual(log_: _Log, p: Array) -> Array:
@@ -328,34 +334,38 @@ def _columns(log_: _Log, p: Array) -> Array:
     """
     from scipy.signal import lfilter
 
-    w, z, late = exp(p[0]), exp(p[1]), float(p[2])
-    A, b = np.array([[0.0, w], [-w, -2.0 * z * w]]), np.array([0.0, w])
-    whole, part = divmod(late / log_.tick, 1.0)
+    w = exp(p[0])
+    z = exp(p[1])
+    late = float(p[2])
+    A = np.array([[0.0, w], [-w, -2.0 * z * w]])
+    b = np.array([0.0, w])
+    ticks_late, fraction = divmod(late / log_.tick, 1.0)
     E, early = zero_order_hold(A, b, log_.tick)
     # Within a tick the command before acts for `part` of it, and then the newer one.
-    later = zero_order_hold(A, b, (1.0 - part) * log_.tick)[1]
+    later = zero_order_hold(A, b, (1.0 - fraction) * log_.tick)[1]
     denominator = np.array([1.0, -E[0, 0] - E[1, 1], E[0, 0] * E[1, 1] - E[0, 1] * E[1, 0]])
     first = _numerator(E, early - later)
     second = _numerator(E, later)
     n = len(log_.command)
-    shift = int(whole)
+    shift = int(ticks_late)
     lacking = max(shift + 1 - len(log_.before), 0)
     known = np.concatenate([np.full(lacking, log_.before[0]), log_.before, log_.command])
     end = len(known) - shift
-    u, older = known[end - n : end], known[end - n - 1 : end - 1]
+    u = known[end - n : end]
+    older = known[end - n - 1 : end - 1]
     answer = lfilter(second, denominator, u) + lfilter(first, denominator, older)
     kick = np.zeros(n)
     kick[0] = 1.0
     free = lfilter([1.0], denominator, kick)
     columns = [answer, np.ones(n), free, np.concatenate([[0.0], free[:-1]])]
     if log_.force is not None:
-        given = lfilter(_numerator(E, early), denominator, log_.force)
-        columns += [given, np.gradient(given, log_.tick)]
+        pushed = lfilter(_numerator(E, early), denominator, log_.force)
+        columns += [pushed, np.gradient(pushed, log_.tick)]
     return np.column_stack(columns)
 
 
 def _numerator(E: Array, b: Array) -> Array:
-    """Of x in x' = E x + b u, the first number of x being read before the step: by powers of 1/z."""
+    """Numerator of x' = E x + b u by powers of 1/z; the first number of x is read before a step."""
     return np.array([0.0, b[0], E[0, 1] * b[1] - E[1, 1] * b[0]])
 
 
@@ -368,10 +378,12 @@ def _errors(log_: _Log, p: Array, halves: list[Array]) -> tuple[FitErrors, Array
     scores = J / size * (log_.position - columns @ best)[:, None]
     influence = scores @ np.linalg.pinv((J / size).T @ (J / size)) / size
     even = _blocks(influence, np.ones(len(scores)))
-    covariance, difference = even[:3, :3], halves[0] - halves[1]
+    covariance = even[:3, :3]
+    difference = halves[0] - halves[1]
     if log_.force is not None:
         slope = -1.0 / best[4]  # of log K_s in the compliance
-        covariance, difference = np.zeros((4, 4)), np.append(difference, 0.0)
+        covariance = np.zeros((4, 4))
+        difference = np.append(difference, 0.0)
         covariance[:3, :3] = even[:3, :3]
         covariance[3, 3] = slope**2 * _blocks(influence, columns[:, 4] ** 2)[7, 7]
     errors = FitErrors(covariance, difference)
@@ -381,18 +393,19 @@ def _errors(log_: _Log, p: Array, halves: list[Array]) -> tuple[FitErrors, Array
 
 def _blocks(influence: Array, energy: Array) -> Array:
     """Covariance of what the sums of influences over blocks are, each of which has the same share of the energy."""
-    share = np.cumsum(energy) / energy.sum()
-    edges = np.searchsorted(share, np.arange(1, BLOCKS) / BLOCKS)
+    fraction = np.cumsum(energy) / energy.sum()
+    edges = np.searchsorted(fraction, np.arange(1, BLOCKS) / BLOCKS)
     sums = np.array([part.sum(axis=0) for part in np.split(influence, edges)])
     return np.asarray(sums.T @ sums * BLOCKS / (BLOCKS - 1.0))
 
 
 def _slopes(log_: _Log, p: Array, best: Array) -> list[Array]:
     """Change of the fitted position with each nonlinear number, shapes (n,)."""
-    found = []
+    slopes = []
     for i, step in enumerate((1e-5, 1e-5, 1e-3 * log_.tick)):
-        ahead, behind = p.copy(), p.copy()
+        ahead = p.copy()
+        behind = p.copy()
         ahead[i] += step
         behind[i] -= min(step, p[2]) if i == 2 else step
-        found.append((_columns(log_, ahead) - _columns(log_, behind)) @ best / (ahead[i] - behind[i]))
-    return found
+        slopes.append((_columns(log_, ahead) - _columns(log_, behind)) @ best / (ahead[i] - behind[i]))
+    return slopes

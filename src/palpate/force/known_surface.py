@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeGuard
 
 from palpate.errors import InputError
 from palpate.force.arm import Arm
-from palpate.force.lag import SOFTEST
+from palpate.force.lag import MIN_STIFFNESS
 
 _OF_IDENTIFY = " (to palpate identify, whose --json palpate tune takes)"
 """Behind what an identification asks for."""
@@ -66,7 +66,7 @@ class Known:
         return cls(stiffness, assumed=none).with_damping_up_to(damping)
 
     def with_damping_up_to(self, highest: float | None) -> Known:
-        """The same with a stated highest B [N s/m]; as it is when None.
+        """The surface with a stated highest B [N s/m]; unchanged if None.
 
         Raises:
             InputError: below 0.
@@ -93,15 +93,13 @@ class Known:
         """
         if not self.in_series or arm.kind != "position":
             return self
-        seen = self.stiffness[1]
-        alone = min(arm.surface(seen), max(arm.limits.stiffness, seen))
-        why = (
-            f"surface and arm in series have up to {seen:.4g} N/m, the arm alone {arm.series / 1e3:.3g} kN/m"
-        )
+        in_series = self.stiffness[1]
+        alone = min(arm.surface(in_series), max(arm.limits.stiffness, in_series))
+        why = f"surface and arm in series have up to {in_series:.4g} N/m, the arm alone {arm.series / 1e3:.3g} kN/m"
         return replace(
             self,
             stiffness=(self.stiffness[0], alone),
-            damping=(self.damping[0], self.damping[1] * (alone / seen) ** 2),
+            damping=(self.damping[0], self.damping[1] * (alone / in_series) ** 2),
             assumed={**self.assumed, "stiffness": Assumed(alone, "N/m", why)},
             in_series=False,
         )
@@ -139,10 +137,11 @@ def known_from(found: Mapping[str, Any], source: str) -> Known:
     if not high > 0.0:
         raise InputError(f"{source}: a stiffness of {low:g} to {high:g} N/m is none that one can press on")
     damping, assumed = _damping(parameters.get("B"), logs if isinstance(logs, list) else [])
-    value, warnings = K.get("value"), _warnings_of(found.get("warnings")) + _of_mass(parameters.get("M"))
+    value = K.get("value")
+    warnings = _warnings_of(found.get("warnings")) + _of_mass(parameters.get("M"))
     force = point.get("force_N") if isinstance(point, Mapping) else None
     return Known(
-        (max(low, SOFTEST), high + _relaxing(parameters)),
+        (max(low, MIN_STIFFNESS), high + _relaxing(parameters)),
         damping,
         float(value) if _is_number(value) else None,
         source,
@@ -160,7 +159,7 @@ def _damping(B: object, logs: list[Any]) -> tuple[tuple[float, float], dict[str,
         B: the parameter.
         logs: that it is pooled from; the widest of their intervals counts where the pooled B has none.
     """
-    each = [_of_unit(own["B"], "N s/m") for own in map(_parameters, logs) if "B" in own]
+    each = [_of_unit(log["B"], "N s/m") for log in map(_parameters, logs) if "B" in log]
     widest = [end for end in each if end is not None]
     interval = _of_unit(B, "N s/m")
     if interval is None and each and len(widest) == len(each):
@@ -168,7 +167,8 @@ def _damping(B: object, logs: list[Any]) -> tuple[tuple[float, float], dict[str,
     why = B.get("reason") or B.get("verdict") if isinstance(B, Mapping) else None
     if interval is None:
         return (0.0, inf), {"damping": Assumed(inf, "N s/m", str(why or "it has no B in N s/m"))}
-    low, high = max(interval[0], 0.0), max(interval[1], 0.0)
+    low = max(interval[0], 0.0)
+    high = max(interval[1], 0.0)
     if isinstance(B, Mapping) and _is_number(B.get("value")) and B.get("verdict") in (None, "identified"):
         return (low, high), {}
     text = f"the upper end of its 95 % interval, {interval[0]:.3g} to {interval[1]:.3g} N s/m"
@@ -190,8 +190,8 @@ def _of_mass(M: object) -> tuple[tuple[str, str], ...]:
 
 
 def _parameters(log: object) -> Mapping[str, Any]:
-    found = log.get("parameters") if isinstance(log, Mapping) else None
-    return found if isinstance(found, Mapping) else {}
+    parameters = log.get("parameters") if isinstance(log, Mapping) else None
+    return parameters if isinstance(parameters, Mapping) else {}
 
 
 def _of_unit(parameter: object, unit: str) -> tuple[float, float] | None:
@@ -208,10 +208,10 @@ def _relaxing(parameters: Mapping[str, Any]) -> float:
 
 def _warnings_of(warnings: object) -> tuple[tuple[str, str], ...]:
     """Warnings of an identification, as far as they are text."""
-    given = warnings if isinstance(warnings, list) else []
+    entries = warnings if isinstance(warnings, list) else []
     return tuple(
         (w["code"], w["text"] + (_OF_IDENTIFY if "--" in w["text"] else ""))
-        for w in given
+        for w in entries
         if isinstance(w, Mapping) and isinstance(w.get("code"), str) and isinstance(w.get("text"), str)
     )
 

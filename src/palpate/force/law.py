@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Mat3, Vec3, sqrt
-from palpate.force.backstop import MOST, Backstop, next_backstop
-from palpate.force.contact_estimate import ContactEstimate, first_estimate, next_estimate
+from palpate.force.contact_estimate import NOTHING, ContactEstimate, Fit, first_estimate, next_estimate
 from palpate.force.contact_evidence import (
     FREE_MOTION,
+    NO_STARTS,
+    Starts,
     Steepest,
     Watch,
     behind,
@@ -25,9 +26,8 @@ from palpate.force.contact_evidence import (
     tare,
     white,
 )
-from palpate.force.onset import NO_STARTS, Starts
-from palpate.force.regression import NOTHING, Fit
-from palpate.force.stage import STEP, Stage, is_false_touch, next_stage
+from palpate.force.outlier import REFUTED, Knowledge, Recall, next_recall
+from palpate.force.stage import MOST, STEP, Backstop, Stage, is_false_touch, next_backstop, next_stage
 from palpate.force.stiffness_bound import EARNED, Bound, Sure, next_bound
 
 SMOOTHING = 0.1
@@ -68,9 +68,6 @@ class Cautious(NamedTuple):
         eps: relative room of the bound.
         full_scale: of the sensor [N].
         force_limit: above which the tip withdraws [N].
-        locking: 1; 0 learns always.
-        bounding: 1; 0 takes the estimate itself.
-        backing: 1; 0 leaves the backstop out.
     """
 
     tick: float
@@ -102,9 +99,6 @@ class Cautious(NamedTuple):
     eps: float
     full_scale: float
     force_limit: float
-    locking: float
-    bounding: float
-    backing: float
 
     def start(self):
         """Free motion, with no estimate of a surface."""
@@ -113,23 +107,25 @@ class Cautious(NamedTuple):
         watch = Watch(
             0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variance, slow_variance, 0.0, 0.0, 0.0, 0.0, steepest
         )
-        return CautiousState(
-            0.0,
-            0.0,
-            watch,
-            Follow(ZERO3, 0.0, 0.0, 0.0, 0.0),
+        stage, estimate = (
             Stage(FREE_MOTION, 0.0, 0.0, 0.0),
             ContactEstimate(fit, fit, 0.0, 0.0, 0.0, ZERO3, ZERO3),
-            NO_STARTS,
-            Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0)),
-            Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            self.approach,
         )
+        bound = Bound(self.cap, self.cap, self.cap, 0.0, 0.0, Sure(0.0, 0.0, 0.0, self.approach, 0.0, 0.0))
+        backstop = Backstop(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        recall = Recall(0.0, Knowledge(watch, stage, estimate, bound, backstop))
+        follow = Follow(ZERO3, 0.0, 0.0, 0.0, 0.0)
+        return CautiousState(
+            0.0, 0.0, watch, follow, stage, estimate, NO_STARTS, bound, backstop, self.approach, recall
+        )  # fmt: skip
 
     def step(self, state, desired, force, position):
         """One tick: speed of the commanded position [m/s], from the forces [N] and the measured position [m]."""
         before = state.desired if state.ticks > 0.0 else desired
         follow = next_follow(self, state, position)
+        recall = next_recall(self, state, follow, force)
+        if recall.readings == REFUTED:
+            state = without_outliers(state)
         starts = next_starts(self, state, follow, force)
         watch = next_watch(self, state, starts, force)
         false_touch = is_false_touch(self, state, watch)
@@ -153,7 +149,7 @@ class Cautious(NamedTuple):
         most = self.speed if limit > EARNED * self.approach else limit
         speed, pace = lead_speed(self, state.pace, speed, bound.used, most)
         return speed, CautiousState(
-            state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace
+            state.ticks + 1.0, desired, watch, follow, stage, estimate, starts, bound, backstop, pace, recall
         )  # fmt: skip
 
     def stiffness_bound(self, state):
@@ -184,6 +180,17 @@ class CautiousState(NamedTuple):
     bound: Bound
     backstop: Backstop
     pace: float  # smoothed speed, which a servo's command leads [m/s]
+    recall: Recall
+
+
+@law
+def without_outliers(state):
+    """The state as it would be without the readings that were refuted."""
+    watch, stage, estimate, bound, backstop = state.recall.known
+    return CautiousState(
+        state.ticks, state.desired, watch, state.follow, stage, estimate, state.starts, bound, backstop, state.pace,
+        state.recall,
+    )  # fmt: skip
 
 
 @law

@@ -16,7 +16,7 @@ from palpate.arrays import Array
 EPS = float(np.finfo(np.float64).eps)
 _STEPS = 60
 _ROWS = 16
-"""Of a product at a time: below the size from which BLAS starts threads, which cost more than they bring here."""
+"""Rows of a product at a time: below the size from which BLAS starts threads, which cost more than they bring."""
 _MARGIN = 1e-9
 _HEAVIER, _HEAVIEST = 8.0, 1e13
 
@@ -43,7 +43,8 @@ def single(Phi: Array, weight: Array | None = None) -> Array | None:
 
 def weight_of(L: Array, Phi: Array) -> Array:
     """W with which Lyapunov's equation of Phi has L for an answer: near Phi, others have one as good by it."""
-    P, rate = L @ L.T, _rate(Phi) or 1.0
+    P = L @ L.T
+    rate = _rate(Phi) or 1.0
     return np.asarray(P - Phi.T @ P @ Phi / rate**2)
 
 
@@ -60,7 +61,8 @@ def _lyapunov_sum(A: Array, W: Array) -> Array:
     P = W
     for _ in range(_STEPS):
         more = A.T @ P @ A
-        P, A = P + more, A @ A
+        P = P + more
+        A = A @ A
         if np.trace(more) <= EPS * np.trace(P):
             break
     return P
@@ -89,7 +91,7 @@ def common(matrices: Sequence[Array], near: Array) -> Array | None:
 
 
 def common_beside(matrices: Sequence[Array], still: Array) -> Array | None:
-    """The same where all of these come near to a matrix that keeps one combination of the state for ever.
+    """L as of `common`, where all matrices come near to one that keeps one combination of the state for ever.
 
     With a gain, or a stiffness, of next to nothing the integrator stands still: P - Phi^T P Phi has to vanish in its
     direction r, so that P r is the left eigenvector l. P is then a block for all that l leaves out, and one number.
@@ -99,7 +101,8 @@ def common_beside(matrices: Sequence[Array], still: Array) -> Array | None:
         still: with one eigenvalue 1, all others inside the unit circle, shape (n, n).
     """
     U, _, Vt = np.linalg.svd(still - np.eye(len(still)))
-    left, right = U[:, -1], Vt[-1]
+    left = U[:, -1]
+    right = Vt[-1]
     S = np.column_stack([U[:, :-1], right / (left @ right)])
     into = np.asarray(np.linalg.inv(S))
     start = single((into @ still @ S)[:-1, :-1])
@@ -128,7 +131,8 @@ def _interior(matrices: Sequence[Array], slack: Array, apart: int = 0) -> Array 
     Phi = np.array(matrices)
     n = Phi.shape[1]
     basis = _Symmetric.of(n, apart)
-    P, unit = 0.5 * np.eye(n), np.linalg.inv(np.linalg.cholesky(slack))
+    P = 0.5 * np.eye(n)
+    unit = np.linalg.inv(np.linalg.cholesky(slack))
     s = 2.0 * float(np.linalg.eigvalsh(unit @ (_map_through(P, Phi) - P) @ unit.T).max()) + 1.0
     weight = 1.0
     for _ in range(_STEPS):
@@ -167,14 +171,15 @@ class _Symmetric:
 
     @classmethod
     def of(cls, n: int, apart: int) -> _Symmetric:
-        """Of matrices of shape (n, n); see `_interior` for `apart`."""
+        """Coordinates of matrices of shape (n, n); see `_interior` for `apart`."""
         rows, columns = np.triu_indices(n)
         free = (columns < n - apart) | (rows == columns)
-        rows, columns = rows[free], columns[free]
+        rows = rows[free]
+        columns = columns[free]
         return cls(rows, columns, np.where(rows == columns, 0.5, np.sqrt(0.5)))
 
     def matrix(self, numbers: Array) -> Array:
-        """That has these coordinates, shape (n, n)."""
+        """The matrix that has these coordinates, shape (n, n)."""
         n = int(self.rows[-1]) + 1
         half = np.zeros((n, n))
         half[self.rows, self.columns] = self.unit * numbers
@@ -192,17 +197,19 @@ def _barrier(P: Array, s: float, Phi: Array, W: Array, basis: _Symmetric) -> tup
     With S the inverse of a constraint, T = S Phi^T and U = Phi T, its part of the Hessian is tr S E S F - tr T E T^T F
     - tr T F T^T E + tr U E U F for units E and F: of all constraints together, Kronecker squares.
     """
-    k, back = len(basis.rows), Phi.transpose(0, 2, 1)
+    k = len(basis.rows)
+    back = Phi.transpose(0, 2, 1)
     ends = np.linalg.inv(np.array([P, np.eye(len(P)) - P]))
     S = np.linalg.inv(_constraints(P, s, Phi, W))
     T = S @ back
     U = Phi @ T
     R = S @ W @ S
-    gradient, hessian = np.empty(k + 1), np.empty((k + 1, k + 1))
+    gradient = np.empty(k + 1)
+    hessian = np.empty((k + 1, k + 1))
     gradient[:k] = basis.inner(ends[1] - ends[0] - S.sum(axis=0) + U.sum(axis=0))
     gradient[k] = -np.sum(S * W)
-    own = basis.inner(basis.inner(_kronecker(np.concatenate([ends, S, U]), T)).transpose(1, 2, 0))
-    hessian[:k, :k] = 0.5 * (own + own.T)
+    block = basis.inner(basis.inner(_kronecker(np.concatenate([ends, S, U]), T)).transpose(1, 2, 0))
+    hessian[:k, :k] = 0.5 * (block + block.T)
     hessian[k, :k] = hessian[:k, k] = basis.inner((R - Phi @ R @ back).sum(axis=0))
     hessian[k, k] = np.sum(R * W)
     return gradient, hessian
@@ -211,7 +218,8 @@ def _barrier(P: Array, s: float, Phi: Array, W: Array, basis: _Symmetric) -> tup
 def _kronecker(squared: Array, twice: Array) -> Array:
     """Sum of all S x S less 2 T x T, shape (n, n, n, n), by products of long matrices."""
     n = squared.shape[-1]
-    a, b = squared.reshape(len(squared), -1), twice.reshape(len(twice), -1)
+    a = squared.reshape(len(squared), -1)
+    b = twice.reshape(len(twice), -1)
     both = np.empty((n * n, n * n))
     for row in range(0, n * n, _ROWS):
         rows = slice(row, row + _ROWS)
@@ -244,10 +252,11 @@ def _constraints(P: Array, s: float, Phi: Array, W: Array) -> Array:
 
 
 def _along(P: Array, s: float, step: tuple[Array, float], Phi: Array, W: Array) -> tuple[Array, float]:
-    """As far along a step as all constraints stay met."""
+    """Go along a step as far as all constraints stay met."""
     length = 1.0
     for _ in range(40):
-        Q, t = P + length * step[0], s + length * step[1]
+        Q = P + length * step[0]
+        t = s + length * step[1]
         if _positive(np.concatenate([[Q, np.eye(len(P)) - Q], _constraints(Q, t, Phi, W)])):
             return (Q, t) if length == 1.0 else (P + 0.9 * length * step[0], s + 0.9 * length * step[1])
         length *= 0.7
@@ -259,7 +268,7 @@ def _contracts(P: Array, Phi: Array) -> bool:
 
 
 def _positive(F: Array) -> bool:
-    """Whether all of these matrices are positive definite, shape (..., n, n)."""
+    """True if all of these matrices are positive definite, shape (..., n, n)."""
     try:
         np.linalg.cholesky(F)
     except np.linalg.LinAlgError:
@@ -273,7 +282,8 @@ def _balance(Phi: Array) -> Array:
     for _ in range(20):
         sized = np.abs(Phi / scale[:, None] * scale)
         np.fill_diagonal(sized, 0.0)
-        rows, columns = sized.sum(axis=1), sized.sum(axis=0)
+        rows = sized.sum(axis=1)
+        columns = sized.sum(axis=0)
         both = (rows > 0.0) & (columns > 0.0)
         scale[both] *= np.sqrt(rows[both] / columns[both])
     return scale

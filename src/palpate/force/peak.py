@@ -45,10 +45,10 @@ def peak_bound(gains: Gains, share: float = 1.0, lags: float = LAGS) -> float | 
             A[k, 1 : k + 2] = step * answer[k::-1]
             A[k, k + 1] += 1.0
         for n in range(1, longest + 1):
-            most = [(0.0, step)] + [(0.0, None)] * n
-            gained = -np.append(lead, np.ones(n))
-            found = linprog(gained, A_ub=A[:n, : n + 1], b_ub=np.full(n, step), bounds=most)
-            worst = max(worst, -float(found.fun) * _overshoot(corner))
+            limits = [(0.0, step)] + [(0.0, None)] * n
+            objective = -np.append(lead, np.ones(n))
+            solution = linprog(objective, A_ub=A[:n, : n + 1], b_ub=np.full(n, step), bounds=limits)
+            worst = max(worst, -float(solution.fun) * _overshoot(corner))
     return gains.force * worst
 
 

@@ -34,7 +34,8 @@ def law_for(arm: Arm, gain: float, bound: float) -> Law:
     inner = arm.inner
     if not isinstance(inner, ServoLoop):
         return Law(gain)
-    total, late = 1.0 + bound / inner.stiffness, SMOOTHING * inner.lag
+    total = 1.0 + bound / inner.stiffness
+    late = SMOOTHING * inner.lag
     lead = 0.5 * inner.lag / total * (1.0 + np.sqrt(max(1.0 - inner.inertia * total, 0.0)))
     return Law(gain, late / (late + arm.tick), float(lead + late) * arm.rate)
 
@@ -65,7 +66,7 @@ class SampledLoop:
     tip: ServoLoop | None = None
 
     def later(self, ticks: int) -> SampledLoop:
-        """The same loop with so many more ticks of delay."""
+        """This loop with more ticks of delay."""
         return replace(self, extra=self.extra + ticks)
 
     @cached_property
@@ -88,7 +89,7 @@ class SampledLoop:
 
     @cached_property
     def lines(self) -> tuple[int, int]:
-        """How many readings and how many commands, or torques beside a command, are kept."""
+        """Number of readings and of commands, or of torques beside a command, that are kept."""
         commands = self.delay + 1 if self.arm.kind == "torque" else max(self.delay, 1)
         return self.arm.sensor_ticks + self.arm.unsure_ticks + self.extra, commands
 
@@ -124,10 +125,12 @@ class SampledLoop:
         return {"w0": self.rate_unit, "k0": self.force_unit, "wf": rate ** (1.0 / order)}
 
     def rates(self, stiffness: float, damping: float) -> tuple[Array, Array]:
-        """Between ticks: zdot = A z + b u of tip and sensor; u is the command or the torque that is held."""
+        """A and b of zdot = A z + b u, of tip and sensor between ticks; u is the held command or torque."""
         F, f, _ = self.low_pass
-        n, w = len(f), self.rate_unit
-        A, b = np.zeros((2 + n, 2 + n)), np.zeros(2 + n)
+        n = len(f)
+        w = self.rate_unit
+        A = np.zeros((2 + n, 2 + n))
+        b = np.zeros(2 + n)
         inner = self.arm.inner
         A[0, 1] = w
         if isinstance(inner, PositionLoop):
@@ -135,7 +138,9 @@ class SampledLoop:
             A[1, 0], A[1, 1], b[1] = -square / w, -rate, square / w
         elif isinstance(inner, ServoLoop):
             servo = inner if self.tip is None else self.tip
-            K, D, m = servo.stiffness, servo.damping, servo.mass
+            K = servo.stiffness
+            D = servo.damping
+            m = servo.mass
             A[1, 0], A[1, 1], b[1] = -(K + stiffness) / m / w, -(D + damping) / m, K / m / w
         else:
             A[1, 0], A[1, 1] = -stiffness / inner.mass / w, -damping / inner.mass
@@ -175,9 +180,11 @@ class SampledLoop:
             law: of this tick.
             loss: as for `phi`.
         """
-        tick, inner = self.arm.tick, self.arm.inner
+        tick = self.arm.tick
+        inner = self.arm.inner
         p = len(e)
-        readings, delay = self.lines[0], self.delay
+        readings = self.lines[0]
+        delay = self.delay
         filtered, command = p + readings, p + readings + 1  # y, then x_c and those on their way
         Phi = np.zeros((self.size, self.size))
         # The readings: z's is read at this tick, joins the line, and comes out `readings` ticks later.
@@ -200,7 +207,8 @@ class SampledLoop:
         # What acts during this tick: the command sent `delay` ticks ago; with none, the one of this tick.
         acting = Phi[command] if delay == 0 else np.eye(self.size)[command + delay - 1]
         if isinstance(inner, TorqueLoop):
-            k, d = inner.stiffness / self.force_unit, inner.damping * self.rate_unit / self.force_unit
+            k = inner.stiffness / self.force_unit
+            d = inner.damping * self.rate_unit / self.force_unit
             acting = k * acting  # torque of a tick: K_p (x_c - x) - D xdot as read at this tick
             if delay:
                 return self._delayed_torque(Phi, E, e, k, d)
@@ -211,12 +219,13 @@ class SampledLoop:
         return Phi
 
     def _delayed_torque(self, Phi: Array, E: Array, e: Array, k: float, d: float) -> Array:
-        """Of a torque that is computed from this tick's readings and acts some ticks later.
+        """The matrix where the torque is computed from this tick's readings and acts some ticks later.
 
         The line after x_c then holds torques, not commands.
         """
         p = len(e)
-        readings, delay = self.lines[0], self.delay
+        readings = self.lines[0]
+        delay = self.delay
         command = p + readings + 1
         Phi[:p, :p] = E
         Phi[:p, command + delay] += e
@@ -256,6 +265,7 @@ def filter_of(low_pass: LowPass) -> tuple[Array, Array, Array]:
     a = np.real(np.poly(np.array(poles) / w))  # s^n + a1 s^(n-1) + ... in units of w
     A = np.diag(np.ones(n - 1), 1)
     A[-1] = -a[:0:-1]
-    b, c = np.zeros(n), np.zeros(n)
+    b = np.zeros(n)
+    c = np.zeros(n)
     b[-1], c[0] = w * a[-1], 1.0
     return w * A, b, c

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from palpate._vector import Mat3, Vec3
+from palpate._vector import Mat3
 from palpate.arrays import Array
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
+from palpate.force.gains import padded_vector
 from palpate.force.sampled_loop import filter_of, zero_order_hold
 from palpate.force.touching import Surface, World, compiled_touch
 
-STEP = {"position": 2e-4, "torque": 5e-5, "servo": 5e-5}
-"""Of the physics [s]."""
+PHYSICS_STEP = {"position": 2e-4, "torque": 5e-5, "servo": 5e-5}
+"""Time step of the physics [s]."""
 ENCODER = 1e-6
 """Resolution of the measured position [m]."""
 
@@ -30,14 +31,16 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0, resolution: float = 
         resolution: of a reading [N]; 0 for none.
     """
     inner = arm.inner
-    steps = max(round(arm.tick / STEP[arm.kind]), 1)
+    steps = max(round(arm.tick / PHYSICS_STEP[arm.kind]), 1)
     A, b, c = filter_of(arm.low_pass)
     E, e = zero_order_hold(A, b, arm.tick / steps)
     if isinstance(inner, PositionLoop):
         w = 2.0 * math.pi * inner.bandwidth
-        first, second = w * w, 2.0 * inner.damping * w
+        first = w * w
+        second = 2.0 * inner.damping * w
     else:
-        first, second = inner.mass, inner.damping
+        first = inner.mass
+        second = inner.damping
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return World(
@@ -50,9 +53,9 @@ def world_of(arm: Arm, *, noise: float, phase: float = 0.0, resolution: float = 
         tick=arm.tick,
         steps=steps,
         speed=float(arm.limits.speed),
-        E=Mat3(*(_three(row) for row in wide)),
-        e=_three(e),
-        c=_three(c),
+        E=Mat3(*map(padded_vector, wide)),
+        e=padded_vector(e),
+        c=padded_vector(c),
         d=0.0 if len(b) else 1.0,
         sampling=float(arm.sensor.sampling),
         phase=float(phase),
@@ -103,7 +106,3 @@ def pressed(
     line = np.zeros(world.delay + 1)
     compiled_touch.run(waiting, world, touched, control, -gap, desired, noise, false, line, out)
     return out
-
-
-def _three(values: Array) -> Vec3:
-    return Vec3(*(float(v) for v in np.concatenate([values, np.zeros(3 - len(values))])))

@@ -24,7 +24,7 @@ class Slide(Table):
     ratio: Annotated[float, Meta(gt=0, le=2)] = 0.85
     """Tangential over normal stiffness of the contact; 2 (1 - nu)/(2 - nu) of two spheres (Mindlin, 1949)."""
     acceleration: Positive = 0.4
-    """Of the tip along the surface [m/s^2]."""
+    """Largest acceleration of the tip along the surface [m/s^2]."""
     step: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
     """Highest step that is expected in the surface [m]: the slide is slow enough to stop on it."""
     touches: Annotated[float, Meta(ge=0, le=0.1)] = 0.0

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import sqrt
+from palpate.force.contact_estimate import AXIS_K, BOTH
 from palpate.force.contact_evidence import EDGE, EVIDENT, FEWEST, FREE_MOTION, PLAIN
-from palpate.force.regression import AXIS_K, BOTH
 from palpate.force.stage import LOCKED
 
 SHOWED = 3.0
@@ -149,9 +149,9 @@ def trail(law, sure, f):
 def from_slow(law, estimate, most):
     """K_u as all since the touch allows: never below the bound, and the cap unless a surface is plain to see."""
     p, sd = estimate.value, estimate.std
-    room = law.z * law.bounding / (1.0 + law.eps)
+    room = law.z / (1.0 + law.eps)
     plain = estimate.shown > 0.0 or p.x + p.y > PLAIN * sd.z or p.x > PLAIN * sd.x
-    if law.bounding > 0.0 and not plain:
+    if not plain:
         return most
     return min(max((1.0 + law.eps) * highest(law, p, room * sd.x, room * sd.z), law.floor), most)
 

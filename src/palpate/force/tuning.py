@@ -1,4 +1,4 @@
-"""From what is known of arm and surface to gains, what they will do, and where they are proved."""
+"""Tuning: gains from an arm and a surface, their predicted performance, and where they are proved."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -26,7 +26,7 @@ from palpate.force.expected import (
 )
 from palpate.force.gains import Gains, gains_for, known_lag
 from palpate.force.known_surface import Known
-from palpate.force.lag import SOFTEST, sum_of_lags
+from palpate.force.lag import MIN_STIFFNESS, sum_of_lags
 from palpate.force.peak import peak_bound
 from palpate.records import Result
 
@@ -56,7 +56,7 @@ class Tuning(Result):
 
     @property
     def proved(self) -> bool:
-        """Whether any surface is proved stable."""
+        """True if any surface is proved stable."""
         return any(c.kind != "adapting" for c in self.certificate.claims)
 
     @property
@@ -107,8 +107,9 @@ class Tuning(Result):
         return {"stiffness": list(self.domain), "overshoot": OVERSHOOT, "settling_s": seconds}
 
     def to_json(self) -> dict[str, Any]:
-        """As `palpate tune --json` prints it."""
-        gains, arm = self.gains, self.gains.arm
+        """The answer of `palpate tune --json`."""
+        gains = self.gains
+        arm = self.gains.arm
         held = next((c for c in self.certificate.claims if c.kind != "adapting"), None)
         adapting = next((c for c in self.certificate.claims if c.kind == "adapting"), None)
         known = self.known
@@ -158,7 +159,9 @@ class Tuning(Result):
                 for e in STIFFENING_AT
             ],
             "estimate": None if known is None else known.to_json(),
-            "assumed": {} if known is None else {name: own.to_json() for name, own in known.assumed.items()},
+            "assumed": {}
+            if known is None
+            else {name: assumed.to_json() for name, assumed in known.assumed.items()},
             "warnings": [{"code": code, "text": text} for code, text in self.warnings],
         }
 
@@ -172,7 +175,6 @@ def _number(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-# More than seven arguments: each is a given number of the surface, the press or the proof.
 def tune(
     arm: Arm,
     force: float,
@@ -180,7 +182,6 @@ def tune(
     *,
     cap: float | None = None,
     peak: float | None = None,
-    surface_speed: float | None = None,
     prove_adapting: bool = True,
     theta: float | None = None,
 ) -> Tuning:
@@ -192,7 +193,6 @@ def tune(
         known: of the surface; the arm's own limit of stiffness if nothing is.
         cap: stiffest surface that there may be, K + B/theta [N/m]; by default what is known, or the arm's limit.
         peak: highest force that is allowed at the touch [N].
-        surface_speed: of a surface that moves by itself [m/s].
         prove_adapting: prove the adapting law too, which takes a torque arm some two seconds.
         theta: whole lag of the loop [s]; the arm's own if left out.
 
@@ -206,22 +206,21 @@ def tune(
     stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
     limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
     gains = gains_for(arm, force, cap=stiffest, theta=theta, limit=limit)
-    soft = min(known.stiffness[0] if known else SOFTEST, stiffest)
+    soft = min(known.stiffness[0] if known else MIN_STIFFNESS, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
     nothing = Certificate(form=FORM, gains=gains, claims=())
     at = margins(gains, gains.seen_cap)
-    found = Tuning(gains, known, nothing, steps, at, (*farther, *_warnings(arm, known, at.gain)))
-    _check_peak(found, peak)
-    _check_surface_speed(gains, surface_speed)
-    found = replace(found, certificate=certify(gains, adapting=prove_adapting))
-    if not found.proved and isinstance(arm.inner, PositionLoop) and arm.inner.bandwidth_interval is not None:
+    tuning = Tuning(gains, known, nothing, steps, at, (*farther, *_warnings(arm, known, at.gain)))
+    _check_peak(tuning, peak)
+    tuning = replace(tuning, certificate=certify(gains, adapting=prove_adapting))
+    if not tuning.proved and isinstance(arm.inner, PositionLoop) and arm.inner.bandwidth_interval is not None:
         text = (
             "nothing is proved for all that the inner loop may be: record more steps or a wider sweep, so that its "
             "intervals are narrower"
         )
-        found = replace(found, warnings=(*found.warnings, ("inner-loop-wide", text)))
-    return found
+        tuning = replace(tuning, warnings=(*tuning.warnings, ("inner-loop-wide", text)))
+    return tuning
 
 
 def _check(force: float, known: Known | None, cap: float | None) -> None:
@@ -254,61 +253,48 @@ def _cap(arm: Arm, known: Known | None, cap: float | None, theta: float) -> floa
     return needed if cap is None else cap
 
 
-TIMES = 2.0
-"""Of the force of a log, up to which its stiffness stands for that of a press.
+MAX_FORCE_RATIO = 2.0
+"""Force of a press over that of a log, up to which the log's stiffness stands for that of the press.
 The stiffness of a force that is a power of the depth grows no faster than the force, and the adapting law's proof bears
 one that is twice as high."""
 
 
 def _beyond_log(arm: Arm, known: Known, force: float) -> tuple[tuple[str, str], ...]:
     """A warning if the force is far beyond that of the log: the arm's own limit of stiffness is the cap then."""
-    if known.force is None or force <= TIMES * known.force:
+    if known.force is None or force <= MAX_FORCE_RATIO * known.force:
         return ()
     text = (
         f"the log presses with {known.force:.3g} N, and {force:g} N are asked for: a surface may stiffen, so that the "
-        f"arm's own limit of {arm.limits.stiffness:.3g} N/m is the cap; record a press of {force / TIMES:.3g} N or "
-        "more, or give --stiffness-cap"
+        f"arm's own limit of {arm.limits.stiffness:.3g} N/m is the cap; record a press of "
+        f"{force / MAX_FORCE_RATIO:.3g} N or more, or give --stiffness-cap"
     )
     return (("force-beyond-log", text),)
 
 
 def _warnings(arm: Arm, known: Known | None, margin: float) -> list[tuple[str, str]]:
-    found = []
+    warnings = []
     if known is not None and known.source != "told" and known.stiffness[1] > margin * known.stiffness[0]:
         low, high = known.stiffness
         text = (
             f"the estimate's interval of {low:.4g} to {high:.4g} N/m is wider than the gain margin of {margin:.2g}: "
             f"excite more (palpate excite --stiffness {low:.3g}:{high:.3g} says how), or leave it to the law"
         )
-        found.append(("wide-estimate", text))
+        warnings.append(("wide-estimate", text))
     if arm.delay_ticks > arm.longest_delay * arm.rate + 1e-6:
         late = f"{1e3 * arm.longest_delay:.4g} ms"
         text = f"the delay of {late} is no whole number of ticks; {arm.delay_ticks} were taken"
-        found.append(("delay-rounded", text))
+        warnings.append(("delay-rounded", text))
     if known is not None:
-        found += known.warnings
-    return found
+        warnings += known.warnings
+    return warnings
 
 
-def _check_peak(found: Tuning, peak: float | None) -> None:
-    if peak is None or found.peak <= peak:
+def _check_peak(tuning: Tuning, peak: float | None) -> None:
+    if peak is None or tuning.peak <= peak:
         return
-    gains = found.gains
+    gains = tuning.gains
     raise InputError(
         f"no approach speed keeps the peak under {peak:g} N: at {1e3 * gains.approach:.3g} mm/s the press itself "
-        f"overshoots to {found.peak:.4g} N; ask for at most {gains.force * peak / found.peak:.4g} N, or allow "
-        f"{found.peak:.4g} N"
+        f"overshoots to {tuning.peak:.4g} N; ask for at most {gains.force * peak / tuning.peak:.4g} N, or allow "
+        f"{tuning.peak:.4g} N"
     )
-
-
-def _check_surface_speed(gains: Gains, speed: float | None) -> None:
-    if speed is None:
-        return
-    if not 0.0 <= speed < inf:
-        raise InputError(f"the surface's speed must be 0 m/s or more, got {speed:g} m/s")
-    most = gains.force * gains.gain
-    if speed >= most:
-        raise InputError(
-            f"contact with a surface that moves at {1e3 * speed:.4g} mm/s cannot be kept: at {gains.force:g} N on "
-            f"{gains.cap:.4g} N/m the limit is {1e3 * most:.4g} mm/s; press harder, or lower --stiffness-cap"
-        )

@@ -76,18 +76,18 @@ _CAUSES = {
     ),
     "each log": Cause("each log's own interval", "make each log longer", "A"),
 }
-_UNKNOWN = {"octave": "blocks", "press": "curvature"}
+_CAUSE_BY_SOURCE = {"octave": "blocks", "press": "curvature"}
 """The cause of a working point's interval that has no budget, by its source."""
 
 
 def cause_of(name: str | None, source: str = "") -> Cause:
     """The cause of that name in a budget; without a budget, that of a working point's source, `octave` or `press`."""
     if name is None:
-        return _CAUSES[_UNKNOWN[source]] if source in _UNKNOWN else NOISE
+        return _CAUSES[_CAUSE_BY_SOURCE[source]] if source in _CAUSE_BY_SOURCE else NOISE
     return _CAUSES.get(name, Cause(name, NOISE.remedy))
 
 
-BRIEF = "the longest contact has"
+BRIEF_CONTACT = "the longest contact has"
 """How the reason begins where the probe touches, and each contact is too short."""
 
 
@@ -115,8 +115,8 @@ class Code(Enum):
     )
     IRREGULAR_TIME = "The rows are not evenly spaced in time; both channels are resampled evenly."
     SATURATED = "A channel rests at its extreme while the other moves on: it is at the end of its range."
-    UNIT_GUESS = "A unit was taken from a column's name or values."
-    UNIT_STATED = "A unit was taken from the file's own statement."
+    UNIT_GUESS = "A unit was guessed: neither you nor the file states it."
+    UNIT_STATED = "A unit was taken from the file's own statement, or from a column's name."
     UNIT_DOUBTFUL = "A unit is probably wrong: the press is unusual by it, or the column's name has another."
     TIME_DOUBTFUL = "The time is doubtful in this unit: it counts rows, or its rate is beyond any log's."
     COLUMNS_SWAPPED = "A column was given a role that its own name contradicts."

@@ -1,14 +1,10 @@
-"""Filters that position and force pass through before a fit, and the noise of the position behind them.
+"""Filters that position and force pass through before a fit.
 
 f = M a + B v + K x holds for filtered channels exactly as for the raw ones, if the filter is the same on both. There
 are two. A state-variable filter (`Chain`) is put on both: five equal first-order lags in a row, F(s) = (w / (s + w))^5,
 whose inner states give the filtered signal and its first three derivatives without ever taking a difference. The force
 sensor's own low-pass and sampling (`SensorPath`), which the force went through before it came into the log, is put on
 the position alone: it cannot be mismatched, and the noise of the readings stays as white as the sensor made it.
-
-Two kinds of noise count: white noise of the position itself, and jumps of it, white noise of its increments, as a slow
-motion through a coarse encoder makes them. Power of the increments per sample at f of the sampling rate:
-jump^2 + white^2 4 sin^2(pi f); no motion of a robot reaches the upper frequencies, so there it is the noise's alone.
 """
 
 from dataclasses import dataclass, field
@@ -19,98 +15,11 @@ import numpy as np
 
 from palpate.arrays import Array, Indices
 from palpate.signals.low_pass import LowPass, Taps, read, taps
+from palpate.signals.position_noise import PositionNoise
 from palpate.signals.samples import convolve
 
-_FROM = 0.2
-"""Share of the sampling rate above which there is no motion."""
-_STEPS = 256
-"""Samples of a spectrum of the increments."""
-_IN_BAND = 0.5
-"""Share of the jumps' power that counts at the frequencies of a motion: `PositionNoise.variance` says why."""
-_FEWEST = 10
-"""Single counts that show what one is worth."""
-
-
-@dataclass(frozen=True)
-class PositionNoise:
-    """Deviations in the position's unit.
-
-    Args:
-        white: of a sample.
-        jump: of what is added from sample to sample.
-        count: what the position moves by when its encoder counts on; 0 where single counts are not seen.
-    """
-
-    white: float
-    jump: float
-    count: float = 0.0
-
-    def power(self, frequency: Array, dt: float) -> Array:
-        """Of a line of an orthonormal transform of the position, at frequencies [Hz].
-
-        An encoder's error never leaves its count: below the rate jump^2/count^2 of its steps it is flat, with a whole
-        variance of count^2/12.
-        """
-        step = 4 * np.sin(np.pi * np.minimum(frequency * dt, 0.5)) ** 2
-        jumps = _IN_BAND * self.jump**2 / np.maximum(step, 1e-12)
-        if self.count and self.jump:
-            jumps = np.minimum(jumps, self.count**4 / (24 * self.jump**2))
-        return np.asarray(self.white**2 + jumps)
-
-    def variance(self, weights: Array) -> float:
-        """Of a filtered rate or acceleration of this noise, by the filter's weights, shape (n,).
-
-        Of the jumps' power half is counted: an encoder's error never leaves its count, so its jumps undo each other,
-        and toward the low frequencies of a motion their power falls below what it is above.
-        """
-        steps = np.cumsum(weights)
-        return float(self.white**2 * weights @ weights + _IN_BAND * self.jump**2 * steps @ steps)
-
-
-NOISELESS = PositionNoise(0.0, 0.0)
-
-
-def position_noise(stretches: list[Array]) -> PositionNoise:
-    """Measure it on stretches of a position, each of shape (n_i,); those shorter than 16 samples say nothing."""
-    from scipy.optimize import nnls
-
-    power, weight = np.zeros(_STEPS // 2 + 1), 0.0
-    frequency = np.fft.rfftfreq(_STEPS)
-    for steps in (np.diff(stretch) for stretch in stretches if len(stretch) >= 16):
-        size = min(_STEPS, len(steps))
-        segments = np.lib.stride_tricks.sliding_window_view(steps, size)[:: max(size // 2, 1)]
-        window = np.hanning(size + 2)[1:-1]
-        own = (np.abs(np.fft.rfft(segments * window, axis=1)) ** 2).mean(axis=0) / float(window @ window)
-        power += len(steps) * np.interp(frequency, np.linspace(0, 0.5, len(own)), own)
-        weight += len(steps)
-    if weight == 0:
-        return NOISELESS
-    above = frequency >= _FROM
-    shape = np.column_stack([4 * np.sin(np.pi * frequency[above]) ** 2, np.ones(int(above.sum()))])
-    scale = float(np.mean(power[above])) or 1.0
-    found, _ = nnls(shape, power[above] / scale)
-    white, jump = np.sqrt(found * scale / weight)
-    return PositionNoise(float(white), float(jump), _count(stretches))
-
-
-def noise_within(position: Array, rows: Indices, spans: Indices) -> PositionNoise:
-    """That of a position, shape (n,), at rows in contact, and the number of each one's contact, shape (m,)."""
-    inside = np.split(rows, np.flatnonzero(np.diff(spans)) + 1)
-    return position_noise([position[own[0] : own[-1] + 1] for own in inside if len(own)])
-
-
-def _count(stretches: list[Array]) -> float:
-    """From changes with none before and none after them. Of several encoders the coarsest counts most."""
-    alone = []
-    for steps in (np.abs(np.diff(stretch)) for stretch in stretches if len(stretch) > 3):
-        still = steps == 0
-        alone.append(steps[1:-1][still[:-2] & still[2:] & ~still[1:-1]])
-    found = np.concatenate(alone) if alone else np.zeros(0)
-    return float(np.sum(found**3) / np.sum(found**2)) if len(found) >= _FEWEST else 0.0
-
-
 ORDER = 5
-_LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
+_RESPONSE_LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
 
 
 @dataclass(frozen=True)
@@ -130,20 +39,20 @@ class Chain:
 
     @property
     def rate(self) -> float:
-        """w of F(s) [rad/s]."""
+        """Angular cut-off frequency w of F(s) [rad/s]."""
         return 2 * pi * self.cutoff
 
     @property
     def period(self) -> float:
-        """From row to row [s]."""
+        """Time from row to row [s]."""
         return self.dt
 
     def times(self, rows: Indices) -> Array:
-        """Of rows [s] from the first sample, less the chain's own delay."""
+        """Times of rows [s] from the first sample, less the chain's own delay."""
         return np.asarray(rows.astype(np.float64) * self.dt - self.delay)
 
     def force_gain(self, frequency: Array) -> Array:
-        """Of its amplitude at frequencies [Hz]."""
+        """Gain of the amplitude at frequencies [Hz]."""
         return np.asarray((1 + (frequency / self.cutoff) ** 2) ** (-ORDER / 2))
 
     position_gain = force_gain
@@ -155,12 +64,12 @@ class Chain:
 
     @property
     def settling(self) -> float:
-        """Time after which a disturbance has left the filtered signal but for 1 % [s]."""
+        """Time after which 1 % of a disturbance is left in the filtered signal [s]."""
         return 11.6 / self.rate
 
     @property
     def thorough_settling(self) -> float:
-        """The same, but for 2e-5 of it [s]."""
+        """Time after which a fraction of 2e-5 of a disturbance is left in the filtered signal [s]."""
         return 20.0 / self.rate
 
     def __call__(
@@ -178,25 +87,29 @@ class Chain:
         padded = np.empty(len(signal) + 2 * reach)
         np.subtract(signal, level, out=padded[reach:-reach])
         padded[:reach], padded[-reach:] = padded[reach], padded[-reach - 1]
-        found = np.zeros(-(-(len(signal) - first) // every))
+        filtered = np.zeros(-(-(len(signal) - first) // every))
         for start in range(reach - begin + first, reach - begin + first - min(every, len(taps)), -1):
-            own = convolve(padded[start % every :: every], taps[reach - begin + first - start :: every])
-            found += own[start // every :][: len(found)]
-        return found + (level if derivative == 0 else 0.0)
+            partial = convolve(padded[start % every :: every], taps[reach - begin + first - start :: every])
+            filtered += partial[start // every :][: len(filtered)]
+        return filtered + (level if derivative == 0 else 0.0)
 
     def read(self, signal: Array, derivative: int, lag: float, rows: Indices) -> Array:
-        """The same at the samples `rows` only, in their order, shape (len(rows),).
+        """Filter a signal at the samples `rows` only, in their order, shape (len(rows),).
 
-        Each stretch of neighbouring rows is filtered with what the filter remembers on either side.
+        Each stretch of neighbouring rows is filtered with the filter's memory on either side.
         """
-        memory = int(np.ceil((_LENGTH / self.rate + abs(lag)) / self.dt)) + 5  # samples on either side
-        found = [np.empty(0)]
-        for own in np.split(rows, np.flatnonzero(np.diff(rows) > 2 * memory) + 1) if len(rows) else ():
-            first, last = int(own[0]), int(own[-1])
-            begin, every = max(first - memory, 0), int(np.gcd.reduce(np.diff(own))) or 1
-            part = signal[begin : last + memory]
-            found.append(self(part, derivative, lag, first - begin, every)[(own - first) // every])
-        return np.concatenate(found)
+        memory = (
+            int(np.ceil((_RESPONSE_LENGTH / self.rate + abs(lag)) / self.dt)) + 5
+        )  # samples on either side
+        pieces = [np.empty(0)]
+        for stretch in np.split(rows, np.flatnonzero(np.diff(rows) > 2 * memory) + 1) if len(rows) else ():
+            first = int(stretch[0])
+            last = int(stretch[-1])
+            begin = max(first - memory, 0)
+            every = int(np.gcd.reduce(np.diff(stretch))) or 1
+            samples = signal[begin : last + memory]
+            pieces.append(self(samples, derivative, lag, first - begin, every)[(stretch - first) // every])
+        return np.concatenate(pieces)
 
     def acceleration_noise(self, noise: PositionNoise) -> float:
         """Variance that noise of the position leaves in the second derivative."""
@@ -207,10 +120,10 @@ class Chain:
 def _taps(chain: Chain, derivative: int, lag: float) -> tuple[Array, int]:
     """Samples of the response to one hat of a first-order hold, and the index of the first of them.
 
-    They are kept: a fit reads many signals with one lag.
+    The cache serves a fit, which reads many signals with one lag.
     """
     first = int(np.floor(lag / chain.dt)) - 1
-    count = int(np.ceil(_LENGTH / (chain.rate * chain.dt))) + 3
+    count = int(np.ceil(_RESPONSE_LENGTH / (chain.rate * chain.dt))) + 3
     time = (first + np.arange(count)) * chain.dt - lag
     curve = _integrate(chain.rate, derivative, time[:, None] + np.array([chain.dt, 0.0, -chain.dt]))
     taps = (curve[:, 0] - 2 * curve[:, 1] + curve[:, 2]) / chain.dt
@@ -241,7 +154,8 @@ def _erlang(order: int, tau: Array) -> Array:
 
 def _erlang_cdf(order: int, tau: Array) -> Array:
     """Step response of `order` unit lags in a row."""
-    total, term = np.ones_like(tau), np.ones_like(tau)
+    total = np.ones_like(tau)
+    term = np.ones_like(tau)
     for k in range(1, order):
         term = term * tau / k
         total += term
@@ -259,13 +173,13 @@ def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
     return signal
 
 
-_DERIVATIVES = 5
+_READ_DERIVATIVES = 5
 """The position and four derivatives: one of order 0 to 2 is read, with the two after it for a lag nearby."""
-_NEAR = 0.25
+_MAX_TAYLOR_STEP = 0.25
 """Steps of time within which a lag is reached by Taylor's series from one that was read before."""
-_FORGOTTEN = 10.0
+_FORGETTING_TIMES = 10.0
 """Time constants of the slowest pole after which exp(-10) is left of what was before."""
-_MOST_KEPT = 6
+_MAX_READINGS_KEPT = 6
 """Readings of signals that are kept beside the newest."""
 
 
@@ -295,33 +209,33 @@ class SensorPath:
 
     @property
     def cutoff(self) -> float:
-        """Of the low-pass [Hz]."""
+        """Cut-off of the low-pass [Hz]."""
         return self.rate / (2 * pi)
 
     @property
     def settling(self) -> float:
-        """Time after which what was before has left the readings [s]."""
-        return _FORGOTTEN / self.low_pass.decay
+        """Time after which earlier motion no longer affects the readings [s]."""
+        return _FORGETTING_TIMES / self.low_pass.decay
 
     @property
     def _taps(self) -> Taps:
-        return taps(self.low_pass, self.dt, _DERIVATIVES)
+        return taps(self.low_pass, self.dt, _READ_DERIVATIVES)
 
     @property
     def reach(self) -> tuple[int, int]:
-        """How many samples of the position before and after an instant are needed."""
+        """Samples of the position that are needed before and after an instant."""
         return self._taps.before, self._taps.after
 
     def times(self, rows: Indices) -> Array:
-        """Of rows [s] from the position's first sample."""
+        """Times of rows [s] from the position's first sample."""
         return np.asarray(self.instants[rows] * self.dt)
 
     def force_gain(self, frequency: Array) -> Array:
-        """Of the amplitude of the readings' own noise: they are taken as they are."""
+        """Gain of the readings' own noise: 1, because no filter follows."""
         return np.ones_like(frequency)
 
     def position_gain(self, frequency: Array) -> Array:
-        """Of the amplitude of the position at frequencies [Hz]."""
+        """Gain of the position's amplitude at frequencies [Hz]."""
         return np.abs(self.low_pass.at(2 * pi * frequency))
 
     def read(self, signal: Array, derivative: int, lag: float, rows: Indices) -> Array:
@@ -330,31 +244,31 @@ class SensorPath:
         The signal, shape (n,), is at the samples of the position; `lag` is how much later than it the force stands in
         the log, the low-pass included [s].
         """
-        near = [
+        readings = [
             (base, stack)
-            for own, at, base, stack in self._kept
-            if own is signal and at is rows and abs(base - lag) <= _NEAR * self.dt
+            for kept_signal, kept_rows, base, stack in self._kept
+            if kept_signal is signal and kept_rows is rows and abs(base - lag) <= _MAX_TAYLOR_STEP * self.dt
         ]
-        if not near:
-            late = (lag - self.low_pass.lag) / self.dt
-            stack = read(signal, self.instants[rows] - late, self._taps)
-            stack /= self.dt ** np.arange(_DERIVATIVES)[:, None]
-            self._kept = [*self._kept[-_MOST_KEPT:], (signal, rows, lag, stack)]
-            near = [(lag, stack)]
-        base, stack = min(near, key=lambda kept: abs(kept[0] - lag))
+        if not readings:
+            delay = (lag - self.low_pass.lag) / self.dt
+            stack = read(signal, self.instants[rows] - delay, self._taps)
+            stack /= self.dt ** np.arange(_READ_DERIVATIVES)[:, None]
+            self._kept = [*self._kept[-_MAX_READINGS_KEPT:], (signal, rows, lag, stack)]
+            readings = [(lag, stack)]
+        base, stack = min(readings, key=lambda reading: abs(reading[0] - lag))
         value, slope, curve = stack[derivative : derivative + 3]
         step = base - lag
         series: Array = value if step == 0 else value + step * slope + step * step / 2 * curve
         return series
 
 
-FASTEST = 1 / 8
+MAX_CUTOFF_RATIO = 1 / 8
 """Highest cut-off as a share of the readings per second: above it sampling, not filtering, sets the error."""
-ABOVE_FLOOR = 10.0
+MIN_POWER_OVER_NOISE = 10.0
 """Power over that of the noise from which on it is a signal's."""
-FEWEST_SEGMENT = 64
+MIN_SPECTRUM_SAMPLES = 64
 """Samples of a stretch whose spectrum tells how fast it is."""
-_SEGMENT = 8192
+_MAX_SPECTRUM_SAMPLES = 8192
 """Samples of a spectrum: twenty periods of the lowest cut-off, a 400th of the readings per second."""
 
 
@@ -363,8 +277,8 @@ def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> floa
 
     `dt` is their sampling period [s], `rate` the fresh readings per second of the slower one [1/s].
     """
-    highest = FASTEST * rate
-    if len(position) < FEWEST_SEGMENT:
+    highest = MAX_CUTOFF_RATIO * rate
+    if len(position) < MIN_SPECTRUM_SAMPLES:
         return highest
     edge = 2 * min(
         _edge(position, dt), _edge(force, dt)
@@ -375,15 +289,17 @@ def choose_cutoff(position: Array, force: Array, dt: float, rate: float) -> floa
 
 def _edge(signal: Array, dt: float) -> float:
     """The highest frequency at which the spectrum stands well above its own floor near the end of the band [Hz]."""
-    size = min(len(signal), _SEGMENT)
-    window, line, power = np.hanning(size), np.linspace(0, 1, size), np.zeros(size // 2 + 1)
+    size = min(len(signal), _MAX_SPECTRUM_SAMPLES)
+    window = np.hanning(size)
+    line = np.linspace(0, 1, size)
+    power = np.zeros(size // 2 + 1)
     for begin in range(0, len(signal) - size + 1, max(size // 2, 1)):
-        part = signal[begin : begin + size]
-        part = part - part[0] - line * (part[-1] - part[0])
-        power += np.abs(np.fft.rfft(part * window)) ** 2
+        block = signal[begin : begin + size]
+        block = block - block[0] - line * (block[-1] - block[0])
+        power += np.abs(np.fft.rfft(block * window)) ** 2
     frequency = np.fft.rfftfreq(size, dt)
     width = max(len(power) // 100, 1)
     power = np.convolve(power, np.ones(width) / width, mode="same")
     floor = float(np.median(power[-len(power) // 4 :]))
-    above = np.flatnonzero(power > ABOVE_FLOOR * floor)
-    return float(frequency[above[-1]]) if len(above) else 0.0
+    significant = np.flatnonzero(power > MIN_POWER_OVER_NOISE * floor)
+    return float(frequency[significant[-1]]) if len(significant) else 0.0

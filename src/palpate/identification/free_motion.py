@@ -1,4 +1,4 @@
-"""Where the probe is in free motion: at one end of its range the position travels, and the force does not follow."""
+"""Find free motion: at one end of its range the position moves, and the force does not follow."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -6,36 +6,37 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.arrays import Array, Indices, Mask
-from palpate.identification.filters import Chain, position_noise
-from palpate.identification.least_squares import noise_of
+from palpate.identification.filters import Chain
+from palpate.identification.least_squares import estimate_noise
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
 from palpate.identification.uncertainty import student
-from palpate.signals.samples import GAUSSIAN, block_means, runs, white_noise
+from palpate.signals.position_noise import position_noise
+from palpate.signals.samples import block_means, outer_range, robust_std, runs, white_noise
 from palpate.signals.types import NORMAL
 
-FLAT = 0.4
+MAX_SLOPE_RATIO = 0.4
 """Slope in free motion over that in contact, at most: a power of the depth up to n = 2 that the probe leaves with 5 %
 of its force has 0.44 there. `benchmarks/identification/free_motion_constants.py` shows which values do as well, of this
 and of the constants below."""
-_SHARES = 0.5 ** (np.arange(2, 13) / 2)
+_RANGE_FRACTIONS = 0.5 ** (np.arange(2, 13) / 2)
 """Of the position's range that may lie in free motion, from a half to a sixty-fourth."""
-_TWICE = 2.0
+_MIN_FRACTION_RATIO = 2.0
 """How much farther the position must travel at one end than at the other, if the force goes with it at neither: all of
 a log in which nothing is touched is such an end, and so is a damped oscillation's turn."""
-_FEWEST = 8
+_MIN_STAY_ROWS = 8
 """Rows of a stay in free motion: fewer have no slope."""
-_MOST = 1 << 16
+_MAX_ROWS = 1 << 16
 """Rows that are looked at; more are averaged."""
-_SEEN = 10.0
+_MIN_MOTION_POWER = 10.0
 """Power of the motion in a stay over that of the position's noise, at least: the slope would be off by a tenth."""
-_OUTLYING = 5.0
+_MAX_NOISE_STDS = 5.0
 """Deviations from the middle of a stay that no noise reaches."""
-_OF_MEDIAN = 2 / np.pi
+_MEAN_OVER_MEDIAN_VARIANCE = 2 / np.pi
 """Variance of a mean over that of a median, of normal noise."""
-_MIDDLE = (0.05, 0.95)
+_CONTACT_FORCE_RANGE = (0.05, 0.95)
 """Of the force's range, between which it is the surface's for sure."""
-_BENDS = 3
+_DRIFT_MODES = 3
 """Ways of a drift to bend between stays in free motion: the first three have five sixths of a random walk's power."""
 
 
@@ -52,17 +53,19 @@ class Drift:
     levels: Array
 
     def bends(self, times: Array) -> Array:
-        """Ways that it may bend beside straight lines from stay to stay [N], of deviation 1 each, shape (m, _BENDS).
+        """Modes of the drift between stays, about the straight lines that join them [N], shape (m, _DRIFT_MODES).
 
-        Those of a random walk that is seen at the stays alone (Karhunen and Loeve's modes of Brown's bridge), at times
-        [s], shape (m,).
+        Each mode has a coefficient of standard deviation 1. The drift is a random walk that is known at the stays alone
+        (Karhunen and Loeve's modes of the Brownian bridge); `times` [s] have the shape (m,).
         """
-        apart = np.diff(self.times)
-        walk = float(np.sqrt(np.sum(np.diff(self.levels) ** 2) / np.sum(apart)))  # N over a root of time
-        at = np.clip(np.searchsorted(self.times, times) - 1, 0, len(apart) - 1)
-        share = np.clip((times - self.times[at]) / apart[at], 0.0, 1.0)
-        order = np.pi * np.arange(1, _BENDS + 1)
-        return np.asarray((walk * np.sqrt(2 * apart[at]))[:, None] * np.sin(share[:, None] * order) / order)
+        intervals = np.diff(self.times)
+        walk = float(np.sqrt(np.sum(np.diff(self.levels) ** 2) / np.sum(intervals)))  # N over a root of time
+        stay = np.clip(np.searchsorted(self.times, times) - 1, 0, len(intervals) - 1)
+        fraction = np.clip((times - self.times[stay]) / intervals[stay], 0.0, 1.0)
+        order = np.pi * np.arange(1, _DRIFT_MODES + 1)
+        return np.asarray(
+            (walk * np.sqrt(2 * intervals[stay]))[:, None] * np.sin(fraction[:, None] * order) / order
+        )
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ class FreeMotion:
         return _stays_in(self.way * position < self.way * self.limit)
 
 
-def free_motion_of(
+def find_free_motion(
     force: Array, position: Array, ends: tuple[float, float], *, none: bool = True
 ) -> FreeMotion | None:
     """The free motion of a log; None if the force goes with the position at both ends of its range, or at neither.
@@ -106,16 +109,19 @@ def free_motion_of(
     chosen by force, they would follow its noise. Both are as they stand in the log, shape (n,): behind a filter a fast
     touch is a slow one. The ends are of the force's range, outliers left aside [N].
     """
-    size = max(len(force) // _MOST, 1)
-    force, position = block_means(force, size), block_means(position, size)
-    search = _Search(force, position, _in_contact(force, position, ends), white_noise(position), none)
-    shares = [0.0, 0.0]
-    for bound in (np.inf, _OUTLYING):
-        if search.slope and not any(shares):
-            shares = [search.share_from(way, bound) for way in (1.0, -1.0)]
-    if max(shares) == 0 or max(shares) < _TWICE * min(shares):
+    size = max(len(force) // _MAX_ROWS, 1)
+    force = block_means(force, size)
+    position = block_means(position, size)
+    search = _Search(force, position, _contact_slope(force, position, ends), white_noise(position), none)
+    fractions = [0.0, 0.0]
+    for bound in (np.inf, _MAX_NOISE_STDS):
+        if search.slope and not any(fractions):
+            fractions = [search.share_from(direction, bound) for direction in (1.0, -1.0)]
+    if max(fractions) == 0 or max(fractions) < _MIN_FRACTION_RATIO * min(fractions):
         return None
-    return _beyond(force, position, 1.0 if shares[0] >= shares[1] else -1.0, max(shares), size)
+    return _free_motion_over(
+        force, position, 1.0 if fractions[0] >= fractions[1] else -1.0, max(fractions), size
+    )
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,7 @@ class _Search:
     none: bool
     _slopes: dict[tuple[float, float, float], tuple[float, float] | None] = field(default_factory=dict)
 
-    def share_from(self, way: float, bound: float) -> float:
+    def share_from(self, direction: float, bound: float) -> float:
         """The largest share from the lower (1) or upper (-1) end in which the force stays; 0 if there is none.
 
         Its slope is clearly below that of the contact. It is so over that share or over the next larger one, which may
@@ -144,91 +150,108 @@ class _Search:
         the force over the whole range, and takes from the contact's.
         """
         clear = False
-        for share in _SHARES:
-            if (found := self._slope_over(way, share, bound)) is None:
+        for fraction in _RANGE_FRACTIONS:
+            if (estimate := self._slope_over(direction, fraction, bound)) is None:
                 continue
-            own, half = float(np.sign(self.slope)) * found[0], found[1]
-            before, clear = clear, own + half < FLAT * abs(self.slope)
-            if not (clear or before) or (self.none and own > half):
+            slope = float(np.sign(self.slope)) * estimate[0]
+            half_width = estimate[1]
+            was_clear = clear
+            clear = slope + half_width < MAX_SLOPE_RATIO * abs(self.slope)
+            if not (clear or was_clear) or (self.none and slope > half_width):
                 continue
-            least = abs(own - half if self.none else own)
-            every = (self._slope_over(end, other, np.inf) for end in (1.0, -1.0) for other in _SHARES)
-            steepest = (abs(k) - h for k, h in filter(None, every))
-            if least < FLAT * abs(self.slope) or any(least < FLAT * steep for steep in steepest):
-                return float(share) * _quiet(self.force, way * self.position, share)
+            bound_below = abs(slope - half_width if self.none else slope)
+            estimates = (
+                self._slope_over(other_direction, other_fraction, np.inf)
+                for other_direction in (1.0, -1.0)
+                for other_fraction in _RANGE_FRACTIONS
+            )
+            steepest = (abs(k) - h for k, h in filter(None, estimates))
+            if bound_below < MAX_SLOPE_RATIO * abs(self.slope) or any(
+                bound_below < MAX_SLOPE_RATIO * steep for steep in steepest
+            ):
+                return float(fraction) * _is_quiet(self.force, direction * self.position, fraction)
         return 0.0
 
-    def _slope_over(self, way: float, share: float, bound: float) -> tuple[float, float] | None:
+    def _slope_over(self, direction: float, fraction: float, bound: float) -> tuple[float, float] | None:
         """Slope over a share of the position's range from an end, and its half-width; None if none is seen."""
-        question = way, share, bound
-        if question not in self._slopes:
-            stays = _stays_in(way * self.position < _limit(way * self.position, share))
-            found = _slope(self.force, self.position, stays, self.white, bound) if stays else None
-            self._slopes[question] = found
-        return self._slopes[question]
+        key = direction, fraction, bound
+        if key not in self._slopes:
+            stays = _stays_in(direction * self.position < _limit(direction * self.position, fraction))
+            estimate = _free_slope(self.force, self.position, stays, self.white, bound) if stays else None
+            self._slopes[key] = estimate
+        return self._slopes[key]
 
 
-def _beyond(force: Array, position: Array, way: float, share: float, size: int) -> FreeMotion:
+def _free_motion_over(
+    force: Array, position: Array, direction: float, fraction: float, size: int
+) -> FreeMotion:
     """Free motion over a share of the position's range; of means of so many rows of the log."""
     from scipy.special import chdtri
 
-    limit = _limit(way * position, share)
-    stays = _stays_in(way * position < limit)
-    middle = np.array([(a + b - 1) / 2 for a, b in stays]) * size + (size - 1) / 2
-    rows, stay = _rows_of(stays)
+    limit = _limit(direction * position, fraction)
+    stays = _stays_in(direction * position < limit)
+    middle = np.array([(first + last - 1) / 2 for first, last in stays]) * size + (size - 1) / 2
+    rows, stay = _stay_rows(stays)
     levels = _medians(force[rows], stay)
-    noise = noise_of(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
+    noise = estimate_noise(force[rows] - levels[stay], np.arange(len(rows)), len(stays))
     # The medians differ if they do so by more than chance would have them in one of twenty logs.
     length = np.bincount(stay).astype(float)
-    weight = _OF_MEDIAN * length * noise.effective / max(noise.variance * length.sum(), 1e-300)
-    apart = float(weight @ (levels - float(weight @ levels) / float(weight.sum())) ** 2)
-    differ = len(stays) > 1 and apart > chdtri(len(stays) - 1, 0.05)
-    rest, deviation = float(np.median(force[rows])), float(np.sqrt(noise.variance))
-    return FreeMotion(way, way * limit, rest, middle, levels, differ, deviation)
+    weight = (
+        _MEAN_OVER_MEDIAN_VARIANCE * length * noise.effective / max(noise.variance * length.sum(), 1e-300)
+    )
+    statistic = float(weight @ (levels - float(weight @ levels) / float(weight.sum())) ** 2)
+    drifts = len(stays) > 1 and statistic > chdtri(len(stays) - 1, 0.05)
+    rest = float(np.median(force[rows]))
+    noise_std = float(np.sqrt(noise.variance))
+    return FreeMotion(direction, direction * limit, rest, middle, levels, drifts, noise_std)
 
 
-def _in_contact(force: Array, position: Array, ends: tuple[float, float]) -> float:
+def _contact_slope(force: Array, position: Array, ends: tuple[float, float]) -> float:
     """Slope of force over position between the ends of the force's range [N/m]; 0 if there is none."""
     low, high = ends
-    inner = (force > low + _MIDDLE[0] * (high - low)) & (force < low + _MIDDLE[1] * (high - low))
+    inner = (force > low + _CONTACT_FORCE_RANGE[0] * (high - low)) & (
+        force < low + _CONTACT_FORCE_RANGE[1] * (high - low)
+    )
     reach = float(np.ptp(position[inner])) if inner.any() else 0.0
-    rises = float((force - force.mean()) @ (position - position.mean())) >= 0
-    return (1.0 if rises else -1.0) * (high - low) / reach if reach > 0 else 0.0
+    rising = float((force - force.mean()) @ (position - position.mean())) >= 0
+    return (1.0 if rising else -1.0) * (high - low) / reach if reach > 0 else 0.0
 
 
 def _limit(position: Array, share: float) -> float:
-    bottom, top = np.percentile(position, [0.1, 99.9])
-    return float(bottom + share * (top - bottom))
+    bottom, top = outer_range(position)
+    return bottom + share * (top - bottom)
 
 
-def _quiet(force: Array, position: Array, share: float) -> bool:
-    """Whether the force has no clearly larger range at the lower end of the position's than at the upper one.
+def _is_quiet(force: Array, position: Array, fraction: float) -> bool:
+    """True unless the force has a clearly larger range at the lower end of the positions than at the upper one.
 
     Steps that a damper ends leave no slope of force over position at the deep end either.
     """
-    low, high = (force[way * position <= _limit(way * position, share)] for way in (1.0, -1.0))
-    own, other = (float(np.ptp(np.percentile(end, [0.1, 99.9]))) for end in (low, high))
-    return FLAT * own <= other
+    low, high = (
+        force[direction * position <= _limit(direction * position, fraction)] for direction in (1.0, -1.0)
+    )
+    low_range, high_range = (float(np.ptp(outer_range(end))) for end in (low, high))
+    return MAX_SLOPE_RATIO * low_range <= high_range
 
 
 def _stays_in(inside: Mask) -> list[tuple[int, int]]:
     """First and past-the-last row of each unbroken stretch that is long enough."""
-    return [(a, b) for a, b in runs(inside) if b - a >= _FEWEST]
+    return [(a, b) for a, b in runs(inside) if b - a >= _MIN_STAY_ROWS]
 
 
-def _rows_of(stays: list[tuple[int, int]]) -> tuple[Indices, Indices]:
+def _stay_rows(stays: list[tuple[int, int]]) -> tuple[Indices, Indices]:
     """Rows of all stays, and the number of each one's stay."""
-    rows = [np.arange(a, b) for a, b in stays]
-    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(own) for own in rows])
+    rows = [np.arange(first, last) for first, last in stays]
+    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(stay_rows) for stay_rows in rows])
 
 
-def _medians(values: Array, number: Indices) -> Array:
-    """Of the values of each number, which only grows."""
-    ordered = [np.sort(own) for own in np.split(values, np.flatnonzero(np.diff(number)) + 1)]
-    return np.array([(own[(len(own) - 1) // 2] + own[len(own) // 2]) / 2 for own in ordered])
+def _medians(values: Array, numbers: Indices) -> Array:
+    """Median of the values of each number; the numbers only grow."""
+    ordered = [np.sort(group) for group in np.split(values, np.flatnonzero(np.diff(numbers)) + 1)]
+    return np.array([(group[(len(group) - 1) // 2] + group[len(group) // 2]) / 2 for group in ordered])
 
 
-def _slope(
+def _free_slope(
     force: Array, position: Array, stays: list[tuple[int, int]], white: float, bound: float
 ) -> tuple[float, float] | None:
     """Slope of force over position within stays, and its half-width [N/m]; None if the position hardly moves.
@@ -236,29 +259,32 @@ def _slope(
     What is more than a bound of deviations from the middle of its stay may be left out: a force that is read late has
     a touch in it that the position no longer shows.
     """
-    at, stay = _rows_of(stays)
-    x = position[at] - (np.bincount(stay, position[at]) / np.bincount(stay))[stay]
-    f = force[at] - _medians(force[at], stay)[stay]
-    near = np.abs(f) <= bound * GAUSSIAN * float(np.median(np.abs(f)))
-    rows = np.flatnonzero(near | np.isinf(bound))
-    x, f = x[rows] - x[rows].mean(), f[rows] - f[rows].mean()
-    size = float(x @ x)
-    if len(rows) < _FEWEST or size <= _SEEN * len(x) * white**2:
+    stay_places, stay = _stay_rows(stays)
+    position_change = (
+        position[stay_places] - (np.bincount(stay, position[stay_places]) / np.bincount(stay))[stay]
+    )
+    force_change = force[stay_places] - _medians(force[stay_places], stay)[stay]
+    inliers = np.abs(force_change) <= bound * robust_std(force_change)
+    rows = np.flatnonzero(inliers | np.isinf(bound))
+    position_change = position_change[rows] - position_change[rows].mean()
+    force_change = force_change[rows] - force_change[rows].mean()
+    size = float(position_change @ position_change)
+    if len(rows) < _MIN_STAY_ROWS or size <= _MIN_MOTION_POWER * len(position_change) * white**2:
         return None
-    own = float(x @ f) / size
-    noise = noise_of(f - own * x, rows, len(stays) + 1)
-    std = float(np.sqrt(noise.variance * len(f) / noise.effective / size))
-    return own, student(noise.effective - 2) * std
+    slope = float(position_change @ force_change) / size
+    noise = estimate_noise(force_change - slope * position_change, rows, len(stays) + 1)
+    std = float(np.sqrt(noise.variance * len(force_change) / noise.effective / size))
+    return slope, student(noise.effective - 2) * std
 
 
-_ACCELERATED = 10.0
+_MIN_ACCELERATION_POWER = 10.0
 """Power of the acceleration over that of the position's noise in it, at least: the mass would be off by a tenth."""
-_FEWEST_LEVEL = 20
+_MIN_LEVEL_ROWS = 20
 """Rows of a stay in free motion that its own level is taken from."""
-_LEAST = 0.05
+_MIN_PART_POWER = 0.05
 """Of the sum of squares of the acceleration in the part that has most, what a part needs to tell the mass again."""
-_EXPLAINED = 0.5
-_OTHERS = 2.0
+_MIN_EXPLAINED_POWER = 0.5
+_MIN_ADVANTAGE = 2.0
 """Share of the force's power that the acceleration accounts for at least, and over that of speed or place: as measured
 by `benchmarks/identification/free_motion_constants.py`."""
 
@@ -272,15 +298,15 @@ class MovingMass:
 
     @property
     def text(self) -> str:
-        """Its meaning, as a sentence."""
+        """Meaning of the mass, as a sentence."""
         seen = f"in free motion the force follows a mass of {self.mass:.3g} kg (std {self.std:.2g})"
         if self.mass > 0:
             return f"{seen}: it moves beyond the force sensor, and its inertia is removed"
         return f"{seen}: a tool's inertia was compensated with the wrong sign, or too much; it is restored"
 
 
-def payload_of(
-    channels: Channels, chain: Chain, air: FreeMotion, lag: float, *, alone: bool = False
+def find_moving_mass(
+    channels: Channels, chain: Chain, free_motion: FreeMotion, lag: float, *, alone: bool = False
 ) -> MovingMass | None:
     """The mass that the force in free motion tells, both channels as they count in the log; None if it tells none.
 
@@ -290,34 +316,49 @@ def payload_of(
     which one frequency does not do.
     """
     memory = int(np.ceil((chain.settling + abs(lag)) / chain.dt))
-    stays = [(a + memory, b) for a, b in air.among(channels.position) if b - a - memory >= _FEWEST_LEVEL]
+    stays = [
+        (first + memory, last)
+        for first, last in free_motion.among(channels.position)
+        if last - first - memory >= _MIN_LEVEL_ROWS
+    ]
     if not stays:
         return None
 
-    def own(filtered: Array) -> Array:
-        return np.concatenate([filtered[i:j] - filtered[i:j].mean() for i, j in stays])
+    def own(signal: Array) -> Array:
+        return np.concatenate([signal[i:j] - signal[i:j].mean() for i, j in stays])
 
-    force, motion = own(chain(channels.force)), own(chain(channels.position, 2, lag))
+    force = own(chain(channels.force))
+    motion = own(chain(channels.position, 2, lag))
     size = float(motion @ motion)
     spread = chain.acceleration_noise(position_noise([channels.position[i:j] for i, j in stays]))
-    others = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
-    if size <= _ACCELERATED * len(motion) * spread:
+    other_columns = (own(chain(channels.position, k, lag)) for k in ((1, 0) if alone else (1,)))
+    if size <= _MIN_ACCELERATION_POWER * len(motion) * spread:
         return None
-    by_motion = _accounts(motion, force)
-    if by_motion <= _EXPLAINED or any(by_motion <= _OTHERS * _accounts(column, force) for column in others):
+    by_motion = _explained_power(motion, force)
+    if by_motion <= _MIN_EXPLAINED_POWER or any(
+        by_motion <= _MIN_ADVANTAGE * _explained_power(column, force) for column in other_columns
+    ):
         return None
-    noise = noise_of(force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1)
+    noise = estimate_noise(
+        force - float(motion @ force) / size * motion, np.arange(len(force)), len(stays) + 1
+    )
     # Both halves of each stay tell the mass: a tone in the force goes with some of the motion, not with all.
-    ends = np.cumsum([0, *(b - a for a, b in stays)])
+    ends = np.cumsum([0, *(last - first for first, last in stays)])
     edges = np.sort(np.concatenate([ends, (ends[:-1] + ends[1:]) // 2]))
-    parts = [(motion[a:b] - motion[a:b].mean(), force[a:b]) for a, b in pairwise(edges.tolist())]
-    sizes = np.array([float(part @ part) for part, _ in parts])
-    told = sizes > _LEAST * sizes.max()
-    masses = np.array([float(part @ f) for part, f in parts])[told] / sizes[told]
-    mean = random_effects(masses, noise.variance * len(force) / noise.effective / sizes[told])
+    parts = [
+        (motion[first:last] - motion[first:last].mean(), force[first:last])
+        for first, last in pairwise(edges.tolist())
+    ]
+    sizes = np.array([float(motion_part @ motion_part) for motion_part, _ in parts])
+    reliable = sizes > _MIN_PART_POWER * sizes.max()
+    masses = (
+        np.array([float(motion_part @ force_part) for motion_part, force_part in parts])[reliable]
+        / sizes[reliable]
+    )
+    mean = random_effects(masses, noise.variance * len(force) / noise.effective / sizes[reliable])
     return MovingMass(mean.value, mean.half / NORMAL) if abs(mean.value) > mean.half else None
 
 
-def _accounts(column: Array, force: Array) -> float:
+def _explained_power(regressor: Array, force: Array) -> float:
     """Share of the force's power that a column accounts for."""
-    return float(column @ force) ** 2 / max(float(column @ column) * float(force @ force), 1e-300)
+    return float(regressor @ force) ** 2 / max(float(regressor @ regressor) * float(force @ force), 1e-300)

@@ -28,11 +28,11 @@ from palpate.identification.uncertainty import Contribution, Parameter, Verdict,
 from palpate.signals.types import NORMAL
 from palpate.units import unit
 
-ASSUMED = "a half space (deep and wide compared with the contact), small strain, no adhesion"
+ASSUMPTIONS = "a half space (deep and wide compared with the contact), small strain, no adhesion"
 """Assumptions of the laws, which no press can check."""
-_SIZE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*:?\s*([a-zA-Zµμ°]*)\s*")
+_SIZE_WITH_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*:?\s*([a-zA-Zµμ°]*)\s*")
 """A number and its unit."""
-_UNTOLD = (0.75, 1.0)
+_UNKNOWN_POISSON = (0.75, 1.0)
 """1 - nu^2 of materials that do not thicken when they are pulled: nu from 0.5 to 0."""
 
 
@@ -66,19 +66,19 @@ class Indenter:
             InputError: another shape, no number, or no unit of the right quantity.
         """
         shape, _, size = text.partition(":")
-        match = _SIZE.fullmatch(size)
+        match = _SIZE_WITH_UNIT.fullmatch(size)
         if shape not in _LAWS or match is None:
             shapes = "sphere:RADIUS, punch:RADIUS or cone:HALF_ANGLE, as sphere:5:mm"
             raise InputError(f"--indenter needs {shapes}, got {text!r}")
         quantity, usual = ("angle", "deg") if shape == "cone" else ("length", "mm")
         if not match[2]:
             raise InputError(f"--indenter {text} needs a unit, as {shape}:{match[1]}:{usual}")
-        own = unit(match[2])
-        if own.quantity != quantity:
+        size_unit = unit(match[2])
+        if size_unit.quantity != quantity:
             raise InputError(
-                f"{match[2]!r} of --indenter is a unit of {own.quantity}; a {shape} needs one of {quantity}"
+                f"{match[2]!r} of --indenter is a unit of {size_unit.quantity}; a {shape} needs one of {quantity}"
             )
-        return cls(shape, float(match[1]) * own.factor)
+        return cls(shape, float(match[1]) * size_unit.factor)
 
     def contact_radius(self, depth: float) -> float:
         """Radius of the contact at a depth [m]."""
@@ -140,10 +140,10 @@ def _modulus(
 ) -> Parameter:
     if press is None or not press.tangent or not press.loading.size:
         return Parameter.unknown("Pa", "the log has no loading whose slope could be estimated")
-    flat = next((t for t in press.tangent if t.stiffness <= t.half), None)
-    if flat is not None:
-        shown = f"{flat.stiffness:.3g} ± {flat.half:.3g} N/m"
-        reason = f"at {flat.force:.3g} N the force does not rise with the depth ({shown})"
+    not_rising = next((t for t in press.tangent if t.stiffness <= t.half), None)
+    if not_rising is not None:
+        shown = f"{not_rising.stiffness:.3g} ± {not_rising.half:.3g} N/m"
+        reason = f"at {not_rising.force:.3g} N the force does not rise with the depth ({shown})"
         return Parameter.unknown("Pa", reason)
     if len(press.tangent) < 2:
         return Parameter.unknown("Pa", "the slope is known at one force only; its growth is not")
@@ -151,48 +151,53 @@ def _modulus(
         return Parameter.unknown("Pa", "the force of the press is not above zero")
     p, factor = _LAWS[indenter.shape]  # F = c E* d^p, c in m^(2-p)
     c = factor(indenter.size)
-    force, slope, half = np.array([(t.force, t.stiffness, t.half) for t in press.tangent]).T
+    force, slope, slope_halves = np.array([(t.force, t.stiffness, t.half) for t in press.tangent]).T
     by_force = slope**p / (p**p * c * force ** (p - 1))
-    own = p * half / slope * by_force
-    weight = own**-2 / (own**-2).sum()
-    depth, reduced = float(p * np.mean(force / slope)), float(weight @ by_force)
+    half_widths = p * slope_halves / slope * by_force
+    weight = half_widths**-2 / (half_widths**-2).sum()
+    depth = float(p * np.mean(force / slope))
+    reduced = float(weight @ by_force)
     parts = {
-        "tangent": float(weight @ own),  # the slopes are of one loading: their errors do not average out
-        "the indenter's law": float(np.maximum(abs(by_force - reduced) - own, 0.0).max()),
-        "surface position": float(abs(_by_depth(press, slope, force, p, c, reduced) - reduced).max()),
+        "tangent": float(
+            weight @ half_widths
+        ),  # the slopes are of one loading: their errors do not average out
+        "the indenter's law": float(np.maximum(abs(by_force - reduced) - half_widths, 0.0).max()),
+        "surface position": float(abs(_modulus_by_depth(press, slope, force, p, c, reduced) - reduced).max()),
     }
     if indenter.shape == "sphere":
         if depth >= indenter.size:
-            deep, radius = 1e3 * depth, 1e3 * indenter.size
+            deep = 1e3 * depth
+            radius = 1e3 * indenter.size
             reason = f"the press goes {deep:.3g} mm deep, beyond the sphere's radius of {radius:.3g} mm"
             return Parameter.unknown("Pa", reason)
-        parts["small strain"] = abs(_beyond_hertz(depth / indenter.size) - 1) * reduced
+        parts["small strain"] = abs(_hertz_ratio(depth / indenter.size) - 1) * reduced
     if poisson is None:
-        share, unknown = sum(_UNTOLD) / 2, (_UNTOLD[1] - _UNTOLD[0]) / sum(_UNTOLD)
+        poisson_factor = sum(_UNKNOWN_POISSON) / 2
+        unknown = (_UNKNOWN_POISSON[1] - _UNKNOWN_POISSON[0]) / sum(_UNKNOWN_POISSON)
     else:
-        share = 1 - poisson[0] ** 2
-        unknown = NORMAL * abs(2 * poisson[0]) * poisson[1] / share
+        poisson_factor = 1 - poisson[0] ** 2
+        unknown = NORMAL * abs(2 * poisson[0]) * poisson[1] / poisson_factor
     parts["Poisson's ratio"] = unknown * reduced
-    parts = {cause: share * part for cause, part in parts.items()}
-    return _judge(share * reduced, parts, indenter, poisson, depth, tolerance)
+    parts = {cause: poisson_factor * part for cause, part in parts.items()}
+    return _judge_modulus(poisson_factor * reduced, parts, indenter, poisson, depth, tolerance)
 
 
-def _by_depth(press: Press, slope: Array, force: Array, p: float, c: float, reduced: float) -> Array:
+def _modulus_by_depth(press: Press, slope: Array, force: Array, p: float, c: float, reduced: float) -> Array:
     """E* by the depth from the touch that the log shows, at each force that it reaches [Pa], shape (n,).
 
     A touch is found at a force, and where that grows slowly the surface lies before it by what the law needs for it: a
     cone has 5 % of its force at 22 % of its depth.
     """
-    depth, own = press.loading
-    rising = np.maximum.accumulate(own)
-    found_at = max(float(np.interp(0.0, depth, own)), 0.0)
-    before = (found_at / (c * reduced)) ** (1 / p)
-    least = 1e-3 * float(np.abs(depth).max())  # a touch found too late leaves a force at no depth
-    at = np.maximum(np.interp(force, rising, depth) + before, least)
-    return np.asarray(slope / (p * c * at ** (p - 1)))
+    depth, force_curve = press.loading
+    monotone_force = np.maximum.accumulate(force_curve)
+    touch_force = max(float(np.interp(0.0, depth, force_curve)), 0.0)
+    depth_at_touch = (touch_force / (c * reduced)) ** (1 / p)
+    min_depth = 1e-3 * float(np.abs(depth).max())  # a touch found too late leaves a force at no depth
+    depths = np.maximum(np.interp(force, monotone_force, depth) + depth_at_touch, min_depth)
+    return np.asarray(slope / (p * c * depths ** (p - 1)))
 
 
-def _beyond_hertz(strain: float) -> float:
+def _hertz_ratio(strain: float) -> float:
     """Force on a rigid sphere over Hertz's, which takes it for a paraboloid, by depth over radius (Sneddon)."""
     from scipy.optimize import brentq
 
@@ -200,25 +205,25 @@ def _beyond_hertz(strain: float) -> float:
     return ((1 + u**2) * atanh(u) - u) / (4 / 3 * strain**1.5)
 
 
-def _judge(
+def _judge_modulus(
     value: float,
-    parts: dict[str, float],
+    causes: dict[str, float],
     indenter: Indenter,
     poisson: tuple[float, float] | None,
     depth: float,
     tolerance: float,
 ) -> Parameter:
-    main = max(parts, key=lambda cause: parts[cause])
+    main = max(causes, key=lambda cause: causes[cause])
     ratio = "Poisson's ratio 0 to 0.5 (none given)" if poisson is None else f"Poisson's ratio {poisson[0]:g}"
     radius = 1e3 * indenter.contact_radius(depth)
-    terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMED}"
-    bounds = {cause: Contribution.within(part) for cause, part in parts.items()}
+    terms = f"a {indenter}, {ratio}, contact radius about {radius:.2g} mm; assumed: {ASSUMPTIONS}"
+    bounds = {cause: Contribution.within(half_of_cause) for cause, half_of_cause in causes.items()}
     half = half_width(bounds)
-    found = Parameter.of(value, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
+    modulus = Parameter.of(value, "Pa", Verdict.NOT_IDENTIFIABLE, "", bounds)
     if half >= value:
         reason = f"the press does not follow a {indenter}: 95 % 0 to {value + half:.3g} Pa, most of it {main}"
-        return found.without_number(reason, ci95=found.ci95)
-    share = f"{100 * half / value:.2g} %"
+        return modulus.without_number(reason, ci95=modulus.ci95)
+    percentage = f"{100 * half / value:.2g} %"
     if half <= tolerance * value:
-        return replace(found, verdict=Verdict.IDENTIFIED, reason=f"known to {share} (95 %): {terms}")
-    return replace(found, reason=f"known to {share} only (95 %), most of it {main}: {terms}")
+        return replace(modulus, verdict=Verdict.IDENTIFIED, reason=f"known to {percentage} (95 %): {terms}")
+    return replace(modulus, reason=f"known to {percentage} only (95 %), most of it {main}: {terms}")

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import accumulate
 from math import isqrt
 
 import numpy as np
 
 from palpate.arrays import Array, Indices, Mask
-from palpate.identification.filters import NOISELESS, Chain, PositionNoise, SensorPath, low_passed
+from palpate.identification.filters import Chain, SensorPath, low_passed
 from palpate.signals.low_pass import LowPass
+from palpate.signals.position_noise import NOISELESS, PositionNoise
 
 
 @dataclass
@@ -49,44 +49,46 @@ class Motion:
         """Any raw signal through the same chain, at t - lag, shape (m,)."""
         return self.chain.read(signal, derivative, lag, self.rows)
 
-    def through(self, change: Callable[[Array], Array]) -> "Motion":
-        """The same with its signals changed, of shape (n,) each."""
-        free, touched = (own if own is None else change(own) for own in (self.free, self.touched))
-        return replace(self, position=change(self.position), free=free, touched=touched, _kept={}, _turned={})
-
     def direction(self, least: float = 0.0) -> Array:
-        """Which way friction holds the probe: 1 while it moves into the surface, -1 out of it, shape (n,).
+        """Direction of friction: 1 while the probe moves into the surface, -1 out of it, shape (n,).
 
         At rest it keeps what it has, and turns within a short way (an elastoplastic element; Dahl 1968 has it smooth):
         the shortest that the position's noise and its encoder do not turn it within, and `least` at least [m].
         """
-        noise, position = self.noise, self.position
-        way = max(_TURNS * noise.white, 2 * noise.jump, _SHORTEST * float(np.ptp(position)), least, 1e-300)
-        if way not in self._turned:
-            self._turned[way] = _clipped_sum(np.diff(position, prepend=position[:1]) / way)
-        return self._turned[way]
+        noise = self.noise
+        position = self.position
+        min_distance = _MIN_FRICTION_TRAVEL * float(np.ptp(position))
+        by_noise = max(_FRICTION_NOISE_STDS * noise.white, 2 * noise.jump)
+        distance = max(by_noise, min_distance, least, 1e-300)
+        if distance not in self._turned:
+            steps = np.diff(position, prepend=position[:1])
+            self._turned[distance] = _clipped_sum(steps / distance)
+        return self._turned[distance]
 
     @property
     def instants(self) -> Array:
         """Sample of the position that each row belongs to, shape (m,)."""
-        chain, rows = self.chain, self.rows
+        chain = self.chain
+        rows = self.rows
         return chain.instants[rows] if isinstance(chain, SensorPath) else rows.astype(np.float64)
 
     @property
     def matched(self) -> bool:
-        """Whether the force sensor's own way is known, so that its readings are as white as their noise."""
+        """True if the force sensor's low-pass is known, so that its readings are as white as their noise."""
         return isinstance(self.chain, SensorPath)
 
 
 def from_surface(motion: Motion, inside: Mask, surface: float) -> Motion:
-    """The same motion counted from a surface [m]: nothing is pressed before it is met.
+    """Count the motion from a surface [m]: nothing is pressed before it is met.
 
     Samples `inside`, shape (n,), are in contact for sure.
     """
     depth = motion.position - surface
-    pressed = np.where(inside, depth, np.maximum(depth, 0.0))
+    penetration = np.where(inside, depth, np.maximum(depth, 0.0))
     touched = (inside | (depth > 0)).astype(np.float64)
-    return replace(motion, position=pressed, free=depth - pressed, touched=touched, _kept={}, _turned={})
+    return replace(
+        motion, position=penetration, free=depth - penetration, touched=touched, _kept={}, _turned={}
+    )
 
 
 @dataclass(frozen=True)
@@ -126,19 +128,19 @@ class Model:
 
     @property
     def of_power(self) -> bool:
-        """Whether the force goes with a power of the depth."""
+        """True if the force is a power of the depth."""
         return any(parameter.name == "n" for parameter in self.nonlinear)
 
     @property
     def derivatives(self) -> dict[str, int]:
-        """Which parameters multiply which derivative of the position."""
+        """Order of the position's derivative that each parameter multiplies."""
         return {name: k for name, k in (("K", 0), ("B", 1), ("M", 2)) if name in self.linear}
 
 
-_TURNS = 6.0
-"""Deviations of the position's noise within which friction does not turn: nearly none is larger."""
-_SHORTEST = 1e-3
-"""Share of the position's range, where it has no noise."""
+_FRICTION_NOISE_STDS = 6.0
+"""Standard deviations of the position's noise within which friction does not turn; hardly any noise is larger."""
+_MIN_FRICTION_TRAVEL = 1e-3
+"""Least distance of turning, as a fraction of the position's range, for a position without noise."""
 
 NAMES = (
     "kelvin-voigt",
@@ -149,58 +151,66 @@ NAMES = (
 )
 
 
-def _of_derivatives(count: int) -> Columns:
-    """f = K x + B v, with three M a as well."""
-    return lambda motion, _, lag: [*(motion.moved(k, lag) for k in range(count)), np.ones(len(motion.rows))]
+def _derivative_columns(count: int) -> Columns:
+    """Columns of f = K x + B v, and M a if the count is three."""
+
+    def columns(motion: Motion, _: dict[str, float], lag: float) -> list[Array]:
+        derivatives = [motion.moved(order, lag) for order in range(count)]
+        return [*derivatives, np.ones(len(motion.rows))]
+
+    return columns
 
 
-KELVIN_VOIGT = Model(NAMES[0], ("K", "B", "offset"), _of_derivatives(2))
-KELVIN_VOIGT_MASS = Model(NAMES[1], ("K", "B", "M", "offset"), _of_derivatives(3))
+KELVIN_VOIGT = Model(NAMES[0], ("K", "B", "offset"), _derivative_columns(2))
+KELVIN_VOIGT_MASS = Model(NAMES[1], ("K", "B", "M", "offset"), _derivative_columns(3))
 
 
 def _relaxing(motion: Motion, u: Array, tau: float, lag: float) -> list[Array]:
-    """f = K u + B u' + K1 y, shape (n,), where the spring K1 of a Maxwell branch is stretched by y: y' + y/tau = u'."""
+    """Columns of f = K u + B u' + K1 y, where y stretches the spring K1 of a Maxwell branch: y' + y/tau = u'."""
     branch = u - low_passed(u, LowPass.of_first_order(tau), motion.chain.dt)
     columns = [motion.filtered(u, k, lag) for k in (0, 1)]
     return [*columns, motion.filtered(branch, 0, lag), np.ones(len(motion.rows))]
 
 
-_RELAXING = ("K", "B", "K1", "offset")
+_RELAXING_PARAMETERS = ("K", "B", "K1", "offset")
 _PASSIVE = ("K", "B", "K1", "Fc")
-_POWER = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
+_EXPONENT = NonlinearParameter("n", (1.5,), 0.5, 5.0, 1e-3)
 
 
-def _time(motion: Motion) -> NonlinearParameter:
-    """A relaxation time that this log can show: between the filter's and the log's."""
-    shortest, longest = 2 / motion.chain.rate, len(motion.rows) * motion.chain.period
+def _relaxation_time(motion: Motion) -> NonlinearParameter:
+    """A relaxation time that a log can show: between the filter's time constant and the log's duration."""
+    shortest = 2 / motion.chain.rate
+    longest = len(motion.rows) * motion.chain.period
     starts = tuple(np.geomspace(3 * shortest, longest / 3, 4))
     return NonlinearParameter("tau", starts, shortest, 3 * longest, 0.01, logarithmic=True)
 
 
-def _touch(motion: Motion) -> NonlinearParameter:
-    """Where the surface is, about the position at which the force was first seen, and on the way there at the least."""
+def _surface_position(motion: Motion) -> NonlinearParameter:
+    """Position of the surface, as a parameter: near or before the first force."""
     depth = float(np.max(motion.position)) or 1.0
     least = min(-depth, float(np.min(motion.position)))
     return NonlinearParameter("x0", (-0.02 * depth,), least, 0.5 * depth, 1e-4 * depth)
 
 
 def standard_linear_solid(motion: Motion) -> Model:
-    """The standard linear solid, stretched by the depth beyond the surface; a probe fixed to it is always in it."""
+    """The standard linear solid, stretched by the depth beyond the surface, or by the position of a bonded probe."""
 
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
         x = motion.position
         depth = x if motion.bonded else np.maximum(x - nonlinear["x0"], 0.0)
         return _relaxing(motion, depth, nonlinear["tau"], lag)
 
-    nonlinear = (_time(motion),) if motion.bonded else (_time(motion), _touch(motion))
-    return Model(NAMES[2], _RELAXING, columns, nonlinear, _PASSIVE)
+    nonlinear: tuple[NonlinearParameter, ...] = (_relaxation_time(motion),)
+    if not motion.bonded:
+        nonlinear += (_surface_position(motion),)
+    return Model(NAMES[2], _RELAXING_PARAMETERS, columns, nonlinear, _PASSIVE)
 
 
 def quasi_linear(motion: Motion) -> Model:
     """Tissue that stiffens and relaxes: f = K u + B u' + K1 y with u = D/n (d/D)^n, and y' + y/tau = u'.
 
-    The elastic force is a power of the depth, and a share of it relaxes. At the penetration D, near the deepest of the
-    log, u' is d': K, B and K1 are what a straight spring, damper and branch have there.
+    The elastic force is a power of the depth, and a fraction of it relaxes. At the penetration D, near the deepest of
+    the log, u' is d': K, B and K1 are those of a linear spring, damper and branch there.
 
     Source: Y. C. Fung, Biomechanics: Mechanical Properties of Living Tissues, 1993, ch. 7, with one relaxation time.
     """
@@ -208,11 +218,12 @@ def quasi_linear(motion: Motion) -> Model:
 
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
         n = nonlinear["n"]
-        u = deepest / n * (np.maximum(motion.position - nonlinear["x0"], 0.0) / deepest) ** n
+        depth = np.maximum(motion.position - nonlinear["x0"], 0.0)
+        u = deepest / n * (depth / deepest) ** n
         return _relaxing(motion, u, nonlinear["tau"], lag)
 
-    nonlinear = (_POWER, _time(motion), _touch(motion))
-    return Model(NAMES[4], _RELAXING, columns, nonlinear, _PASSIVE, deepest)
+    nonlinear = (_EXPONENT, _relaxation_time(motion), _surface_position(motion))
+    return Model(NAMES[4], _RELAXING_PARAMETERS, columns, nonlinear, _PASSIVE, deepest)
 
 
 def hunt_crossley(motion: Motion) -> Model:
@@ -222,7 +233,8 @@ def hunt_crossley(motion: Motion) -> Model:
     """
 
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
-        n, d = nonlinear["n"], np.maximum(motion.position - nonlinear["x0"], 0.0)
+        n = nonlinear["n"]
+        d = np.maximum(motion.position - nonlinear["x0"], 0.0)
         power = d**n
         return [
             motion.filtered(power, 0, lag),
@@ -230,41 +242,46 @@ def hunt_crossley(motion: Motion) -> Model:
             np.ones(len(motion.rows)),
         ]
 
-    return Model(NAMES[3], ("K", "B", "offset"), columns, (_POWER, _touch(motion)), ("K", "B", "Fc"))
+    nonlinear = (_EXPONENT, _surface_position(motion))
+    return Model(NAMES[3], ("K", "B", "offset"), columns, nonlinear, positive=("K", "B", "Fc"))
 
 
 def at_rest_before(model: Model) -> Model:
-    """The same where the log shows what the force rests at before the touch, so that no offset is left to find.
+    """Remove the offset from a model, for a log that shows the force at rest before the touch.
 
-    An offset and the place of the surface do the same to a straight spring, and nearly the same to a curved one.
+    An offset and the position of the surface have the same effect on a linear spring, and nearly so on a curved one.
     """
     return replace(model, linear=model.linear[:-1], columns=lambda *at: model.columns(*at)[:-1])
 
 
 def begun_before(model: Model) -> Model:
-    """The same in a log that begins in contact: what the Maxwell branch was stretched by then dies out with tau."""
+    """Add the stretch of the Maxwell branch at the start of a log that begins in contact; it decays with tau."""
 
     def columns(motion: Motion, nonlinear: dict[str, float], lag: float) -> list[Array]:
-        own = model.columns(motion, nonlinear, lag)
-        since = np.arange(len(motion.position)) * motion.chain.dt
-        return [*own[:-1], motion.filtered(np.exp(-since / nonlinear["tau"]), 0, lag), own[-1]]
+        model_columns = model.columns(motion, nonlinear, lag)
+        time = np.arange(len(motion.position)) * motion.chain.dt
+        decay = motion.filtered(np.exp(-time / nonlinear["tau"]), 0, lag)
+        return [*model_columns[:-1], decay, model_columns[-1]]
 
     return replace(model, linear=(*model.linear[:-1], "y0", model.linear[-1]), columns=columns)
 
 
 def _clipped_sum(steps: Array) -> Array:
-    """z of every step, shape (n,), with z + step cut off at -1 and 1, from 0 on.
+    """Running sum of steps from 0, clipped to -1 and 1 after each step, shape (n,).
 
-    So many steps from any z end at z + a, cut off where the ways from -1 and from 1 end: stretches go side by side.
+    Several steps from any z end at z + a, clipped to the ends from -1 and from 1. So stretches are summed in parallel.
     """
     width = isqrt(len(steps)) + 1
-    table = np.concatenate([steps, np.zeros(width**2 - len(steps))]).reshape(width, width).T
-    along = np.cumsum(table, axis=0)
+    padded = np.concatenate([steps, np.zeros(width**2 - len(steps))])
+    table = padded.reshape(width, width).T
+    partial_sums = np.cumsum(table, axis=0)
     ends = np.empty((width, 2, width))
     state = np.repeat([[-1.0], [1.0]], width, axis=1)
-    for i, step in enumerate(table):
-        state = np.minimum(np.maximum(state + step, -1.0, out=ends[i]), 1.0, out=ends[i])
-    last = zip(along[-1].tolist(), *ends[-1].tolist(), strict=True)
-    z = list(accumulate(last, lambda z, way: min(max(z + way[0], way[1]), way[2]), initial=0.0))
-    found: Array = np.minimum(np.maximum(np.array(z[:-1]) + along, ends[:, 0]), ends[:, 1])
-    return found.T.ravel()[: len(steps)]
+    for row, step in enumerate(table):
+        state = np.clip(state + step, -1.0, 1.0, out=ends[row])
+    starts = [0.0]
+    for total, low, high in zip(partial_sums[-1].tolist(), *ends[-1].tolist(), strict=True):
+        starts.append(min(max(starts[-1] + total, low), high))
+    sums = np.array(starts[:-1]) + partial_sums
+    clipped: Array = np.minimum(np.maximum(sums, ends[:, 0]), ends[:, 1])
+    return clipped.T.ravel()[: len(steps)]

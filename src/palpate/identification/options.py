@@ -22,7 +22,7 @@ sensors and arms in `tests/oracles/foreign` take 0 to 20 ms; the prior's 95 % re
 
 @dataclass(frozen=True)
 class Lag:
-    """How much later the force is read than the position, and what is known of the mass.
+    """Prior of the delay of the force behind the position, and of the mass.
 
     Args:
         value, std: mean and standard deviation of the prior of the lag [s].
@@ -49,14 +49,14 @@ def lag_prior(
     return Lag(filtered + USUAL_LAG, float(np.hypot(USUAL_LAG_STD, period / 2)), False, mass)
 
 
-_EXACT = 1e-3
+_EXACT_STD = 1e-3
 """Relative deviation of what is known exactly: less would only cost digits of the rest."""
 
 
 def mass_std(mass: tuple[float, float]) -> float:
     """Standard deviation of the prior of the mass [kg]."""
     value, std = mass
-    return max(std, _EXACT * abs(value), _EXACT**3)
+    return max(std, _EXACT_STD * abs(value), _EXACT_STD**3)
 
 
 @dataclass(frozen=True)
@@ -99,16 +99,25 @@ class Options:
     @classmethod
     def of(cls, **said: Any) -> Options:
         """Check what was said; a value out of its range is an `InputError`."""
-        told = said.get("force_filter")
-        options = cls(**(said | {"force_filter": LowPass.parse(told) if isinstance(told, str) else told}))
+        force_filter = said.get("force_filter")
+        options = cls(
+            **(
+                said
+                | {
+                    "force_filter": LowPass.parse(force_filter)
+                    if isinstance(force_filter, str)
+                    else force_filter
+                }
+            )
+        )
         _check(options)
         return options
 
     @property
     def assumed_lag(self) -> float:
-        """Of the force behind the position [s]: as told, else as sensors have it."""
-        own = self.force_filter.lag if self.force_filter else 0.0
-        return own + USUAL_LAG if self.lag is None else self.lag
+        """Delay of the force behind the position [s]: as given, else as sensors have it."""
+        filter_lag = self.force_filter.lag if self.force_filter else 0.0
+        return filter_lag + USUAL_LAG if self.lag is None else self.lag
 
     @property
     def swing(self) -> tuple[float, float]:
@@ -153,6 +162,6 @@ def _check(o: Options) -> None:
             )
 
 
-NOTHING_SAID = Options()
-NAMED = tuple(own.name for own in fields(Options))
+DEFAULT_OPTIONS = Options()
+OPTION_NAMES = tuple(own.name for own in fields(Options))
 """Names of the options."""

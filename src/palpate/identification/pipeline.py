@@ -7,26 +7,24 @@ import numpy as np
 
 from palpate.identification.causes import Code, Warn
 from palpate.identification.contacts import Contacts, contacts_of
-from palpate.identification.estimators.fit import Descent, Fit, fit
-from palpate.identification.estimators.linearisation import lag_open
-from palpate.identification.evidence import evidence_of
 from palpate.identification.filters import Chain
 from palpate.identification.in_series import SeriesSpring
+from palpate.identification.linearisation import lag_open
 from palpate.identification.options import LAG, Options
-from palpate.identification.problem import Problem, problem_of, with_fewer_rows
+from palpate.identification.press import gather_evidence
+from palpate.identification.problem import Problem, build_problem, thin_rows
 from palpate.identification.result import Identification, LagFound, Press, Traces, WorkingPoint
 from palpate.identification.sampling import Channels, channels_of, thinned
 from palpate.identification.selection import Choice, choose
 from palpate.identification.uncertainty import Input, Parameter, Verdict, correlations
 from palpate.identification.verdicts import Units, verdicts
 from palpate.records import Record
-from palpate.signals import Estimate
 from palpate.signals.samples import block_means
 from palpate.signals.types import NORMAL
 from palpate.units import impedance_units
 
-_MOST_SAMPLES = 2_000_000
-_FOLLOWS = 0.3
+_MAX_SAMPLES = 2_000_000
+_MIN_R2_OF_CONTACT = 0.3
 
 
 @dataclass(frozen=True)
@@ -65,145 +63,165 @@ def identify(record: Record, **given: Any) -> Identification:
     Raises:
         InputError: the record or an option is wrong, in one line.
     """
-    options, units, channels = Options.of(**given), record.units, channels_of(record)
+    options = Options.of(**given)
+    units = record.units
+    channels = channels_of(record)
     options.check_lag(len(channels.position) * channels.dt)
-    channels = thinned(channels, -(-len(channels.position) // _MOST_SAMPLES))
+    channels = thinned(channels, -(-len(channels.position) // _MAX_SAMPLES))
     channels, chain, contacts = contacts_of(channels, options)
-    log, warnings = _PreparedLog(channels, chain, options, units), (*channels.warnings, *contacts.warnings)
+    log = _PreparedLog(channels, chain, options, units)
+    warnings = (*channels.warnings, *contacts.warnings)
     if not contacts.spans:
-        return _nothing(log, warnings)
-    problem = with_fewer_rows(problem_of(channels, chain, contacts, options))
+        return _no_contact(log, warnings)
+    problem = thin_rows(build_problem(channels, chain, contacts, options))
     choice = choose(problem, options)
-    problem, fitted = choice.problem, choice.answer.fit
-    follows = max(fitted.r2, fitted.in_time(problem.motion, problem.force).r2) > _FOLLOWS
+    problem = choice.problem
+    fitted = choice.answer.fit
+    follows = max(fitted.r2, fitted.in_time(problem.motion, problem.force).r2) > _MIN_R2_OF_CONTACT
     if not (contacts.clear or options.bonded or follows or contacts.press):
         rms = f"rms {choice.answer.unexplained:.3g} N"
         text = f"the force ({rms}) does not follow the position: there seems to be no contact"
-        return _nothing(log, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
-    searched = {own.name: fitted[own.name] for own in fitted.model.nonlinear}
-    holds = fit(Descent(fitted.model, problem.motion, problem.force, fitted.lag), searched, problem.lag)
-    return _outcome(log, choice, holds, warnings)
+        return _no_contact(log, (*channels.warnings, Warn(Code.NO_CONTACT, text)))
+    return _outcome(log, choice, warnings)
 
 
-_SOFTEST, _STIFFEST = 1.0, 1e8
-_DEEPEST = 0.5
+_MIN_STIFFNESS, _MAX_STIFFNESS = 1.0, 1e8
+_MAX_DEPTH = 0.5
 """Reach of half an arm [m]: no press goes deeper, and one of half a mm that is read in m does."""
-_SHOWN = 50_000
+_MAX_TRACE_SAMPLES = 50_000
 """Samples of each trace: what is more is thinned, and averaged where it was fitted."""
-_NARROWER = 0.5
+_MEASURED_LAG_RATIO = 0.5
 """Share of the prior's half-width at which a lag is measured: the log tells three times as much, 1/.5^2 - 1."""
 
 
-def _outcome(log: _PreparedLog, choice: Choice, holds: Fit, warnings: tuple[Warn, ...]) -> Identification:
+def _outcome(log: _PreparedLog, choice: Choice, warnings: tuple[Warn, ...]) -> Identification:
     """Identification from the fit: its evidence, and the verdicts that rest on both."""
-    problem, options, unit = choice.problem, log.options, log.impedance_units["K"]
-    spectrum, press, point = evidence_of(problem, options, unit, choice.answer)
-    choice, holds = _of_surface(choice, holds, options)
-    parameters, told = verdicts(choice, holds, point, options, log.units)
-    warnings, found = (*warnings, *told), choice.answer
-    mass, name = parameters.get("M"), found.fit.model.name
+    problem = choice.problem
+    options = log.options
+    unit = log.impedance_units["K"]
+    spectrum, press, point = gather_evidence(problem, options, unit, choice.answer)
+    choice = _surface_alone(choice, options)
+    parameters, parameter_warnings = verdicts(choice, point, options, log.units)
+    warnings = (*warnings, *parameter_warnings)
+    fitted = choice.answer
+    mass = parameters.get("M")
+    name = fitted.fit.model.name
     massless = options.model is None and (mass is None or mass.verdict is not Verdict.IDENTIFIED)
     return Identification(
         model="kelvin-voigt" if massless and name == "kelvin-voigt-mass" else name,
         parameters=parameters,
         contacts=_contact_times(log, problem.contacts),
         lag=_lag(choice),
-        r2=max(found.fit.r2, 0.0),
-        rmse=found.fit.rmse,
+        r2=max(fitted.fit.r2, 0.0),
+        rmse=fitted.fit.rmse,
         n=len(problem.force),
-        warnings=(*warnings, *_doubts(log, parameters, press, problem, warnings)),
+        warnings=(*warnings, *_doubtful_numbers(log, parameters, press, problem, warnings)),
         comparison=choice.tried,
         cutoff=problem.motion.chain.cutoff,
         traces=_traces(log, choice),
-        estimate=Estimate(holds.names, holds.theta, holds.cov, holds.effective),
         working_point=point,
         dynamic_stiffness=spectrum,
         press=press,
         options=_plain_options(options),
-        depth=found.fit.model.depth,
+        depth=fitted.fit.model.depth,
         inputs=_inputs(problem, options),
         correlation=_correlation(choice, parameters, point),
     )
 
 
-def _of_surface(choice: Choice, holds: Fit, options: Options) -> tuple[Choice, Fit]:
-    """The surface alone: without the spring in series with it, and as uncertain as the tool's weighed inertia."""
-    series, payload, band = SeriesSpring.of(options), choice.problem.contacts.payload, choice.problem.band
+def _surface_alone(choice: Choice, options: Options) -> Choice:
+    """Remove the series spring from the answer, and add the uncertainty of the tool's inertia."""
+    series = SeriesSpring.of(options)
+    payload = choice.problem.contacts.payload
+    band = choice.problem.band
     if series is not None:
         choice = replace(choice, answer=series.parameters(choice.answer, band))
-        holds = series.parameters(holds, band)
     if payload is not None:
         weighed = np.where(np.array(choice.answer.names) == "M", payload.std, 0.0)
         choice = replace(choice, answer=choice.answer.with_cause("tool's inertia", weighed))
-    return choice, holds
+    return choice
 
 
 def _contact_times(log: _PreparedLog, contacts: Contacts) -> tuple[tuple[float, float], ...]:
     """Begin and end of each contact on the log's clock [s]."""
-    start, delay = log.channels.start, 0.0 if contacts.bonded else log.chain.delay
-    ends = ((start + i * log.channels.dt - delay for i in span) for span in contacts.spans)
+    start = log.channels.start
+    delay = 0.0 if contacts.bonded else log.chain.delay
+    ends = ((start + sample * log.channels.dt - delay for sample in span) for span in contacts.spans)
     return tuple((max(float(begin), start), float(end)) for begin, end in ends)
 
 
-def _nothing(log: _PreparedLog, warnings: tuple[Warn, ...]) -> Identification:
+def _no_contact(log: _PreparedLog, warnings: tuple[Warn, ...]) -> Identification:
     """There is no contact: every parameter without a number, and the force, which says why."""
-    reason, nan = "there is no contact in this log", float("nan")
+    reason = "there is no contact in this log"
+    nan = float("nan")
     return Identification(
         log.options.model or "kelvin-voigt",
         {name: Parameter.unknown(unit, reason) for name, unit in log.impedance_units.items()},
-        (), None, nan, nan, 0, warnings,
+        (),
+        None,
+        nan,
+        nan,
+        0,
+        warnings,
         cutoff=log.chain.cutoff,
         traces=_traces(log, None),
         options=_plain_options(log.options),
-    )  # fmt: skip
+    )
 
 
 def _plain_options(options: Options) -> dict[str, object]:
     """The given options, and the tolerance; a lag of 0 and "not bonded" are given too."""
-    told = {
-        own.name: getattr(options, own.name)
-        for own in fields(options)
-        if own.name == "tolerance" or getattr(options, own.name) != own.default
+    given = {
+        option.name: getattr(options, option.name)
+        for option in fields(options)
+        if option.name == "tolerance" or getattr(options, option.name) != option.default
     }
-    return told | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
+    return given | ({"force_filter": str(options.force_filter)} if options.force_filter else {})
 
 
 def _inputs(problem: Problem, options: Options) -> dict[str, Input]:
     """The input quantities whose uncertainty is given, or assumed, before the log is read."""
-    payload, (share, share_std) = problem.contacts.payload, options.swing
-    found = {
+    payload, (swing, swing_std) = problem.contacts.payload, options.swing
+    quantities = {
         "lag": Input(problem.lag.value + (problem.filtered or 0.0), problem.lag.std, "s"),
         "calibration": Input(1.0, options.calibration, "1"),
         "series stiffness": Input(options.series_stiffness or 0.0, options.series_std, "N/m"),
-        "tip's mass": Input(share, share_std, "s^2"),
+        "tip's mass": Input(swing, swing_std, "s^2"),
         "tool's inertia": Input(payload.mass, payload.std, "kg") if payload else Input(0.0, 0.0, "kg"),
     }
-    return {cause: own for cause, own in found.items() if own.std > 0}
+    return {cause: quantity for cause, quantity in quantities.items() if quantity.std > 0}
 
 
 def _correlation(
     choice: Choice, parameters: dict[str, Parameter], point: WorkingPoint | None
 ) -> dict[str, float]:
-    """Of the fit's K, B and M that have a number; a tangent in place of K is no part of the fit."""
-    found, tangent = choice.answer, point and point.stiffness
-    known = {name: p for name, p in parameters.items() if p.value is not None and p is not tangent}
-    names = [name for name in ("K", "B", "M") if name in found.names and name in known]
-    places = [found.names.index(name) for name in names]
-    return correlations(names, found.cov[np.ix_(places, places)])
+    """Correlations of the fit's K, B and M that have a number; a tangent in place of K is no part of the fit."""
+    fitted = choice.answer
+    tangent = point and point.stiffness
+    known = {
+        name: parameter
+        for name, parameter in parameters.items()
+        if parameter.value is not None and parameter is not tangent
+    }
+    names = [name for name in ("K", "B", "M") if name in fitted.names and name in known]
+    places = [fitted.names.index(name) for name in names]
+    return correlations(names, fitted.cov[np.ix_(places, places)])
 
 
 def _lag(choice: Choice) -> LagFound | None:
-    prior, found, filtered = choice.problem.lag, choice.answer, choice.problem.filtered or 0.0
+    prior = choice.problem.lag
+    fitted = choice.answer
+    filtered = choice.problem.filtered or 0.0
     if prior.known:
-        told = prior.value + filtered != 0 or prior.std > 0
-        return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "told") if told else None
-    half = found.half_of(LAG) if LAG in found.names else NORMAL * prior.std
-    if half <= _NARROWER * NORMAL * prior.std and not lag_open(choice.problem):
-        return LagFound(found[LAG] + filtered, half / NORMAL, half, "measured")
+        given = prior.value + filtered != 0 or prior.std > 0
+        return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "told") if given else None
+    half = fitted.half_of(LAG) if LAG in fitted.names else NORMAL * prior.std
+    if half <= _MEASURED_LAG_RATIO * NORMAL * prior.std and not lag_open(choice.problem):
+        return LagFound(fitted[LAG] + filtered, half / NORMAL, half, "measured")
     return LagFound(prior.value + filtered, prior.std, NORMAL * prior.std, "prior")
 
 
-def _doubts(
+def _doubtful_numbers(
     log: _PreparedLog,
     parameters: dict[str, Parameter],
     press: Press | None,
@@ -211,45 +229,57 @@ def _doubts(
     warnings: tuple[Warn, ...],
 ) -> list[Warn]:
     """The lag that the work of the presses tells, where it is beyond an assumed prior's bound; unlikely numbers."""
-    found, prior, late = [], problem.lag, press.late if press else None
+    doubts = []
+    prior = problem.lag
+    late = press.late if press else None
     known = prior.known or any(w.code is Code.FORCE_LAGS_POSITION for w in warnings)
     if late is not None and not known and late[0] > NORMAL * prior.std:
         text = (
             f"unloading returns more work than loading took, which no passive surface does: the force is read"
             f" after the position by {prior.value + late[0]:.2g} s or more (± {late[1]:.2g}); calibrate the lag"
         )
-        found.append(Warn(Code.FORCE_LAGS_POSITION, text))
+        doubts.append(Warn(Code.FORCE_LAGS_POSITION, text))
     stiffness = parameters["K"].value if "K" in parameters else None
-    if stiffness is not None and parameters["K"].unit == "N/m" and not _SOFTEST <= stiffness <= _STIFFEST:
-        off = "is a unit off, as by a factor of 1000?"
-        text = f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: {off}"
-        found.append(Warn(Code.UNIT_DOUBTFUL, text))
+    if (
+        stiffness is not None
+        and parameters["K"].unit == "N/m"
+        and not _MIN_STIFFNESS <= stiffness <= _MAX_STIFFNESS
+    ):
+        question = "is a unit off, as by a factor of 1000?"
+        text = f"K = {stiffness:.3g} N/m lies outside 1 N/m to 100 MN/m: {question}"
+        doubts.append(Warn(Code.UNIT_DOUBTFUL, text))
     series = log.options.series_stiffness
     if stiffness is not None and series and stiffness > series / 3:
-        beside = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it"
-        text = f"{beside}: K depends on that calibration"
-        found.append(Warn(Code.SERIES_COMPLIANCE, text))
+        comparison = f"K = {stiffness:.3g} against {series:.3g} N/m in series with it"
+        text = f"{comparison}: K depends on that calibration"
+        doubts.append(Warn(Code.SERIES_COMPLIANCE, text))
     deep = float(np.ptp(problem.motion.position[problem.in_contact]))
-    if log.units["position"] == "m" and deep > _DEEPEST:
+    if log.units["position"] == "m" and deep > _MAX_DEPTH:
         text = f"the probe moves by {deep:.3g} m in contact: is the position in mm? then say NAME:mm"
-        found.append(Warn(Code.UNIT_DOUBTFUL, text))
-    return found
+        doubts.append(Warn(Code.UNIT_DOUBTFUL, text))
+    return doubts
 
 
 def _traces(log: _PreparedLog, choice: Choice | None) -> Traces:
     """Signals and fit to be drawn; of a log in which nothing is touched, the force alone."""
-    channels, chain, units = log.channels, log.chain, log.units
-    step, both = max(len(channels.position) // _SHOWN, 1), (units["position"], units["force"])
-    time = (channels.time - chain.delay)[::step]
+    channels = log.channels
+    chain = log.chain
+    units = log.units
+    stride = max(len(channels.position) // _MAX_TRACE_SAMPLES, 1)
+    axis_units = (units["position"], units["force"])
+    time = (channels.time - chain.delay)[::stride]
     if choice is None:
         none = np.empty(0)
-        return Traces(time, chain(channels.force)[::step], *(none,) * 4, {}, {}, {}, False, *both)
-    problem, fitted = choice.answer.problem, choice.answer.fit
-    size, linear, mass = max(len(problem.force) // _SHOWN, 1), fitted.model.linear, problem.lag.mass
+        return Traces(time, chain(channels.force)[::stride], *(none,) * 4, {}, {}, {}, False, *axis_units)
+    problem = choice.answer.problem
+    fitted = choice.answer.fit
+    size = max(len(problem.force) // _MAX_TRACE_SAMPLES, 1)
+    linear = fitted.model.linear
+    mass = problem.lag.mass
     columns = fitted.model.columns(problem.motion, fitted.theta, fitted.lag)
     return Traces(
         time,
-        chain(problem.contacts.force_sign * channels.force)[::step] - problem.resting,
+        chain(problem.contacts.force_sign * channels.force)[::stride] - problem.resting,
         block_means(channels.start + problem.time, size),
         block_means(problem.motion.moved(0, fitted.lag), size),
         block_means(problem.force, size),
@@ -258,5 +288,5 @@ def _traces(log: _PreparedLog, choice: Choice | None) -> Traces:
         {name: fitted[name] for name in linear},
         {"M": mass[1]} if mass and "M" in linear else {},
         problem.motion.matched,
-        *both,
+        *axis_units,
     )

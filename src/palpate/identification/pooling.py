@@ -26,17 +26,17 @@ from palpate.signals.types import NORMAL
 
 Interval = tuple[float, float]
 
-_ROUNDS = 100
-_EXACT = 1e-12
+_MAX_ITERATIONS = 100
+_NO_VARIANCE = 1e-12
 """Share of the spread of the values below which a stated variance counts as none."""
-_ALONE = 4.0
+_SINGLE_FREEDOM = 4.0
 """Degrees of freedom of a single effect's own variance, which nothing repeats."""
 _POOLED = ("K", "B", "M", "E")
 """Parameters that mean the same in each log."""
-_BY_CHANCE = ("noise", "repetition", "blocks")
+_INDEPENDENT_CAUSES = ("noise", "repetition", "blocks")
 """Causes whose errors are independent from log to log. The others are errors common to all logs of one rig and one
 motion (the lag, a calibration, a force that the model lacks): no number of logs makes them smaller."""
-_ALIKE = {"kelvin-voigt-mass": "kelvin-voigt"}
+_SAME_MEANING = {"kelvin-voigt-mass": "kelvin-voigt"}
 """Models whose parameters of one name are one quantity."""
 
 
@@ -82,23 +82,27 @@ def random_effects(values: Array, variances: Array, covariates: Array | None = N
     """
     n = len(values)
     if n == 1:
-        return Mean(float(values[0]), float(np.sqrt(variances[0])), _ALONE, 0.0, 1)
+        return Mean(float(values[0]), float(np.sqrt(variances[0])), _SINGLE_FREEDOM, 0.0, 1)
     scale = float(max(np.ptp(values) ** 2, variances.max())) or 1.0
-    centre, size = float(values.mean()), float(np.sqrt(scale))
-    y, own = (values - centre) / size, np.maximum(variances / scale, _EXACT)
+    centre = float(values.mean())
+    size = float(np.sqrt(scale))
+    y = (values - centre) / size
+    own_variances = np.maximum(variances / scale, _NO_VARIANCE)
     offsets = np.empty((n, 0)) if covariates is None else covariates - covariates.mean(axis=0)
     spans = offsets.std(axis=0)
     design = np.column_stack([np.ones(n), offsets / spans])
-    freedom, between = n - design.shape[1], _between(y, own, design)
-    weight = 1 / (own + between)
+    freedom = n - design.shape[1]
+    between = _between_variance(y, own_variances, design)
+    weight = 1 / (own_variances + between)
     theta, inverse = _least_squares(y, weight, design)
     excess = max(float(weight @ (y - design @ theta) ** 2) / freedom, 1.0)
     stds = size * np.sqrt(excess * np.diag(inverse))
-    pull = design @ inverse[0] * weight  # of each effect on the mean
-    share = between * float(pull @ pull) / float(inverse[0, 0])
+    influence = design @ inverse[0] * weight  # of each effect on the mean
+    between_fraction = between * float(influence @ influence) / float(inverse[0, 0])
     slopes = zip((size * theta[1:] / spans).tolist(), (stds[1:] / spans).tolist(), strict=True)
-    value, deviation = centre + size * float(theta[0]), size * float(np.sqrt(between))
-    return Mean(value, float(stds[0]), float(freedom), deviation, n, share, tuple(slopes))
+    value = centre + size * float(theta[0])
+    deviation = size * float(np.sqrt(between))
+    return Mean(value, float(stds[0]), float(freedom), deviation, n, between_fraction, tuple(slopes))
 
 
 def _least_squares(y: Array, weight: Array, design: Array) -> tuple[Array, Array]:
@@ -107,16 +111,17 @@ def _least_squares(y: Array, weight: Array, design: Array) -> tuple[Array, Array
     return inverse @ (design.T @ (weight * y)), inverse
 
 
-def _between(y: Array, own: Array, design: Array) -> float:
+def _between_variance(y: Array, own_variances: Array, design: Array) -> float:
     """Variance between effects at which their weighted spread is what it should be: n - p (Newton from below)."""
-    between, freedom = 0.0, len(y) - design.shape[1]
-    for _ in range(_ROUNDS):
-        weight = 1 / (own + between)
-        left = y - design @ _least_squares(y, weight, design)[0]
-        excess = float(weight @ left**2) - freedom
+    between = 0.0
+    freedom = len(y) - design.shape[1]
+    for _ in range(_MAX_ITERATIONS):
+        weight = 1 / (own_variances + between)
+        residual = y - design @ _least_squares(y, weight, design)[0]
+        excess = float(weight @ residual**2) - freedom
         if excess <= 1e-9 * len(y):
             break
-        between += excess / float(weight**2 @ left**2)
+        between += excess / float(weight**2 @ residual**2)
     return between
 
 
@@ -192,10 +197,10 @@ class Pooled(Result):
         return len(self.logs)
 
     @property
-    def found(self) -> bool:
-        """Whether there is anything with a number."""
+    def identified(self) -> bool:
+        """True if the stiffness at the working point or a parameter is identified over the logs."""
         point = [self.working_point.stiffness] if self.working_point else []
-        return any(p.parameter.value is not None for p in (*self.parameters.values(), *point))
+        return any(p.parameter.verdict is Verdict.IDENTIFIED for p in (*self.parameters.values(), *point))
 
     def to_json(self) -> dict[str, Any]:
         """The plain values under `pooled` of `palpate identify --json` for many logs."""
@@ -226,18 +231,21 @@ def pool(
     """
     if names and len(names) != len(logs):
         raise InputError(f"names must be one for each of the {len(logs)} logs, got {len(names)}")
-    beside = _Covariates.of(covariates or {}, len(logs))
-    own = {}
+    regressors = _Covariates.of(covariates or {}, len(logs))
+    pooled = {}
     for name in _POOLED:
-        given = [  # a parameter, and the model that gives it its meaning
-            (log.parameters[name], "" if name == "E" else _ALIKE.get(log.model, log.model))
-            if log is not None and name in log.parameters
+        reported = [  # a parameter, and the model that gives it its meaning
+            (
+                identification.parameters[name],
+                "" if name == "E" else _SAME_MEANING.get(identification.model, identification.model),
+            )
+            if identification is not None and name in identification.parameters
             else None
-            for log in logs
+            for identification in logs
         ]
-        if any(given):
-            own[name] = _pool(given, tolerance, beside)
-    return Pooled(own, _point(logs, tolerance, beside), tuple(logs), tuple(names))
+        if any(reported):
+            pooled[name] = _pool(reported, tolerance, regressors)
+    return Pooled(pooled, _point(logs, tolerance, regressors), tuple(logs), tuple(names))
 
 
 @dataclass(frozen=True)
@@ -248,39 +256,39 @@ class _Covariates:
     numbers: Array
 
     @classmethod
-    def of(cls, given: Mapping[str, ArrayLike], count: int) -> _Covariates:
-        found = cls((), np.empty((count, 0)))
-        for name, values in given.items():
+    def of(cls, columns: Mapping[str, ArrayLike], count: int) -> _Covariates:
+        collected = cls((), np.empty((count, 0)))
+        for name, values in columns.items():
             column = np.asarray(values, np.float64)
             if column.shape != (count,) or not np.isfinite(column).all():
                 raise InputError(f"the covariate {name} must be a number for each of the {count} logs")
-            found = cls((*found.names, name), np.column_stack([found.numbers, column]))
-            if not found.vary(range(count)):
+            collected = cls((*collected.names, name), np.column_stack([collected.numbers, column]))
+            if not collected.vary(range(count)):
                 raise InputError(
                     f"the covariate {name} is the same in all {count} logs, or a combination of others; leave it out"
                 )
-        return found
+        return collected
 
     def vary(self, logs: Sequence[int]) -> bool:
-        """Whether these logs tell the effect of each from the others'."""
-        own = self.numbers[list(logs)]
-        spread = own.std(axis=0)
-        if (spread <= _EXACT * abs(own).max(axis=0, initial=0.0)).any():
+        """True if these logs separate the effects of the covariates."""
+        selected = self.numbers[list(logs)]
+        spread = selected.std(axis=0)
+        if (spread <= _NO_VARIANCE * abs(selected).max(axis=0, initial=0.0)).any():
             return False
-        return int(np.linalg.matrix_rank((own - own.mean(axis=0)) / spread)) == len(self.names)
+        return int(np.linalg.matrix_rank((selected - selected.mean(axis=0)) / spread)) == len(self.names)
 
 
 def _point(
-    logs: Sequence[Identification | None], tolerance: float, beside: _Covariates
+    logs: Sequence[Identification | None], tolerance: float, covariates: _Covariates
 ) -> PooledPoint | None:
-    points = [found.working_point if found else None for found in logs]
+    points = [log.working_point if log else None for log in logs]
     if not any(points):
         return None
-    stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance, beside)
+    stiffness = _pool([(point.stiffness, "") if point else None for point in points], tolerance, covariates)
     used = [p for i in stiffness.logs or range(len(points)) if (p := points[i]) is not None]
     forces, depths, frequencies = zip(*((p.force_N, p.depth_m, p.frequency_Hz) for p in used), strict=True)
-    ranges = ((min(own), max(own)) for own in (forces, depths, frequencies))
-    return PooledPoint(stiffness, *ranges)
+    intervals = ((min(values), max(values)) for values in (forces, depths, frequencies))
+    return PooledPoint(stiffness, *intervals)
 
 
 def _pool(
@@ -291,7 +299,7 @@ def _pool(
     for i, (p, meaning) in ((i, pair) for i, pair in enumerate(own) if pair is not None):
         if p.value is not None and p.ci95 is not None and p.verdict is not Verdict.REJECTED:
             half = (p.ci95[1] - p.ci95[0]) / 2
-            alike = [part for cause, part in p.budget.items() if cause not in _BY_CHANCE]
+            alike = [part for cause, part in p.budget.items() if cause not in _INDEPENDENT_CAUSES]
             common = min(float(np.hypot.reduce([0.0, *alike])), half)
             kinds[i] = p.unit, meaning
             numbers_of[i] = p.value, float(np.sqrt(half**2 - common**2)), common
@@ -306,7 +314,8 @@ def _pool(
         return PooledParameter(Parameter.unknown(kind[0], few), None, None, tuple(used))
     values, halves, shared = np.array([*used.values()]).T
     numbers = beside.numbers[list(used)]
-    mean, common = random_effects(values, (halves / NORMAL) ** 2, numbers), float(shared.mean())
+    mean = random_effects(values, (halves / NORMAL) ** 2, numbers)
+    common = float(shared.mean())
     again = None if mean.next_half is None else float(np.hypot(mean.next_half, common))
     prediction = None if again is None else (mean.value - again, mean.value + again)
     of = f"{mean.count} of {len(own)} logs{f', as of {kind[1]}' if kind[1] else ''}"
@@ -316,7 +325,7 @@ def _pool(
         "each log": Contribution(mean.std * float(np.sqrt(1 - mean.share)), freedom),
         "common to all logs": Contribution.within(common),
     }
-    together = _judge(Measurement(mean.value, parts), kind[0], of, tolerance)
+    together = _judge_pooled(Measurement(mean.value, parts), kind[0], of, tolerance)
     slopes = {}
     for name, (slope, std) in zip(beside.names, mean.slopes, strict=True):
         scaled = common * abs(slope / mean.value) if mean.value else 0.0  # such an error is of the scale
@@ -324,19 +333,21 @@ def _pool(
             "between logs": Contribution(std, mean.freedom),
             "common to all logs": Contribution.within(scaled),
         }
-        slopes[name] = _judge(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
+        slopes[name] = _judge_pooled(Measurement(slope, parts), f"{kind[0]} per {name}", of, tolerance)
     at = dict(zip(beside.names, numbers.mean(axis=0).tolist(), strict=True))
     return PooledParameter(together, prediction, mean.between, tuple(used), slopes, at)
 
 
-def _judge(own: Measurement, unit: str, of: str, tolerance: float) -> Parameter:
-    """A verdict on a number; `of` names the logs that it is from."""
-    share = own.half / abs(own.value) if own.value else np.inf
-    found = Parameter.of(own.value, unit, Verdict.IDENTIFIED, "", own.contributions)
-    if share >= 1:
-        reason = f"95 %: {own.value - own.half:.3g} to {own.value + own.half:.3g}; zero is within it ({of})"
-        return found.without_number(reason, ci95=found.ci95)
-    verdict = Verdict.IDENTIFIED if share <= tolerance else Verdict.NOT_IDENTIFIABLE
-    only = "" if verdict is Verdict.IDENTIFIED else " only"
-    reason = f"known to {100 * share:.2g} %{only} (95 %), from {of}"
-    return replace(found, verdict=verdict, reason=reason)
+def _judge_pooled(measurement: Measurement, unit: str, source: str, tolerance: float) -> Parameter:
+    """A verdict on a pooled number; `source` names its logs."""
+    relative_half = measurement.half / abs(measurement.value) if measurement.value else np.inf
+    parameter = Parameter.of(measurement.value, unit, Verdict.IDENTIFIED, "", measurement.contributions)
+    if relative_half >= 1:
+        low = measurement.value - measurement.half
+        high = measurement.value + measurement.half
+        reason = f"95 %: {low:.3g} to {high:.3g}; zero is within it ({source})"
+        return parameter.without_number(reason, ci95=parameter.ci95)
+    verdict = Verdict.IDENTIFIED if relative_half <= tolerance else Verdict.NOT_IDENTIFIABLE
+    qualifier = "" if verdict is Verdict.IDENTIFIED else " only"
+    reason = f"known to {100 * relative_half:.2g} %{qualifier} (95 %), from {source}"
+    return replace(parameter, verdict=verdict, reason=reason)

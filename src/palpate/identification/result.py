@@ -10,7 +10,6 @@ from palpate.arrays import Array
 from palpate.identification.causes import Warn
 from palpate.identification.uncertainty import Input, Measurement, Parameter, Verdict
 from palpate.records import Compared, Readable, Result
-from palpate.signals import Estimate
 
 
 @dataclass(frozen=True)
@@ -111,12 +110,15 @@ class Press(Compared):
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
-        own = self.relaxation
-        return {
-            "tangent": [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent],
-            "hysteresis_loss": self.hysteresis_loss,
-            "relaxation": own and {"share": own.share, "half_time_s": own.half_time, "duration_s": own.duration},
-        }  # fmt: skip
+        tangent = [{"force_N": t.force, "stiffness": t.stiffness, "half": t.half} for t in self.tangent]
+        relaxation = None
+        if self.relaxation:
+            relaxation = {
+                "share": self.relaxation.share,
+                "half_time_s": self.relaxation.half_time,
+                "duration_s": self.relaxation.duration,
+            }
+        return {"tangent": tangent, "hysteresis_loss": self.hysteresis_loss, "relaxation": relaxation}
 
 
 @dataclass(frozen=True)
@@ -147,9 +149,9 @@ class WorkingPoint(Readable):
 
     def to_json(self) -> dict[str, Any]:
         """Plain values that JSON can hold."""
-        again = list(self.prediction95) if self.prediction95 else None
+        interval = list(self.prediction95) if self.prediction95 else None
         return {
-            "stiffness": self.stiffness.to_json() | {"prediction95": again},
+            "stiffness": self.stiffness.to_json() | {"prediction95": interval},
             "force_N": self.force_N,
             "depth_m": self.depth_m,
             "frequency_Hz": self.frequency_Hz,
@@ -160,7 +162,7 @@ class WorkingPoint(Readable):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well one of the models fits the same filtered force, by its name, and what speaks for or against it."""
+    """Fit of one model to the same filtered force, by its name, and the comment on it."""
 
     model: str
     r2: float
@@ -200,7 +202,7 @@ class Traces(Compared):
 
 @dataclass(frozen=True)
 class SlideFound:
-    """A slide along the surface, as `palpate-slide` finds it in a log.
+    """A slide along the surface, as `palpate.contact_frame` finds it in a log.
 
     Args:
         sentence: the answer.
@@ -215,7 +217,7 @@ class SlideFound:
 
 @dataclass(frozen=True)
 class LagFound:
-    """How much later the force is read than the position.
+    """Delay of the force behind the position.
 
     Args:
         value, std: [s].
@@ -243,7 +245,6 @@ class Identification(Result):
         comparison: all the models that were tried.
         cutoff: of the filter chain [Hz].
         traces: for the figure.
-        estimate: the fit's own parameters with their covariance, before any verdict; offset and lag among them.
         working_point: the stiffness that the log shows whatever the model; None without a contact.
         dynamic_stiffness: by octave, lowest first.
         press: force over depth; None if the log does not show one.
@@ -265,7 +266,6 @@ class Identification(Result):
     comparison: tuple[Comparison, ...] = ()
     cutoff: float = float("nan")
     traces: Traces | None = field(default=None, repr=False)
-    estimate: Estimate | None = field(default=None, repr=False)
     working_point: WorkingPoint | None = None
     dynamic_stiffness: tuple[DynamicStiffness, ...] = ()
     press: Press | None = field(default=None, repr=False)
@@ -289,26 +289,34 @@ class Identification(Result):
         return tuple(warn.code.word for warn in self.warnings)
 
     @property
-    def found(self) -> bool:
-        """Whether there is anything with a number."""
-        return self.working_point is not None or any(p.value is not None for p in self.parameters.values())
+    def identified(self) -> bool:
+        """True if the stiffness at the working point or a parameter is identified."""
+        point = [self.working_point.stiffness] if self.working_point else []
+        return any(
+            parameter.verdict is Verdict.IDENTIFIED for parameter in (*point, *self.parameters.values())
+        )
 
     @property
     def resonance(self) -> tuple[float, float] | None:
         """Undamped resonance [Hz] and damping ratio, if mass, damping and stiffness are all identified."""
-        own = [self.parameters.get(name) for name in ("K", "B", "M")]
-        if not all(p and p.verdict is Verdict.IDENTIFIED for p in own):
+        parameters = [self.parameters.get(name) for name in ("K", "B", "M")]
+        if not all(parameter and parameter.verdict is Verdict.IDENTIFIED for parameter in parameters):
             return None
-        k, b, m = (p.value or 0.0 for p in own if p)
+        k, b, m = (parameter.value or 0.0 for parameter in parameters if parameter)
         return sqrt(k / m) / (2 * pi), b / (2 * sqrt(k * m))
 
     def to_json(self) -> dict[str, Any]:
         """The plain values that `palpate identify --json` prints."""
         # The chosen one is called as the parameters' model, whose mass may be left out.
-        chosen = [isclose(own.rmse, self.rmse, rel_tol=1e-9) for own in self.comparison]
+        chosen = [isclose(comparison.rmse, self.rmse, rel_tol=1e-9) for comparison in self.comparison]
         models = [
-            {"model": self.model if own else m.model, "r2": _plain(m.r2), "note": m.note, "chosen": own}
-            for m, own in zip(self.comparison, chosen, strict=True)
+            {
+                "model": self.model if comparison else m.model,
+                "r2": _plain(m.r2),
+                "note": m.note,
+                "chosen": comparison,
+            }
+            for m, comparison in zip(self.comparison, chosen, strict=True)
         ]
         return {
             "model": self.model,
@@ -329,11 +337,11 @@ class Identification(Result):
 
     def uncertainty_json(self) -> dict[str, Any]:
         """Uncertainty budgets of the working point and of each parameter with a number, as plain values."""
-        every = {"working_point": self.working_point.stiffness} if self.working_point else {}
+        point_parameter = {"working_point": self.working_point.stiffness} if self.working_point else {}
         budgets = {
-            name: own.budget_json(self.inputs) | {"value": own.value, "unit": p.unit}
-            for name, p in (every | self.parameters).items()
-            if (own := p.measurement) is not None
+            name: measurement.budget_json(self.inputs) | {"value": measurement.value, "unit": parameter.unit}
+            for name, parameter in (point_parameter | self.parameters).items()
+            if (measurement := parameter.measurement) is not None
         }
         return {
             "working_point": budgets.pop("working_point", None),

@@ -21,26 +21,26 @@ from numpy.polynomial import chebyshev
 
 from palpate.arrays import Array
 from palpate.identification.free_motion import Drift
-from palpate.identification.least_squares import noise_of
+from palpate.identification.least_squares import estimate_noise
 from palpate.identification.options import Lag
 from palpate.identification.pooling import random_effects
 from palpate.identification.sampling import Channels
-from palpate.identification.strokes import BLOCKS, STROKE, Stroke, turns_of
+from palpate.identification.strokes import MAX_BLOCKS, MIN_STROKE_REACH, Stroke, find_turns
 from palpate.identification.uncertainty import Contribution, Measurement
 from palpate.signals.samples import block_means
 
 WINDOW = (0.35, 0.97)
-"""Shares of a stroke's force about the tangent that is named: below, a surface is still being met."""
+"""Force range, as fractions of the peak, over which the tangent is fitted; below it the contact area still grows."""
 LEVELS = (0.3, 0.5, 0.9)
-"""Shares of the force whose tangents are listed beside it."""
-NEAR = 0.2
-"""Half of the share of the force about a level in which its tangent is taken: the levels beside it lie so far off."""
-_MOST, _FEWEST = 96, 12
+"""Fractions of the force at which further tangents are listed."""
+HALF_WINDOW = 0.2
+"""Half of the window about a level in which its tangent is fitted, as a fraction of the force."""
+_MAX_BLOCKS, _MIN_BLOCKS = 96, 12
 """Blocks in a window."""
-_SHOWN = 400
-"""Points of a curve that are kept at most, to be drawn."""
+_MAX_CURVE_POINTS = 400
+"""Maximum points of a curve that is drawn."""
 _DEGREES = (2, 4, 6, 8)
-"""Of the curves that are averaged: an odd degree moves the slope in the middle as the even one above it does."""
+"""Degrees of the averaged curves; an odd degree changes the slope in the middle as the next even one does."""
 
 
 class _Tangent(NamedTuple):
@@ -92,30 +92,38 @@ class Curve:
     @property
     def abscissa(self) -> tuple[Array, float, float]:
         """Depth from -1 to 1, shape (n,), about its middle [m], over half of its range [m]."""
-        low, high = float(self.depth.min()), float(self.depth.max())
-        return (self.depth - (low + high) / 2) / ((high - low) / 2), (low + high) / 2, (high - low) / 2
+        low = float(self.depth.min())
+        high = float(self.depth.max())
+        middle = (low + high) / 2
+        reach = (high - low) / 2
+        return (self.depth - middle) / reach, middle, reach
 
     def between(self, low: float, high: float) -> Curve | None:
-        """Block means of the unbroken part between the first and last crossing of two forces; None of too few."""
+        """Block means of the unbroken part between the crossings of two forces; None if there are too few."""
         force = self.force if self.loads else self.force[::-1]
         first = int(np.argmax(force > low))
         above = np.flatnonzero(force > high)
         last = int(above[0]) if len(above) else len(force)
-        count = min(_MOST, int((last - first) * self.readings))  # rows between two readings tell nothing more
-        if count < _FEWEST:
+        readings = int((last - first) * self.readings)  # rows between two readings add no information
+        count = min(_MAX_BLOCKS, readings)
+        if count < _MIN_BLOCKS:
             return None
         rows = slice(first, last) if self.loads else slice(len(force) - last, len(force) - first)
         edges = np.linspace(0, last - first, count + 1).astype(np.intp)
-        every = np.stack([self.time, self.depth, self.force, self.drift])[:, rows]
-        time, x, f, drift = np.add.reduceat(every, edges[:-1], axis=1) / np.diff(edges)
-        return Curve(time, x, f, drift, self.loads, 1.0) if len(np.unique(x)) > _DEGREES[0] else None
+        signals = np.stack([self.time, self.depth, self.force, self.drift])[:, rows]
+        means = np.add.reduceat(signals, edges[:-1], axis=1) / np.diff(edges)
+        if len(np.unique(means[1])) <= _DEGREES[0]:
+            return None
+        time, depth, force, drift = means
+        return Curve(time, depth, force, drift, self.loads, 1.0)
 
     def about(self, depth: float) -> Curve:
-        """The half of it about a depth [m]; the whole where that has blocks at too few depths."""
+        """The half of the curve about a depth [m]; all of it if that has blocks at too few depths."""
         near = np.abs(self.depth - depth) <= self.abscissa[2] / 2
-        if len(np.unique(self.depth[near])) < _FEWEST:
+        if len(np.unique(self.depth[near])) < _MIN_BLOCKS:
             return self
-        time, x, force, drift = (own[near] for own in (self.time, self.depth, self.force, self.drift))
+        signals = np.stack([self.time, self.depth, self.force, self.drift])[:, near]
+        time, x, force, drift = signals
         return Curve(time, x, force, drift, self.loads, 1.0)
 
     def fit(self, degree: int) -> Array:
@@ -124,49 +132,57 @@ class Curve:
 
     def tangent(self, level: float) -> _Tangent:
         """The slope of a window at a force [N]."""
-        (u, middle, reach), force = self.abscissa, self.force
-        degrees = [own for own in _DEGREES if own == _DEGREES[0] or 4 * own < len(np.unique(u))]
+        u, middle, reach = self.abscissa
+        force = self.force
+        depth_count = len(np.unique(u))
+        degrees = [degree for degree in _DEGREES if degree == _DEGREES[0] or 4 * degree < depth_count]
         fine = np.linspace(-1, 1, 201)
         curve = chebyshev.chebval(fine, self.fit(degrees[:2][-1]))
-        at = float(fine[int(np.argmin(np.abs(curve - level)))])
-        left = force - chebyshev.chebval(u, self.fit(degrees[-1]))
-        noise, free = noise_of(left, np.arange(len(left)), degrees[-1] + 1), len(left) - degrees[-1] - 1
+        place = float(fine[int(np.argmin(np.abs(curve - level)))])
+        residual = force - chebyshev.chebval(u, self.fit(degrees[-1]))
+        noise = estimate_noise(residual, np.arange(len(residual)), degrees[-1] + 1)
+        free = len(residual) - degrees[-1] - 1
         rounding = (1e-9 * float(np.ptp(force))) ** 2
-        variance = max(float(left @ left) / free * max(len(left) / noise.effective, 1.0), rounding)
-        every = []
+        inflation = max(len(residual) / noise.effective, 1.0)
+        variance = max(float(residual @ residual) / free * inflation, rounding)
+        fits = []
         for degree in degrees:
             inverse = np.linalg.pinv(chebyshev.chebvander(u, degree))
-            weights = np.asarray(chebyshev.chebval(at, chebyshev.chebder(inverse)))  # of blocks on the slope
+            derivative = chebyshev.chebder(inverse)
+            weights = np.asarray(chebyshev.chebval(place, derivative))  # of blocks on the slope
             misfit = force - chebyshev.chebval(u, inverse @ force)
             criterion = float(misfit @ misfit) / variance + 2 * (degree + 1)
-            every.append((float(weights @ force), variance * float(weights @ weights), criterion))
-        values, own, criteria = np.array(every).T
-        share = np.exp(-(criteria - criteria.min()) / 2)
-        share /= share.sum()
-        mean = float(share @ values)
-        spread = float(share @ (own + (values - mean) ** 2))
+            fits.append((float(weights @ force), variance * float(weights @ weights), criterion))
+        values, variances, criteria = np.array(fits).T
+        probability = np.exp(-(criteria - criteria.min()) / 2)
+        probability /= probability.sum()
+        mean = float(probability @ values)
+        spread = float(probability @ (variances + (values - mean) ** 2))
         acceleration, speed, _ = np.polyfit(self.time - self.time.mean(), u, 2)
-        drift = float(self.drift[-1] - self.drift[0]) / float(self.depth[-1] - self.depth[0])
+        travel = float(self.depth[-1] - self.depth[0])
+        drift = float(self.drift[-1] - self.drift[0]) / travel
         change = float(2 * acceleration / (speed or 1e-300))
-        return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * at)
+        return _Tangent(mean / reach, spread / reach**2, change, drift, middle + reach * place)
 
 
-def curves_of(
+def stroke_curves(
     channels: Channels, strokes: Sequence[Stroke], signs: tuple[float, float], drift: Drift | None
 ) -> list[Curve]:
     """The force of each stroke over its depth."""
     curves = []
     for rows in (stroke.rows(channels) for stroke in strokes):
-        there = np.flatnonzero(channels.valid[rows]) + rows.start
-        if len(there) < 2 * _FEWEST:
+        valid_rows = np.flatnonzero(channels.valid[rows]) + rows.start
+        if len(valid_rows) < 2 * _MIN_BLOCKS:
             continue
-        time, force = channels.time[there], signs[1] * channels.force[there]
-        begin, *_, end = (float(np.median(own)) for own in np.array_split(force, 5))
-        gone = np.zeros(len(time))
+        time = channels.time[valid_rows]
+        force = signs[1] * channels.force[valid_rows]
+        begin, *_, end = (float(np.median(part)) for part in np.array_split(force, 5))
+        removed_drift = np.zeros(len(time))
         if drift is not None:
-            gone = np.interp(time - channels.start, drift.times, drift.levels)
+            removed_drift = np.interp(time - channels.start, drift.times, drift.levels)
         readings = min(channels.rate * channels.dt, 1.0)
-        curves.append(Curve(time, signs[0] * channels.position[there], force, gone, end > begin, readings))
+        depth = signs[0] * channels.position[valid_rows]
+        curves.append(Curve(time, depth, force, removed_drift, end > begin, readings))
     return curves
 
 
@@ -190,7 +206,7 @@ class Slopes:
     rise: float
 
     def spread_as(self, wider: Slopes | None) -> Slopes:
-        """The same with the relative spread of more presses, if that is larger, as of one on another surface."""
+        """Take over the relative spread of more presses, if it is larger, as of one on another surface."""
         if wider is None or not wider.stiffness.value:
             return self
         gain = self.stiffness.value / wider.stiffness.value
@@ -206,46 +222,51 @@ def slopes_at(
 ) -> Slopes | None:
     """The tangent in the middle of a window of the force that all curves pass; None if it is too short.
 
-    Where strokes differ by more than their noise, the variance between them is in the interval. The curves are of one
-    direction, and the window lies between shares of the force that they have in common; `rest` is the force out of
+    If strokes differ by more than their noise, the interval includes the variance between them. The curves have one
+    direction, and the window lies between fractions `shares` of their common force range; `rest` is the force out of
     contact [N].
     """
-    low, high = max(own.reach[0] for own in curves), min(own.reach[1] for own in curves)
-    ends = low + shares[0] * (high - low), low + shares[1] * (high - low)
-    windows = [own for curve in curves if (own := curve.between(*ends)) is not None]
+    low = max(curve.reach[0] for curve in curves)
+    high = min(curve.reach[1] for curve in curves)
+    begin, end = (low + share * (high - low) for share in shares)
+    windows = [window for curve in curves if (window := curve.between(begin, end)) is not None]
     if not windows or high <= low:
         return None
-    level = float(np.mean([chebyshev.chebval(0.0, own.fit(2)) for own in windows]))
-    every = [own.tangent(level) for own in windows]
-    values, variances, bends, drifts, depths = np.array(every).T
-    # A bend that no smooth curve follows, as a second layer, biases the slope, in half of the window less. The slopes
-    # differ by that bias and the noise of the narrower: it is known as well as its excess over the noise (James and
-    # Stein's shrinkage).
-    nearer = [own.about(depth).tangent(level) for own, depth in zip(windows, depths, strict=True)]
-    apart = np.array([own.slope for own in nearer]) - values
-    noises = np.array([own.variance for own in nearer])
-    share = np.maximum(1 - noises / np.maximum(apart**2, 1e-300), 0.0)
-    values, bent = values + share * apart, share * noises
-    mean = random_effects(values, variances + bent)
-    n, weight = len(values), 1 / np.maximum(variances + mean.between**2, 1e-300)
+    level = float(np.mean([chebyshev.chebval(0.0, window.fit(2)) for window in windows]))
+    tangents = [window.tangent(level) for window in windows]
+    slopes, variances, bends, drifts, depths = np.array(tangents).T
+    # A bend that no smooth curve follows, such as a second layer, biases the slope, and less in half of the window. The
+    # two slopes differ by that bias and the noise of the narrower window (James and Stein's shrinkage).
+    halves = [window.about(depth) for window, depth in zip(windows, depths, strict=True)]
+    near_tangents = [half.tangent(level) for half in halves]
+    differences = np.array([tangent.slope for tangent in near_tangents]) - slopes
+    noises = np.array([tangent.variance for tangent in near_tangents])
+    shrinkage = np.maximum(1 - noises / np.maximum(differences**2, 1e-300), 0.0)
+    slopes = slopes + shrinkage * differences
+    bias_variances = shrinkage * noises
+    mean = random_effects(slopes, variances + bias_variances)
+    n = len(slopes)
+    weight = 1 / np.maximum(variances + mean.between**2, 1e-300)
     weight /= weight.sum()
-    noise, differ = float(np.sqrt(weight**2 @ variances)), mean.between * float(np.sqrt(weight @ weight))
+    noise = float(np.sqrt(weight**2 @ variances))
+    scatter = mean.between * float(np.sqrt(weight @ weight))
     # Satterthwaite: the noise is known, the differences by n - 1.
-    part = differ**2 / max(noise**2 + differ**2, 1e-300)
-    freedom = (n - 1) / part**2 if part else np.inf
+    scatter_fraction = scatter**2 / max(noise**2 + scatter**2, 1e-300)
+    freedom = (n - 1) / scatter_fraction**2 if scatter_fraction else np.inf
     bend = float(weight @ bends)
-    value = float(weight @ values) * (1 + lag.value * bend)
+    value = float(weight @ slopes) * (1 + lag.value * bend)
     parts = {
-        "repetition": Contribution(differ, freedom),
+        "repetition": Contribution(scatter, freedom),
         "noise": Contribution(noise, freedom),
         "lag": Contribution(lag.std * abs(value * bend)),
-        "curvature": Contribution(float(np.sqrt(weight**2 @ bent))),
+        "curvature": Contribution(float(np.sqrt(weight**2 @ bias_variances))),
         # Known where the probe is free, not in between.
         "other forces": Contribution.within(float(weight @ np.abs(drifts))),
     }
-    rise = float(np.mean([own.time[-1] - own.time[0] for own in curves]))
-    at, stiffness = (level - rest, float(weight @ depths)), Measurement(value, parts)
-    return Slopes(*at, stiffness, tuple(values.tolist()), mean.next_half, rise)
+    rise = float(np.mean([curve.time[-1] - curve.time[0] for curve in curves]))
+    depth = float(weight @ depths)
+    stiffness = Measurement(value, parts)
+    return Slopes(level - rest, depth, stiffness, tuple(slopes.tolist()), mean.next_half, rise)
 
 
 @dataclass(frozen=True)
@@ -274,36 +295,41 @@ def steady_press(
 ) -> SteadyPress | None:
     """The press of a log's strokes; None where the force does not follow them.
 
-    The tangents are of the loadings; of the unloadings, where the log has no other stroke. The channels are as logged,
-    less a drift of the force; signs of position and force are those to multiply them with, and the force out of contact
-    is after the sign [N].
+    The tangents belong to the loadings, or to the unloadings if the log has no other stroke. The channels are as
+    logged, less a drift of the force; `signs` multiply position and force, and `rest` is the force out of contact after
+    its sign [N].
     """
-    every = curves_of(channels, strokes, signs, drift)
-    deepest = max((own.span for own in every), default=0.0)
-    curves = [own for own in every if own.span > deepest / 2]
-    named = [own for own in curves if own.loads]
-    force = block_means(signs[1] * channels.force[channels.valid], -(-len(channels.force) // BLOCKS))
-    if not named and (np.diff(force[turns_of(force, deepest / 2)]) > deepest / 2).any():
-        return None
-    named = named or curves
-    headline = slopes_at(named, WINDOW, lag, rest)
+    all_curves = stroke_curves(channels, strokes, signs, drift)
+    largest_span = max((curve.span for curve in all_curves), default=0.0)
+    curves = [curve for curve in all_curves if curve.span > largest_span / 2]
+    loadings = [curve for curve in curves if curve.loads]
+    if not loadings:
+        block = -(-len(channels.force) // MAX_BLOCKS)
+        force = block_means(signs[1] * channels.force[channels.valid], block)
+        turning_forces = force[find_turns(force, largest_span / 2)]
+        if (np.diff(turning_forces) > largest_span / 2).any():
+            return None
+    loadings = loadings or curves
+    headline = slopes_at(loadings, WINDOW, lag, rest)
     if headline is None:
         return None
-    beside = [own for own in every if own.loads is named[0].loads and own.span > STROKE * deepest]
-    if len(beside) > len(named):  # at a force that all reach
-        headline = headline.spread_as(slopes_at(beside, WINDOW, lag, rest))
+    long_curves = [curve for curve in all_curves if curve.span > MIN_STROKE_REACH * largest_span]
+    similar = [curve for curve in long_curves if curve.loads is loadings[0].loads]
+    if len(similar) > len(loadings):  # at a force that all reach
+        headline = headline.spread_as(slopes_at(similar, WINDOW, lag, rest))
     if not headline.stiffness.with_cause("repetition", Contribution(0.0)).known_to(1.0):
         return None
-    windows = [(level - NEAR, min(level + NEAR, 1.0)) for level in LEVELS]
-    others = [own for window in windows if (own := slopes_at(named, window, lag, rest)) is not None]
-    known = tuple(own for own in others if own.stiffness.known_to(1.0))
-    drawn = []
+    windows = [(level - HALF_WINDOW, min(level + HALF_WINDOW, 1.0)) for level in LEVELS]
+    others = [slopes_at(loadings, window, lag, rest) for window in windows]
+    known = tuple(slopes for slopes in others if slopes and slopes.stiffness.known_to(1.0))
+    drawn_curves = []
     for loads in (True, False):
-        longest = max((own for own in curves if own.loads is loads), key=lambda own: own.span, default=None)
-        drawn.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
-    return SteadyPress(headline, known, *map(few_points, drawn))
+        of_direction = [curve for curve in curves if curve.loads is loads]
+        longest = max(of_direction, key=lambda curve: curve.span, default=None)
+        drawn_curves.append(np.stack([longest.depth, longest.force]) if longest else np.empty((2, 0)))
+    return SteadyPress(headline, known, *map(thin_curve, drawn_curves))
 
 
-def few_points(curve: Array) -> Array:
+def thin_curve(curve: Array) -> Array:
     """A curve, shape (2, n), with so few points that it is drawn."""
-    return curve[:, :: max(curve.shape[1] // _SHOWN, 1)]
+    return curve[:, :: max(curve.shape[1] // _MAX_CURVE_POINTS, 1)]

@@ -9,30 +9,30 @@ from itertools import pairwise
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.identification.filters import noise_within
 from palpate.identification.sampling import Channels
+from palpate.signals.position_noise import noise_in_contacts
 from palpate.signals.samples import block_means, runs, white_noise
 
-BLOCKS = 1 << 13
+MAX_BLOCKS = 1 << 13
 """Of the whole log at most, in which strokes are looked for."""
-STROKE = 0.2
+MIN_STROKE_REACH = 0.2
 """Share of the position's range that a stroke goes through at least; it is a press if its force does so, too.
 `benchmarks/identification/press_constants.py` shows which values do as well, of this and of the constants below."""
-_ENDS = 0.02
+_END_FRACTION = 0.02
 """Share of a stroke at both ends in which the probe speeds up and slows down."""
-_PARTS, _FINE = 5, 25
+_SPEED_PARTS, _REST_PARTS = 5, 25
 """Parts of a stroke by time, in which its speed is about the same, and those in which it never rests."""
-_SLOWEST = 0.4
+_MIN_SPEED_RATIO = 0.4
 """Speed of the slowest part over that of the fastest: a machine whose own compliance is half of the press has 0.5."""
-_BULGE = 1.5
+_MAX_MIDDLE_SPEED_RATIO = 1.5
 """Speed of the middle over the mean of both ends: an advance that speeds up for a quarter of its time and slows down
 for another has 1.5, half a sine 1.9."""
-_STILL = 0.1
+_REST_SPEED_RATIO = 0.1
 """Share of a stroke's mean speed below which a part of it rests."""
-_SHARE = 0.8
+_MIN_STROKE_FRACTION = 0.8
 """Share of the probe's way, in or out, that goes in strokes, of a press: else something shakes it as well. A return may
 be at any speed."""
-_SEEN = 8.0
+_MIN_TRAVEL_STDS = 8.0
 """Deviations of the noise that a way must exceed to be one."""
 
 
@@ -44,41 +44,54 @@ class Stroke:
     end: float
 
     def rows(self, channels: Channels) -> slice:
-        """Its samples in the channels, thinned or not."""
+        """Rows of the stroke in the channels, thinned or not."""
         first, last = ((t - channels.start) / channels.dt for t in (self.begin, self.end))
         return slice(max(int(np.ceil(first)), 0), min(int(last) + 1, len(channels.position)))
 
 
-def strokes_of(channels: Channels) -> tuple[Stroke, ...]:
+def find_strokes(channels: Channels) -> tuple[Stroke, ...]:
     """The strokes of an evenly sampled log that goes one way in strokes, comes back at any speed, and does little else.
 
     None of another log.
     """
-    size = -(-len(channels.position) // BLOCKS)
+    size = -(-len(channels.position) // MAX_BLOCKS)
     x = block_means(channels.position, size)
-    noise = noise_within(x, np.arange(len(x)), np.zeros(len(x), np.intp))
-    least, reach = max(_SEEN * white_noise(x), noise.count), float(np.ptp(x))
-    if reach <= _FINE * least:
+    noise = noise_in_contacts(x, np.arange(len(x)), np.zeros(len(x), np.intp))
+    min_travel = max(_MIN_TRAVEL_STDS * white_noise(x), noise.count)
+    reach = float(np.ptp(x))
+    if reach <= _REST_PARTS * min_travel:
         return ()
-    turns = turns_of(x, STROKE * reach)
-    ends = [own for a, b in pairwise(turns) if (own := _steady(x, a, b, least)) is not None]
+    turns = find_turns(x, MIN_STROKE_REACH * reach)
+    ends = [
+        stroke_rows
+        for first, last in pairwise(turns)
+        if (stroke_rows := _steady_rows(x, first, last, min_travel)) is not None
+    ]
     # Ways [m] of the strokes, of the legs between large turns at any speed, and of all between turns above the noise.
-    strokes = np.array([x[b] - x[a] for a, b in ends])
-    legs, whole = np.diff(x[turns]), np.diff(x[turns_of(x, least)])
+    strokes = np.array([x[last] - x[first] for first, last in ends])
+    leg_ways = np.diff(x[turns])
+    all_ways = np.diff(x[find_turns(x, min_travel)])
     for sign in (1, -1):
-        ways = sign * whole, sign * strokes, -sign * legs
-        there, advance, back = (np.maximum(way, 0).sum() for way in ways)
-        if 0 < _SHARE * there <= advance and advance + back >= _SHARE * np.abs(whole).sum():
+        ways = sign * all_ways, sign * strokes, -sign * leg_ways
+        total_in, advance, total_back = (np.maximum(signed_ways, 0).sum() for signed_ways in ways)
+        if (
+            0 < _MIN_STROKE_FRACTION * total_in <= advance
+            and advance + total_back >= _MIN_STROKE_FRACTION * np.abs(all_ways).sum()
+        ):
             break
     else:
         return ()
-    dt, start = size * channels.dt, channels.start + (size - 1) / 2 * channels.dt
-    return tuple(Stroke(start + a * dt, start + b * dt) for a, b in ends)
+    dt = size * channels.dt
+    start = channels.start + (size - 1) / 2 * channels.dt
+    return tuple(Stroke(start + first * dt, start + last * dt) for first, last in ends)
 
 
-def turns_of(x: Array, least: float) -> list[int]:
-    """Where a position turns by more than a way, its first and last row included."""
-    turns, low, high, rising = [0], 0, 0, 0
+def find_turns(x: Array, least: float) -> list[int]:
+    """Rows at which a position turns by more than a distance, the first and last row included."""
+    turns = [0]
+    low = 0
+    high = 0
+    rising = 0
     for i, value in enumerate(x.tolist()):
         if value > x[high]:
             high = i
@@ -94,25 +107,31 @@ def turns_of(x: Array, least: float) -> list[int]:
     return sorted({*turns, last, len(x) - 1})
 
 
-def _steady(x: Array, a: int, b: int, least: float) -> tuple[int, int] | None:
+def _steady_rows(x: Array, first_row: int, last_row: int, least: float) -> tuple[int, int] | None:
     """First and last row between two turns in which the probe goes at about one speed; None if it does not.
 
     Where it rests on the way, those of the part without a rest that goes farthest.
     """
-    whole = float(x[b] - x[a])
-    if abs(whole) <= _FINE * least:
+    travel = float(x[last_row] - x[first_row])
+    if abs(travel) <= _REST_PARTS * least:
         return None
-    share = (x[a : b + 1] - x[a]) / whole
-    first, last = int(np.flatnonzero(share <= _ENDS)[-1]), int(np.argmax(share >= 1 - _ENDS))
-    if last - first < _FINE:
+    fraction = (x[first_row : last_row + 1] - x[first_row]) / travel
+    first = int(np.flatnonzero(fraction <= _END_FRACTION)[-1])
+    last = int(np.argmax(fraction >= 1 - _END_FRACTION))
+    if last - first < _REST_PARTS:
         return None
-    every = (np.linspace(first, last, parts + 1) for parts in (_PARTS, _FINE))
-    speed, fine = (np.diff(np.interp(own, np.arange(len(share)), share)) for own in every)
-    moves = fine >= _STILL / _FINE
+    grids = (np.linspace(first, last, parts + 1) for parts in (_SPEED_PARTS, _REST_PARTS))
+    speed, fine = (
+        np.diff(np.interp(edges_of_parts, np.arange(len(fraction)), fraction)) for edges_of_parts in grids
+    )
+    moves = fine >= _REST_SPEED_RATIO / _REST_PARTS
     if not moves.all():
-        edges = np.linspace(first, last, _FINE + 1).astype(np.intp)
+        edges = np.linspace(first, last, _REST_PARTS + 1).astype(np.intp)
         parts = [(int(edges[i]), int(edges[j])) for i, j in runs(moves)]
-        i, j = max(parts, key=lambda part: share[part[1]] - share[part[0]], default=(first, first))
-        return _steady(x, a + i, a + j, least)
-    even = speed.min() >= _SLOWEST * speed.max() and speed[_PARTS // 2] <= _BULGE * (speed[0] + speed[-1]) / 2
-    return (a + first, a + last) if even else None
+        i, j = max(parts, key=lambda part: fraction[part[1]] - fraction[part[0]], default=(first, first))
+        return _steady_rows(x, first_row + i, first_row + j, least)
+    even = (
+        speed.min() >= _MIN_SPEED_RATIO * speed.max()
+        and speed[_SPEED_PARTS // 2] <= _MAX_MIDDLE_SPEED_RATIO * (speed[0] + speed[-1]) / 2
+    )
+    return (first_row + first, first_row + last) if even else None

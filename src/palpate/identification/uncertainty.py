@@ -21,7 +21,7 @@ from palpate.identification.causes import cause_of
 from palpate.records import Readable
 from palpate.signals.types import NORMAL
 
-_MOST_FREEDOM = 1e9
+_MAX_FREEDOM = 1e9
 """Degrees of freedom from which on Student's t is the normal distribution."""
 
 
@@ -40,7 +40,7 @@ def effective_freedom(variance: ArrayLike, freedom: ArrayLike) -> Array:
     variance = np.asarray(variance, np.float64)
     total = variance.sum(axis=0)
     loss = ((variance / np.where(total > 0, total, 1.0)) ** 2 / np.asarray(freedom)).sum(axis=0)
-    return np.asarray(1 / np.clip(loss, 1 / _MOST_FREEDOM, 1.0))
+    return np.asarray(1 / np.clip(loss, 1 / _MAX_FREEDOM, 1.0))
 
 
 def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
@@ -50,9 +50,10 @@ def half_widths(variance: ArrayLike, freedom: ArrayLike) -> Array:
     """
     from scipy.special import stdtrit
 
-    whole, together = np.asarray(variance, np.float64).sum(axis=0), effective_freedom(variance, freedom)
-    coverage = np.where(together < 0.99 * _MOST_FREEDOM, stdtrit(together, 0.975), NORMAL)
-    return np.asarray(coverage * np.sqrt(whole))
+    total = np.asarray(variance, np.float64).sum(axis=0)
+    freedoms = effective_freedom(variance, freedom)
+    coverage = np.where(freedoms < 0.99 * _MAX_FREEDOM, stdtrit(freedoms, 0.975), NORMAL)
+    return np.asarray(coverage * np.sqrt(total))
 
 
 class Contribution(NamedTuple):
@@ -77,7 +78,7 @@ class Contribution(NamedTuple):
         return (student(self.freedom) if isfinite(self.freedom) else NORMAL) * self.std
 
     def times(self, gain: float) -> Contribution:
-        """Of a result that is a multiple of this one."""
+        """Scale the contribution to that of a multiple of the result."""
         return Contribution(abs(gain) * self.std, self.freedom)
 
 
@@ -120,14 +121,14 @@ class Measurement:
     @property
     def combined(self) -> float:
         """Combined standard uncertainty u_c."""
-        return hypot(*(own.std for own in self.contributions.values()))
+        return hypot(*(part.std for part in self.contributions.values()))
 
     @property
     def freedom(self) -> float:
         """Effective degrees of freedom; infinite where the normal distribution holds."""
-        variance, freedom = np.array([(own.std**2, own.freedom) for own in self.contributions.values()]).T
-        found = float(effective_freedom(variance, freedom))
-        return found if found < 0.99 * _MOST_FREEDOM else np.inf
+        variance, freedom = np.array([(part.std**2, part.freedom) for part in self.contributions.values()]).T
+        effective = float(effective_freedom(variance, freedom))
+        return effective if effective < 0.99 * _MAX_FREEDOM else np.inf
 
     @property
     def relative_half(self) -> float:
@@ -135,16 +136,16 @@ class Measurement:
         return self.half / abs(self.value or 1e-300)
 
     def known_to(self, tolerance: float) -> bool:
-        """Whether its half-width is at most a share of its value."""
+        """True if the half-width is at most a fraction of the value."""
         return self.half <= tolerance * abs(self.value)
 
     def with_cause(self, cause: str, own: Contribution) -> Measurement:
-        """The same with one more cause of error."""
+        """Add one more cause of error."""
         return replace(self, contributions={**self.contributions, cause: own})
 
     def through(self, value: float, gain: float) -> Measurement:
         """A function of it instead, by its value and its derivative."""
-        return Measurement(value, {cause: own.times(gain) for cause, own in self.contributions.items()})
+        return Measurement(value, {cause: part.times(gain) for cause, part in self.contributions.items()})
 
     def budget_json(self, inputs: Mapping[str, Input]) -> dict[str, Any]:
         """Plain values that JSON can hold, largest contribution first; an infinite number is None.
@@ -159,7 +160,7 @@ class Measurement:
             "effective_degrees_of_freedom": _finite(self.freedom),
             "coverage_factor": self.half / self.combined,
             "expanded_uncertainty": self.half,
-            "sources": [self._source(name, own, inputs.get(name)) for name, own in rows if own.std > 0],
+            "sources": [self._source(name, part, inputs.get(name)) for name, part in rows if part.std > 0],
         }
 
     def _source(self, name: str, own: Contribution, read: Input | None) -> dict[str, Any]:
@@ -178,14 +179,14 @@ class Measurement:
 
 
 class Verdict(StrEnum):
-    """How far to trust a parameter."""
+    """Trust in a parameter."""
 
     IDENTIFIED = "identified"
     NOT_IDENTIFIABLE = "not identifiable"
     REJECTED = "rejected"
 
 
-_SMALL = 1e-3
+_MIN_LISTED_SHARE = 1e-3
 """Share of a half-width below which a cause is not listed in the budget."""
 
 
@@ -200,7 +201,6 @@ class Parameter(Readable):
         ci95: 95 % interval that holds whatever the model, also where `value` is None and the log bounds it; verdicts
             rest on it.
         reason: why.
-        ci95_if_model_holds: 95 % interval of least squares on this model, were it exactly true.
         budget: half-width of `ci95` by cause, largest first; without what is under a thousandth of the whole.
         contributions: to the combined standard uncertainty, by cause.
     """
@@ -211,7 +211,6 @@ class Parameter(Readable):
     unit: str
     verdict: Verdict
     reason: str
-    ci95_if_model_holds: tuple[float, float] | None = None
     budget: dict[str, float] = field(default_factory=dict)
     contributions: Contributions = field(default_factory=dict)
 
@@ -220,14 +219,14 @@ class Parameter(Readable):
         cls, value: float, unit: str, verdict: Verdict, reason: str, contributions: Contributions
     ) -> Parameter:
         """A parameter with its interval and its budget, of the contributions to its uncertainty by cause."""
-        whole = Measurement(value, contributions)
-        half = whole.half
-        share = half / (whole.combined or 1.0)  # one coverage factor, of all causes together
-        parts = {cause: share * part.std for cause, part in contributions.items()}
+        measurement = Measurement(value, contributions)
+        half = measurement.half
+        coverage = half / (measurement.combined or 1.0)  # one coverage factor, of all causes together
+        parts = {cause: coverage * part.std for cause, part in contributions.items()}
         parts = dict(sorted(parts.items(), key=lambda item: -item[1]))
-        budget = {cause: part for cause, part in parts.items() if part > _SMALL * half}
+        budget = {cause: part for cause, part in parts.items() if part > _MIN_LISTED_SHARE * half}
         ends = value - half, value + half
-        return cls(value, half / NORMAL, ends, unit, verdict, reason, None, budget, contributions)
+        return cls(value, half / NORMAL, ends, unit, verdict, reason, budget, contributions)
 
     @classmethod
     def unknown(cls, unit: str, reason: str) -> Parameter:
@@ -240,14 +239,17 @@ class Parameter(Readable):
         verdict: Verdict = Verdict.NOT_IDENTIFIABLE,
         ci95: tuple[float, float] | None = None,
     ) -> Parameter:
-        """The same without a value, at most with bounds `ci95` that the log still shows: its budget says why."""
-        bare = replace(self, value=None, std=None, ci95=ci95, ci95_if_model_holds=None)
-        return replace(bare, verdict=verdict, reason=reason)
+        """Remove the value, and keep at most the bounds `ci95` that the log still shows: the budget says why."""
+        return replace(self, value=None, std=None, ci95=ci95, verdict=verdict, reason=reason)
 
     @property
     def measurement(self) -> Measurement | None:
         """Value and contributions; None without a number, or where no cause is known."""
-        if self.value is None or self.ci95 is None or not any(own.std for own in self.contributions.values()):
+        if (
+            self.value is None
+            or self.ci95 is None
+            or not any(part.std for part in self.contributions.values())
+        ):
             return None
         return Measurement(self.value, self.contributions)
 
@@ -257,7 +259,6 @@ class Parameter(Readable):
             "value": self.value,
             "std": self.std,
             "ci95": list(self.ci95) if self.ci95 else None,
-            "ci95_if_model_holds": list(self.ci95_if_model_holds) if self.ci95_if_model_holds else None,
             "budget": self.budget,
             "unit": self.unit,
             "verdict": str(self.verdict),

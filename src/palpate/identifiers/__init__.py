@@ -4,8 +4,7 @@
 |---|---|---|
 | stays as it is | `RecursiveLeastSquares` | nothing is forgotten: the batch solution, at any moment |
 | changes slowly, always moved on | its `forgetting=Exponential(0.999)` | simple; 1 / (1 - keep) samples of memory |
-| changes slowly, often left alone | its `forgetting=SIFt(0.999)`, `Directional` | only what is excited is forgotten |
-| drifts at a pace that is known | `KalmanFilter` | each parameter at its own, a mass not at all |
+| changes slowly, often left alone | its `forgetting=SIFt(0.999)` | only what is excited is forgotten |
 | may become another at any moment | `RestartingLeastSquares` | notices, dates the change, starts again from there |
 | has no model | `NeuralProbe` | the thesis' way; its answers carry no interval |
 
@@ -15,8 +14,7 @@ and the verdict that each parameter deserves. Whoever has a position and a force
 """
 
 from palpate.identifiers.contact_identifier import ContactIdentifier
-from palpate.identifiers.estimator import Directional, Exponential, IdentifierTable, SIFt
-from palpate.identifiers.kalman_filter import KalmanFilter, KalmanIdentifier
+from palpate.identifiers.estimator import Exponential, IdentifierTable, SIFt
 from palpate.identifiers.neural_probe import NeuralProbe, Probed, Setting, watch
 from palpate.identifiers.recursive_least_squares import LeastSquaresIdentifier, RecursiveLeastSquares
 from palpate.identifiers.restarting import RestartingIdentifier, RestartingLeastSquares
@@ -24,12 +22,9 @@ from palpate.signals.types import Estimate
 
 __all__ = [
     "ContactIdentifier",
-    "Directional",
     "Estimate",
     "Exponential",
     "IdentifierTable",
-    "KalmanFilter",
-    "KalmanIdentifier",
     "LeastSquaresIdentifier",
     "NeuralProbe",
     "Probed",

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.identifiers.estimator import entry
 from palpate.identifiers.kernels import contact_state, contact_stream, octave_sums
 from palpate.identifiers.kernels.contact_stream import take_tick
 from palpate.identifiers.kernels.octave_sums import LineNoise
@@ -26,16 +26,16 @@ from palpate.signals.types import Estimate
 NAMES = ("M", "B", "K", "offset")
 PASSIVE = NAMES[:3]
 """No passive surface has one of these below zero."""
-_FORGOTTEN = 10.0
+_SETTLING_TIMES = 10.0
 """Times the low-pass' slowest mode falls by e until what was before is forgotten."""
-_VAGUE = np.array([10.0, 1e4, 1e6, 1e3])
+_PRIOR_STDS = np.array([10.0, 1e4, 1e6, 1e3])
 """Deviation of each parameter before anything is known [kg], [N s/m], [N/m], [N]."""
 
-FARTHEST, STRONGEST = 1e3, 1e6
+MAX_POSITION, MAX_FORCE = 1e3, 1e6
 """Largest position [m] and force [N] that are readings of a sensor."""
 FASTEST = contact_stream.FASTEST
 
-_RANGE = 10.0
+_MAX_PRIOR_STDS = 10.0
 """Deviations of the prior within which a contact's parameters are."""
 
 
@@ -92,7 +92,8 @@ class ContactIdentifier(Readable):
         settings = _settings(self.low_pass, rate, lag, sampling, touch)
         settings[[contact_stream.BEFORE, contact_stream.AFTER]] = window.before, window.after
         if settings[contact_stream.HOLD] > 0:  # contact is decided when the regressor is there
-            settings[contact_stream.HOLD] += max(window.after - settings[contact_stream.LATE], 0.0)
+            judged = contact_stream.AHEAD * max(settings[contact_stream.PERIOD], 1.0)
+            settings[contact_stream.HOLD] += max(window.after - settings[contact_stream.LATE], judged)
         room = (
             self._weights.shape[2]
             + ceil(abs(settings[contact_stream.LATE]))
@@ -107,23 +108,24 @@ class ContactIdentifier(Readable):
     @property
     def delay(self) -> int:
         """Ticks between a reading and its part in the estimate, where none is missing."""
-        s = self._state
-        waits = s[contact_stream.AFTER] - s[contact_stream.LATE]
-        return max(ceil(waits), ceil(s[contact_stream.HOLD]), 0)
+        state = self._state
+        filter_wait = state[contact_stream.AFTER] - state[contact_stream.LATE]
+        decision_wait = contact_stream.AHEAD * max(state[contact_stream.PERIOD], 1.0)
+        return max(ceil(filter_wait), ceil(state[contact_stream.HOLD]), ceil(decision_wait))
 
     @property
     def in_contact(self) -> bool:
-        """Whether the tip is in contact, `delay` ticks ago at the latest."""
+        """True if the tip is in contact, `delay` ticks ago at the latest."""
         return bool(self._contact[contact_state.TOUCHING])
 
     @property
     def contacts(self) -> int:
-        """How many contacts there were."""
+        """Number of contacts so far."""
         return int(self._contact[contact_state.CONTACTS])
 
     @property
     def samples(self) -> int:
-        """How many samples came through."""
+        """Number of samples in contact so far."""
         return int(self._sums[octave_sums.SEEN])
 
     def update(self, position: float, force: float) -> None:
@@ -136,14 +138,16 @@ class ContactIdentifier(Readable):
         Raises:
             InputError: a number out of the range of any sensor; the estimate is unchanged.
         """
-        if abs(position) > FARTHEST or abs(force) > STRONGEST:
+        position = cast_number("position", position)
+        force = cast_number("force", force)
+        if abs(position) > MAX_POSITION or abs(force) > MAX_FORCE:
             raise InputError(
-                f"a tick must be finite, a position within {FARTHEST:g} m and a force within {STRONGEST:g} N, "
+                f"a tick must be finite, a position within {MAX_POSITION:g} m and a force within {MAX_FORCE:g} N, "
                 f"got position {position}, force {force}; in its place call skip()"
             )
-        taken = self._one(self._state, self._weights, position, force, self._out)
-        if taken and self.estimator is not None:
-            for row in self._out[:taken]:
+        count = self._one(self._state, self._weights, position, force, self._out)
+        if count and self.estimator is not None:
+            for row in self._out[:count]:
                 self.estimator.update(row[:4], float(row[4]))
 
     def skip(self) -> None:
@@ -152,9 +156,8 @@ class ContactIdentifier(Readable):
 
     def update_many(self, positions: ArrayLike, forces: ArrayLike) -> None:
         """Takes k ticks in, as k calls of `update` would: positions and forces of shape (k,)."""
-        x, f = np.asarray(positions, dtype=np.float64), np.asarray(forces, dtype=np.float64)
-        if x.ndim != 1 or x.shape != f.shape:
-            raise InputError(f"positions and forces must have one shape (k,), got {x.shape} and {f.shape}")
+        x = cast_array("positions", positions, (None,))
+        f = cast_array("forces", forces, x.shape)
         for position, force in zip(x.tolist(), f.tolist(), strict=True):
             self.update(position, force)
 
@@ -162,52 +165,55 @@ class ContactIdentifier(Readable):
         """M, B, K and the offset, with all that is known to make them uncertain, and whether the model holds.
 
         Where the force stands at the end of its range, contact is never kept for long enough, or a test of
-        `block_fit` fails, the estimate is `rejected`, with the reason.
+        `octave_fit` fails, the estimate is `rejected`, with the reason.
         """
-        own = self.estimator.estimate() if self.estimator is not None else None
-        since = own.samples if own is not None else np.inf
-        c, track = self._contact, self._track
+        given = self.estimator.estimate() if self.estimator is not None else None
+        sample_limit = given.samples if given is not None else np.inf
+        contact = self._contact
+        track = self._track
         data = OctaveData(
             self._sums,
             self._lines,
-            max(float(c[contact_state.POWER]), float(c[contact_state.QUANTUM]) ** 2 / 12),
+            max(float(contact[contact_state.POWER]), float(contact[contact_state.QUANTUM]) ** 2 / 12),
             contact_stream.step_in(track),
-            _VAGUE,
+            _PRIOR_STDS,
             self._lag_error,
             float(self.contacts),
         )
-        fit = octave_fit(data, since)
-        if own is None:
+        fit = octave_fit(data, sample_limit)
+        if given is None:
             theta = fit.theta if fit is not None else np.zeros(4)
-            covariance = fit.covariance if fit is not None else np.diag(_VAGUE**2)
-            worth = fit.system.samples if fit is not None else float(self.samples)
+            covariance = fit.covariance if fit is not None else np.diag(_PRIOR_STDS**2)
+            samples = fit.system.samples if fit is not None else float(self.samples)
         else:
-            theta, covariance = own.theta, own.covariance
+            theta = given.theta
+            covariance = given.covariance
             if fit is not None:
-                theta, opened = fit.without_position_noise(own.theta, _VAGUE)
-                covariance = covariance + fit.open + opened
-            worth = own.samples
+                theta, added_covariance = fit.without_position_noise(given.theta, _PRIOR_STDS)
+                covariance = covariance + fit.open + added_covariance
+            samples = given.samples
         refused = self._refusal(theta) or (fit.rejected if fit is not None else "")
-        return Estimate(NAMES, theta, covariance, worth, refused, passive=PASSIVE)
+        return Estimate(NAMES, theta, covariance, samples, refused, passive=PASSIVE)
 
     @property
     def _lag_error(self) -> float:
         """Standard deviation of the lag, with the phase of the sensor's clock [s]."""
-        s, clock = self._state, self._state[contact_stream.AT_CLOCK : contact_stream.AT_POSITIONS]
-        if not s[contact_stream.PERIOD]:
+        state = self._state
+        clock = self._state[contact_stream.AT_CLOCK : contact_stream.AT_POSITIONS]
+        if not state[contact_stream.PERIOD]:
             return self.lag_std
-        between = min(clock[contact_stream.HIGH] - clock[contact_stream.LOW], 1.0)
-        return float(np.hypot(self.lag_std, between / self.rate / np.sqrt(12)))
+        phase_width = min(clock[contact_stream.HIGH] - clock[contact_stream.LOW], 1.0)
+        return float(np.hypot(self.lag_std, phase_width / self.rate / np.sqrt(12)))
 
     def _refusal(self, theta: Array) -> str:
         """Why none of the numbers can be trusted, whatever the fit says; empty if nothing speaks against them."""
-        for name, value, most in zip(NAMES, theta, _RANGE * _VAGUE, strict=True):
-            if abs(value) > most:
+        for name, value, largest in zip(NAMES, theta, _MAX_PRIOR_STDS * _PRIOR_STDS, strict=True):
+            if abs(value) > largest:
                 return f"{name} is beyond that of any contact: check the units of position and force"
-        c = self._contact
-        if c[contact_state.LIMITED]:
-            return f"the force stands at {c[contact_state.HIGHEST]:.4g} N while the tip moves on: it is saturated"
-        if self.samples < octave_sums.ROWS and c[contact_state.LOST] > 0:
+        contact = self._contact
+        if contact[contact_state.LIMITED]:
+            return f"the force stands at {contact[contact_state.HIGHEST]:.4g} N while the tip moves on: it is saturated"
+        if self.samples < octave_sums.ROWS and contact[contact_state.LOST] > 0:
             return "contact is lost again before the low-pass has settled"
         return ""
 
@@ -224,7 +230,7 @@ class ContactIdentifier(Readable):
         return self._state[contact_stream.AT_SUMS : contact_stream.AT_RING]
 
     def _bind(self) -> None:
-        self._one = entry(_one, self._state.copy(), self._weights, 0.0, 0.0, self._out)
+        self._one = machine_code(_one, self._state.copy(), self._weights, 0.0, 0.0, self._out)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -244,7 +250,7 @@ def _settings(
 ) -> Array:
     """The settings of `contact_stream`, but for those of the taps and the room."""
     settings = np.zeros(contact_stream.SETTINGS)
-    settling = _FORGOTTEN / low_pass.decay * rate
+    settling = _SETTLING_TIMES / low_pass.decay * rate
     settings[contact_stream.GAP] = max(ceil(rate / (2 * low_pass.cutoff)) - 1, 0)
     settings[contact_stream.PERIOD] = 0.0 if sampling is None else rate / sampling
     settings[contact_stream.LATE] = (lag - low_pass.lag) * rate
@@ -258,17 +264,20 @@ def _settings(
 
 def _state(settings: Array) -> Array:
     """The state before the first tick."""
-    s = contact_stream
-    room, queue = int(settings[s.ROOM]), int(settings[s.QUEUE])
-    own, clock, track = np.zeros(s.OWN), np.array(contact_stream.UNSET), np.zeros(contact_stream.NUMBERS)
-    own[[s.ORIGIN, s.FORCE]], own[s.FRESH] = np.nan, -2.0
+    layout = contact_stream
+    room = int(settings[layout.ROOM])
+    queue = int(settings[layout.QUEUE])
+    loop_state = np.zeros(layout.OWN)
+    clock = np.array(contact_stream.UNSET)
+    track = np.zeros(contact_stream.NUMBERS)
+    loop_state[[layout.ORIGIN, layout.FORCE]], loop_state[layout.FRESH] = np.nan, -2.0
     track[[contact_stream.ROW, contact_stream.RESOLVED, contact_stream.GOOD, contact_stream.OPEN]] = -1.0
     track[contact_stream.LAST_SIXTH] = np.nan
     contact = np.zeros(contact_state.FIELDS)
-    for at in (contact_state.KNOWN, contact_state.CERTAIN):
-        contact[at + 4 : at + 20] = np.diag(_VAGUE).ravel()
+    for place in (contact_state.KNOWN, contact_state.CERTAIN):
+        contact[place + 4 : place + 20] = np.diag(_PRIOR_STDS).ravel()
     ring = np.full(2 * room, np.nan)
-    parts = [settings, own, clock, track, contact, octave_sums.no_sums(), ring]
+    parts = [settings, loop_state, clock, track, contact, octave_sums.no_sums(), ring]
     return np.concatenate([*parts, np.zeros(queue * contact_state.SAMPLE)])
 
 

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from palpate._jit import Kernel, kernel, law, part
+from palpate._jit import kernel, law, part
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate._vector import solve
 from palpate.arrays import Array
 from palpate.errors import InputError
@@ -74,14 +75,13 @@ class Streaming(Readable, ABC):
         Raises:
             InputError: a regressor of another shape, or a number that is not finite; the estimate is unchanged.
         """
-        try:
-            taken = self._one(
-                self._state, np.ascontiguousarray(regressor, np.float64), force, self._policy, self._size
+        phi = cast_array("regressor", regressor, self._shape)
+        y = cast_number("force", force)
+        if not self._one(self._state, phi, y, self._policy, self._size):
+            raise InputError(
+                "a sample must be finite numbers up to 1e30, leave it out; "
+                f"got regressor {regressor!r}, force {force!r}"
             )
-        except (TypeError, ValueError):  # not numbers, or more than one dimension
-            taken = False
-        if not taken:
-            raise self._refusal(regressor, force)
 
     def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
         """Takes k samples in, as k calls of `update` would: regressors of shape (k, n), forces of shape (k,).
@@ -89,12 +89,8 @@ class Streaming(Readable, ABC):
         Raises:
             InputError: shapes that do not fit; or a sample that is not finite, those before it having been taken in.
         """
-        phi = np.ascontiguousarray(regressors, dtype=np.float64)
-        y = np.ascontiguousarray(forces, dtype=np.float64)
-        if phi.ndim != 2 or phi.shape[1] != self._n or y.shape != phi.shape[:1]:
-            raise InputError(
-                f"regressors must have shape (k, {self._n}) and forces (k,), got {phi.shape} and {y.shape}"
-            )
+        phi = cast_array("regressors", regressors, (None, self._n))
+        y = cast_array("forces", forces, phi.shape[:1])
         done = self._many(self._state, phi, y, self._policy, self._size)
         if done < len(y):
             raise InputError(
@@ -102,18 +98,13 @@ class Streaming(Readable, ABC):
                 f"the {done} before it were taken in"
             )
 
-    def _refusal(self, regressor: ArrayLike, force: Any) -> InputError:
-        shape = np.shape(regressor)
-        if shape != (self._n,):
-            return InputError(f"regressor must have shape ({self._n},), got {shape}")
-        return InputError(
-            f"a sample must be finite numbers up to 1e30, got regressor {regressor!r}, force {force!r}; leave it out"
-        )
-
     def _bind(self) -> None:
+        self._shape = (self._n,)
         # An impossible sample compiles the update and leaves the state alone.
-        self._one = entry(_one, self._state, np.full(self._n, np.nan), 0.0, self._policy, self._size)
-        self._many = _many.compiled
+        impossible = np.full((1, self._n), np.nan)
+        rest = (self._policy, self._size)
+        self._one = machine_code(_one, self._state, impossible[0], 0.0, *rest)
+        self._many = machine_code(_many, self._state, impossible, np.zeros(1), *rest)
 
     def __getstate__(self) -> dict[str, Any]:
         return {
@@ -129,7 +120,7 @@ class Streaming(Readable, ABC):
 
 @kernel
 def _one(state, phi, y, policy, size):
-    return len(phi) == size.n and policy.absorb(state, phi, y, size)
+    return policy.absorb(state, phi, y, size)
 
 
 @kernel
@@ -159,21 +150,10 @@ def as_estimate(
         samples: that they are worth.
         floor: inverse of each initial variance, shape (n,).
     """
-    own = np.diag(covariance)
-    if not (np.isfinite(covariance).all() and (own >= 0.0).all()):
+    variances = np.diag(covariance)
+    if not (np.isfinite(covariance).all() and (variances >= 0.0).all()):
         return Estimate(names, theta, np.diag(1.0 / floor), samples)
     return Estimate(names, theta, 0.5 * (covariance + covariance.T), samples)
-
-
-def entry(kernel: Kernel, *example: Any) -> Any:
-    """The compiled code for such arguments, without the look-up by type that half of a short call's time goes into.
-
-    It still checks that they are arrays of as many dimensions and numbers; not what an array holds.
-    """
-    import numba
-
-    kernel(*example)
-    return kernel.compiled.overloads[tuple(map(numba.typeof, example))].entry_point
 
 
 def check_start(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
@@ -182,17 +162,31 @@ def check_start(theta: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     Raises:
         InputError: shapes that do not fit, numbers that are not finite, a matrix that is no covariance.
     """
-    start, P = np.array(theta, dtype=np.float64), np.array(covariance, dtype=np.float64)
-    n = start.size
-    if start.ndim != 1 or n == 0:
-        raise InputError(f"theta must have shape (n,) with n at least 1, got {start.shape}")
-    if P.shape != (n, n):
-        raise InputError(f"covariance must have shape ({n}, {n}) as theta has {n} values, got {P.shape}")
+    start = cast_array("theta", theta, (None,)).copy()
+    n = len(start)
+    if n == 0:
+        raise InputError("theta must have shape (n,) with n at least 1, got (0,)")
+    P = cast_array("covariance", covariance, (n, n))
     if not (np.isfinite(start).all() and np.isfinite(P).all()):
         raise InputError("theta and covariance must be finite")
-    if not np.allclose(P, P.T, rtol=1e-12, atol=0.0) or np.linalg.eigvalsh(P)[0] <= 0.0:
+    variances = np.diag(P)
+    if not np.allclose(P, P.T, rtol=1e-12, atol=0.0) or not _is_definite(P):
         raise InputError("covariance must be symmetric and positive definite, for example 1e6 * identity")
+    if np.abs(start).max() > LARGEST or variances.max() > HUGE or variances.min() < 1.0 / HUGE:
+        raise InputError(
+            "theta must be numbers up to 1e30, and their variances in covariance from 1e-60 to 1e60"
+        )
     return start, 0.5 * (P + P.T)
+
+
+def _is_definite(P: Array) -> bool:
+    """True if a symmetric matrix has a root."""
+    with np.errstate(all="ignore"):
+        scale = np.sqrt(np.diag(P))
+        try:
+            return bool(np.isfinite(np.linalg.cholesky(P / scale / scale[:, None])).all())
+        except np.linalg.LinAlgError:
+            return False
 
 
 @runtime_checkable
@@ -230,26 +224,6 @@ class Exponential(NamedTuple):
         return stretch_of(self.keep) * S, True
 
 
-@part
-@coerce_fields(_factor)
-class Directional(NamedTuple):
-    """Only what the sample speaks of is forgotten: the force that is predicted for it (Kulhavy and Karny, 1984).
-
-    When to use it: excitation that comes and goes and is never faint. Independent of units; but a faint sample,
-    mere noise, makes it forget as much as a strong one.
-
-    Args:
-        keep: the forgetting factor, in (0, 1]. Each sample forgets in one direction of n only: where all are excited
-            alike, each remembers n / (1 - keep) samples.
-    """
-
-    keep: float
-
-    def forget(self, S, phi, floor):
-        """S stretched along what the sample sees of it; every sample counts."""
-        return stretch(S, S.T @ phi, stretch_of(self.keep)), True
-
-
 def _subspace(policy: "SIFt") -> None:
     _factor(policy)
     require(policy.least >= 0.0, "least", "0 or more", policy.least)
@@ -264,10 +238,11 @@ class SIFt(NamedTuple):
     and an upper bound without persistent excitation. Directions are compared in units of the initial standard
     deviations, so that the result does not depend on whether stiffness is in N/m or in kN/m.
 
-    When to use it: as `Directional`, and for years of rest with noisy sensors.
+    When to use it: excitation that comes and goes, faint excitation, and years of rest with noisy sensors.
 
     Args:
-        keep: the forgetting factor, in (0, 1]; memory as of `Directional`.
+        keep: the forgetting factor, in (0, 1]. Each sample forgets in one direction of n only: where all are excited
+            alike, each remembers n / (1 - keep) samples.
         least: a sample whose force the initial covariance would predict with less than this variance [N^2] says
             nothing; it is left out.
     """
@@ -283,9 +258,11 @@ class SIFt(NamedTuple):
         return stretch(S, solve(S, d), stretch_of(self.keep)), True
 
 
-def policy_of(forgetting: float | Forgetting) -> Forgetting:
+def forgetting_policy(forgetting: float | Forgetting) -> Forgetting:
     """A policy as it is; a number is the factor of exponential forgetting."""
-    return forgetting if isinstance(forgetting, Forgetting) else Exponential(forgetting)
+    if isinstance(forgetting, Forgetting):
+        return forgetting
+    return Exponential(cast_number("forgetting", forgetting))
 
 
 class IdentifierTable(Table, tag_field="kind"):

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
 from palpate.networks import Network, layers_of, network, random_layers
@@ -104,8 +105,7 @@ class NeuralProbe(Readable):
         self.samples = 0
         self._memory = self._net.start()
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
-        self._follow = _follow.compiled
-        self._take(np.empty((0, 3)), np.empty(0), np.empty((0, 4)))
+        self._bind()
 
     @classmethod
     def thesis(
@@ -128,13 +128,8 @@ class NeuralProbe(Readable):
         Raises:
             InputError: a regressor of another shape, or a number that is not finite; the network is unchanged.
         """
-        try:
-            phi, y = np.asarray(regressor, dtype=np.float64), float(force)
-        except (TypeError, ValueError):
-            raise InputError(
-                f"a sample must be numbers, got regressor {regressor!r}, force {force!r}"
-            ) from None
-        self.update_many(phi[None], np.array([y]))
+        phi = cast_array("regressor", regressor, (3,))
+        self.update_many(phi[None], np.array([cast_number("force", force)]))
 
     def update_many(self, regressors: ArrayLike, forces: ArrayLike) -> None:
         """Takes k samples in, as k calls of `update` would: regressors of shape (k, 3), forces of shape (k,)."""
@@ -165,10 +160,13 @@ class NeuralProbe(Readable):
             velocity: [m/s], not 0; likewise.
             acceleration: [m/s^2], not 0; likewise.
         """
-        given = (displacement, velocity, acceleration)
-        chosen = [own if v is None else v for v, own in zip(given, self.values, strict=True)]
+        inputs = (displacement, velocity, acceleration)
+        chosen = [
+            default if value is None else value for value, default in zip(inputs, self.values, strict=True)
+        ]
         values = _probe_values(_three(chosen, "values"))
-        net, memory = self._net, self._memory
+        net = self._net
+        memory = self._memory
         answers = ask(net.sizes, memory.weights, net.amplitude, memory.signals.copy(), self.scale, values)
         K, B, M = map(float, answers)
         return Probed(K, B, M, self.force((0.0, 0.0, 0.0)), self._warnings(values))
@@ -202,12 +200,8 @@ class NeuralProbe(Readable):
         )
 
     def _update(self, regressors: ArrayLike, forces: ArrayLike, *, trajectory: bool) -> Array:
-        phi = np.ascontiguousarray(regressors, dtype=np.float64)
-        y = np.ascontiguousarray(forces, dtype=np.float64)
-        if phi.ndim != 2 or phi.shape[1] != 3 or y.shape != phi.shape[:1]:
-            raise InputError(
-                f"regressors must have shape (k, 3) and forces (k,), got {phi.shape} and {y.shape}"
-            )
+        phi = cast_array("regressors", regressors, (None, 3))
+        y = cast_array("forces", forces, phi.shape[:1])
         out = np.empty((len(y) if trajectory else 0, 4))
         done = self._take(phi, y, out)
         self.samples += done
@@ -219,31 +213,43 @@ class NeuralProbe(Readable):
         return out
 
     def _take(self, phi: Array, y: Array, out: Array) -> int:
-        net, memory = self._net, self._memory
-        return int(
-            self._follow(
-                net.sizes,
-                memory.weights,
-                net.amplitude,
-                memory.signals,
-                memory.deltas,
-                net.learning_rate,
-                self._thresholds,
-                self.scale,
-                self.values,
-                self._low,
-                self._high,
-                phi,
-                y,
-                out,
-            )
+        return int(self._follow(*self._arguments, phi, y, out))
+
+    @property
+    def _arguments(self) -> tuple[Any, ...]:
+        net = self._net
+        memory = self._memory
+        scale = cast_array("scale", self.scale, (3,))
+        values = cast_array("values", self.values, (3,))
+        return (
+            net.sizes,
+            memory.weights,
+            net.amplitude,
+            memory.signals,
+            memory.deltas,
+            net.learning_rate,
+            self._thresholds,
+            scale,
+            values,
+            self._low,
+            self._high,
         )
+
+    def _bind(self) -> None:
+        self._follow = machine_code(
+            _follow, *self._arguments, np.empty((0, 3)), np.empty(0), np.empty((0, 4))
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_follow"}
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        self.__dict__.update(known)
+        self._bind()
 
 
 def _three(values: ArrayLike, name: str) -> Array:
-    array = np.array(values, dtype=np.float64)
-    if array.shape != (3,):
-        raise InputError(f"{name} must have shape (3,): {', '.join(CHANNELS)}; got {array.shape}")
+    array = cast_array(f"{name}, which is {', '.join(CHANNELS)},", values, (3,)).copy()
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite, got {array}")
     return array

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from palpate._jit import law, part
 from palpate.arrays import Array
 from palpate.identifiers import estimator
-from palpate.identifiers.estimator import NAMES, VAGUE, Directional, Exponential, SIFt, is_sample
+from palpate.identifiers.estimator import NAMES, VAGUE, Exponential, SIFt, is_sample
 from palpate.identifiers.kernels.dimension import AnyNumber
 from palpate.identifiers.kernels.least_squares import (
     covariance_in,
@@ -25,7 +25,7 @@ from palpate.signals.types import Estimate
 
 
 class LeastSquaresEstimator(estimator.Streaming):
-    """A least-squares estimate of theta: the front of the state as `flat` has it."""
+    """A least-squares estimate of theta at the front of the state."""
 
     @property
     def covariance(self) -> Array:
@@ -44,12 +44,12 @@ class LeastSquaresEstimator(estimator.Streaming):
 
     @abstractmethod
     def _worth(self, weight: float) -> float:
-        """How many samples the estimate is worth, if the noise was heard in so many."""
+        """Number of samples that the estimate is worth, if the noise was heard in so many."""
 
 
 @part
 class Recursion(NamedTuple):
-    """The update of `RecursiveLeastSquares`, with a policy of `forgetting`."""
+    """The update of `RecursiveLeastSquares`, with a forgetting policy."""
 
     forgetting: Any
 
@@ -69,7 +69,7 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
     Args:
         theta: initial estimate, shape (n,).
         covariance: initial P, shape (n, n), symmetric and positive definite; how little `theta` is trusted.
-        forgetting: a factor in (0, 1], which is `Exponential`, or one of the policies of `forgetting`.
+        forgetting: a factor in (0, 1], which is `Exponential`, or a policy, such as `SIFt`.
         names: of the parameters, in the order of the regressor.
 
     Raises:
@@ -84,7 +84,7 @@ class RecursiveLeastSquares(LeastSquaresEstimator):
         names: tuple[str, ...] | None = None,
     ):
         start, P = estimator.check_start(theta, covariance)
-        self.forgetting = estimator.policy_of(forgetting)
+        self.forgetting = estimator.forgetting_policy(forgetting)
         super().__init__(known_first(start, P), len(start), Recursion(self.forgetting), names)
 
     def _worth(self, weight: float) -> float:
@@ -115,10 +115,10 @@ class LeastSquaresIdentifier(estimator.IdentifierTable, tag="least-squares"):
 
     keep: Annotated[float, Meta(gt=0, le=1)] = 1.0
     """Forgetting factor; 1 forgets nothing."""
-    forgetting: Literal["exponential", "directional", "sift"] = "exponential"
+    forgetting: Literal["exponential", "sift"] = "exponential"
 
     def build(self, tick: float) -> RecursiveLeastSquares:
         """The estimator at its start."""
-        policy = {"exponential": Exponential, "directional": Directional, "sift": SIFt}[self.forgetting]
+        policy = SIFt if self.forgetting == "sift" else Exponential
         forgetting: Any = policy(self.keep) if self.keep < 1.0 else 1.0
         return RecursiveLeastSquares(np.zeros(3), np.diag(np.square(VAGUE)), forgetting, NAMES)

@@ -13,8 +13,17 @@ from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from palpate._jit import law, part
+from palpate._jit.typed_edge import cast_number
 from palpate.errors import InputError
-from palpate.identifiers.estimator import NAMES, VAGUE, Forgetting, IdentifierTable, check_start, policy_of
+from palpate.identifiers.estimator import (
+    LARGEST,
+    NAMES,
+    VAGUE,
+    Forgetting,
+    IdentifierTable,
+    check_start,
+    forgetting_policy,
+)
 from palpate.identifiers.kernels.least_squares import (
     known_first,
     learn_sample,
@@ -25,8 +34,10 @@ from palpate.identifiers.kernels.least_squares import (
     unsure,
 )
 from palpate.identifiers.recursive_least_squares import LeastSquaresEstimator, absorb
-from palpate.signals.types import Positive
+from palpate.signals.types import Positive, require
 
+MOST_ROWS = 100_000
+"""Most samples that one looks back over; each look costs time for all of them."""
 COUNTERS = 5
 """Behind the initial estimate and its root: the alarm, the next row, rows written, changes, samples since the last."""
 EXTRA = 6
@@ -48,7 +59,7 @@ _ENOUGH = 2
 
 @law
 def counters(n):
-    """Where the counters stand in a state of n parameters, behind all of `flat`; the memory follows them."""
+    """Where the counters stand in a state of n parameters, behind the estimate; the memory follows them."""
     return length(n) + n + n * n
 
 
@@ -147,7 +158,7 @@ class RestartingUpdate(NamedTuple):
     """The update of `RestartingLeastSquares`.
 
     Args:
-        forgetting: a policy of `forgetting`, between changes.
+        forgetting: the policy between changes.
         rows: samples that it looks back over.
         evidence: log-likelihood ratio from which the surface has changed.
     """
@@ -182,7 +193,7 @@ class RestartingLeastSquares(LeastSquaresEstimator):
     Args:
         theta: initial estimate, shape (n,); also the one that it starts again from.
         covariance: initial P, shape (n, n), symmetric and positive definite; vague, for a surface not met before.
-        forgetting: what is forgotten between changes: a factor in (0, 1] or one of the policies of `forgetting`.
+        forgetting: what is forgotten between changes: a factor in (0, 1] or a policy, such as `SIFt`.
         memory: samples that it looks back over; a change that shows later than so is dated at the latest there.
         evidence: log-likelihood ratio from which it takes the surface to have changed.
         names: of the parameters, in the order of the regressor.
@@ -202,33 +213,36 @@ class RestartingLeastSquares(LeastSquaresEstimator):
     ):
         start, P = check_start(theta, covariance)
         n = len(start)
-        if memory != int(memory) or not memory > n:
-            raise InputError(f"memory must be a whole number of samples above {n}, got {memory}")
-        if not evidence > 0.0:
-            raise InputError(f"evidence must be above 0, got {evidence}")
-        self.forgetting = policy_of(forgetting)
-        initial = [start, np.linalg.cholesky(P).ravel(), np.zeros(COUNTERS + int(memory) * (n + EXTRA))]
+        rows = cast_number("memory", memory)
+        evidence = cast_number("evidence", evidence)
+        if not n < rows <= MOST_ROWS or rows % 1.0:
+            raise InputError(
+                f"memory must be a whole number of samples above {n}, to {MOST_ROWS:g}, got {rows:g}"
+            )
+        require(0.0 < evidence <= LARGEST, "evidence", "above 0", evidence)
+        self.forgetting = forgetting_policy(forgetting)
+        initial = [start, np.linalg.cholesky(P).ravel(), np.zeros(COUNTERS + int(rows) * (n + EXTRA))]
         state = np.concatenate([known_first(start, P), *initial])
-        super().__init__(state, n, RestartingUpdate(self.forgetting, float(memory), float(evidence)), names)
+        super().__init__(state, n, RestartingUpdate(self.forgetting, rows, evidence), names)
 
     def _worth(self, weight: float) -> float:
         return min(weight, float(self.since))
 
     @property
     def changes(self) -> int:
-        """How many times the surface was taken to have changed."""
+        """Number of changes of the surface that were detected."""
         return int(self._state[counters(self._n) + 3])
 
     @property
     def since(self) -> int:
-        """How many samples the estimate rests on: those since the last change, or all."""
+        """Number of samples that the estimate rests on: those since the last change, or all."""
         return int(self._state[counters(self._n) + 4])
 
 
 class RestartingIdentifier(IdentifierTable, tag="restarting-least-squares"):
     """Least squares that notice when the surface becomes another one."""
 
-    memory: Annotated[int, Meta(ge=4, le=100_000)] = 480
+    memory: Annotated[int, Meta(ge=4, le=MOST_ROWS)] = 480
     """Samples that it looks back over."""
     evidence: Positive = 20.0
     """Log-likelihood ratio from which the surface has changed."""

@@ -1,5 +1,7 @@
 """Wrench and pose of an arm's log, in three dimensions."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -10,15 +12,15 @@ import numpy as np
 
 from palpate.arrays import Array
 from palpate.errors import InputError, unknown
-from palpate.logs.formats import Bag, Kind, bag_reader, kind_of, open_table
+from palpate.logs import bags
+from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.read import read_log
 from palpate.logs.roles import POSE, WRENCH
 from palpate.records import Record
+from palpate.signals.rotations import quaternions_from
 
 PLACE = ("position_x", "position_y", "position_z")
 QUATERNION = ("quaternion_x", "quaternion_y", "quaternion_z", "quaternion_w")
-_OFF = 0.1
-"""By which a matrix may miss being a rotation: logs are rounded, and numbers in another order miss by far more."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class PoseFormat:
 def _matrix(order: str, across: bool, whole: bool) -> PoseFormat:
     """A rotation matrix by rows or by columns, behind the place or in a matrix of four by four."""
     turn = [[f"matrix_{i}{j}" for j in range(3)] for i in range(3)]
-    cells = [[*row, place] for row, place in zip(turn, PLACE, strict=True)] + [[None] * 4]
+    cells = [[*row, coordinate] for row, coordinate in zip(turn, PLACE, strict=True)] + [[None] * 4]
     if not whole:
         flat = [turn[i][j] if across else turn[j][i] for i in range(3) for j in range(3)]
         return PoseFormat(order, (*PLACE, *flat))
@@ -46,7 +48,7 @@ def _matrix(order: str, across: bool, whole: bool) -> PoseFormat:
     )
 
 
-_WAYS: dict[str, tuple[PoseFormat, ...]] = {
+_POSE_FORMATS: dict[str, tuple[PoseFormat, ...]] = {
     "quaternion": (PoseFormat("x,y,z,qx,qy,qz,qw", (*PLACE, *QUATERNION)),),
     "quaternion-wxyz": (PoseFormat("x,y,z,qw,qx,qy,qz", (*PLACE, QUATERNION[3], *QUATERNION[:3])),),
     "rotation-vector": (PoseFormat("x,y,z,rx,ry,rz", (*PLACE, "rotvec_x", "rotvec_y", "rotvec_z")),),
@@ -60,26 +62,30 @@ _WAYS: dict[str, tuple[PoseFormat, ...]] = {
         _matrix("the 16 of a 4 x 4 matrix by columns", across=False, whole=True),
     ),
 }
-ROTATIONS = tuple(_WAYS)
+ROTATIONS = tuple(_POSE_FORMATS)
 
 
-def roles_of(rotation: str, names: list[str]) -> dict[str, str]:
+def pose_roles(rotation: str, names: list[str]) -> dict[str, str]:
     """Roles of the columns of a pose.
 
     Raises:
         InputError: no such rotation, or another number of columns than it has.
     """
-    if rotation not in _WAYS:
-        raise unknown("rotation", rotation, _WAYS)
-    ways = _WAYS[rotation]
+    if rotation not in _POSE_FORMATS:
+        raise unknown("rotation", rotation, _POSE_FORMATS)
+    formats = _POSE_FORMATS[rotation]
     if len(names) == 3:
         return dict(zip(PLACE, names, strict=True))
-    for way in ways:
-        if len(way.roles) == len(names):
-            return {role: name for role, name in zip(way.roles, names, strict=True) if role is not None}
-    others = [name for name, known in _WAYS.items() if any(len(way.roles) == len(names) for way in known)]
-    hint = f"; {len(names)} columns are those of --rotation {' or '.join(others)}" if others else ""
-    orders = ", or ".join(("x,y,z", *(way.order for way in ways)))
+    for layout in formats:
+        if len(layout.roles) == len(names):
+            return {role: name for role, name in zip(layout.roles, names, strict=True) if role is not None}
+    fitting = [
+        name
+        for name, layouts in _POSE_FORMATS.items()
+        if any(len(layout.roles) == len(names) for layout in layouts)
+    ]
+    hint = f"; {len(names)} columns are those of --rotation {' or '.join(fitting)}" if fitting else ""
+    orders = ", or ".join(("x,y,z", *(layout.order for layout in formats)))
     raise InputError(f"--pose needs {orders}, got {len(names)} columns: {','.join(names)}{hint}")
 
 
@@ -89,12 +95,12 @@ def with_quaternions(columns: Mapping[str, Array]) -> dict[str, Array]:
     Raises:
         InputError: nine numbers are no rotation.
     """
-    others = {name: values for name, values in columns.items() if name.partition("_")[0] not in _FAMILIES}
+    unrelated = {name: values for name, values in columns.items() if name.partition("_")[0] not in _FAMILIES}
     for family, names in _FAMILIES.items():
         if names[0] in columns:
             numbers = np.column_stack([columns[name] for name in names])
-            return others | dict(zip(QUATERNION, _quaternions(family, numbers).T, strict=True))
-    return others
+            return unrelated | dict(zip(QUATERNION, quaternions_from(family, numbers).T, strict=True))
+    return unrelated
 
 
 _FAMILIES = {
@@ -104,38 +110,6 @@ _FAMILIES = {
 }
 
 
-def _quaternions(family: str, numbers: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    there = np.isfinite(numbers).all(axis=1)
-    found = np.full((len(numbers), 4), np.nan)
-    if family == "rotvec":
-        found[there] = Rotation.from_rotvec(numbers[there]).as_quat()
-    elif family == "rpy":
-        found[there] = Rotation.from_euler("xyz", numbers[there]).as_quat()
-    else:
-        matrices = numbers[there].reshape(-1, 3, 3)
-        _check_rotations(matrices)
-        found[there] = Rotation.from_matrix(matrices).as_quat()
-    return found
-
-
-def _check_rotations(matrices: Array) -> None:
-    off = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-    turned = np.linalg.det(matrices) if len(matrices) else np.ones(0)
-    bad = np.flatnonzero((off > _OFF) | (turned < 0))
-    if len(bad):
-        row = int(bad[0])
-        why = (
-            f"its rows are not orthonormal: they are off by {off[row]:.2g}"
-            if off[row] > _OFF
-            else "it is a reflection, with determinant -1"
-        )
-        raise InputError(
-            f"row {row + 1} of the pose's matrix is no rotation: {why}; are the columns in the order of --rotation?"
-        )
-
-
 _XYZ = ("x", "y", "z")
 
 
@@ -143,8 +117,8 @@ def _axes(*prefixes: str, axes: tuple[str, ...] = _XYZ) -> tuple[str, ...]:
     return tuple(f"{prefix}.{axis}".lstrip(".") for prefix in prefixes for axis in axes)
 
 
-def _pose(place: str, turn: str) -> tuple[str, ...]:
-    return (*_axes(place), *_axes(turn, axes=(*_XYZ, "w")))
+def _pose(position: str, turn: str) -> tuple[str, ...]:
+    return (*_axes(position), *_axes(turn, axes=(*_XYZ, "w")))
 
 
 _WRENCHES = {
@@ -164,7 +138,7 @@ _POSES = {
     "franka_msgs/msg/FrankaState": _axes("O_T_EE", axes=("12", "13", "14", "qx", "qy", "qz", "qw")),
     "franka_msgs/msg/FrankaRobotState": _pose("o_t_ee.pose.position", "o_t_ee.pose.orientation"),
 }
-"""Where the components are, by the types that palpate knows as a wrench or as a pose.
+"""Fields of the components, by the message types of a wrench or a pose.
 
 Franka's states hold both, the wrench as estimated from the joints, in the base's axes.
 """
@@ -173,12 +147,12 @@ _ORDERS = {"wrench": "fx,fy,fz or fx,fy,fz,tx,ty,tz", "pose": "x,y,z or x,y,z,qx
 
 
 def is_wrench(kind: str) -> bool:
-    """Whether a type of message is a wrench."""
+    """True if a type of message is a wrench."""
     return kind in _WRENCHES
 
 
 def is_pose(kind: str) -> bool:
-    """Whether a type of message is a pose, or a point."""
+    """True if a type of message is a pose, or a point."""
     return kind in _POSES
 
 
@@ -208,38 +182,38 @@ def read_wrench_and_pose(
     """
     path = Path(path)
     kind = kind_of(path)
-    with bag_reader().Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
-        wrench = wrench or _only("wrench", bag, path)
-        pose = pose or _only("pose", bag, path)
+    with bags.Bag(path, kind, options.get("limits")) if kind.is_bag else nullcontext() as bag:
+        wrench = wrench or _only_topic("wrench", bag, path)
+        pose = pose or _only_topic("pose", bag, path)
         columns = _columns("wrench", wrench, path, kind, bag) | _columns(
             "pose", pose, path, kind, bag, rotation
         )
     record = read_log(path, **(options | columns))
-    turned = with_quaternions(record.columns)
-    record = Record(turned, {name: record.units.get(name, "1") for name in turned}, record.meta)
+    oriented = with_quaternions(record.columns)
+    record = Record(oriented, {name: record.units.get(name, "1") for name in oriented}, record.meta)
     facts = [f"wrench of {wrench}, pose of {pose}", *record.meta.get("facts", ())]
     return Record(record.columns, record.units, {**record.meta, "facts": facts})
 
 
-def _only(what: str, bag: Bag | None, path: Path) -> str:
+def _only_topic(what: str, bag: bags.Bag | None, path: Path) -> str:
     """The only topic of a bag that is a wrench, or a pose."""
     if bag is None:
         raise InputError(f"name the {what}'s columns of {path} with --{what} {_ORDERS[what]}")
-    known = _WRENCHES if what == "wrench" else _POSES
-    there = [
-        topic.name for topic in bag.topics.values() if topic.kind in known and topic.count and topic.known
+    kinds = _WRENCHES if what == "wrench" else _POSES
+    fitting = [
+        topic.name for topic in bag.topics.values() if topic.kind in kinds and topic.count and topic.known
     ]
-    if len(there) == 1:
-        return there[0]
-    found = f"there are {', '.join(there)}" if there else f"none of its topics is a {what}"
+    if len(fitting) == 1:
+        return fitting[0]
+    listed = f"there are {', '.join(fitting)}" if fitting else f"none of its topics is a {what}"
     raise InputError(
-        f"name the {what} of {path} with --{what} TOPIC ({found}), or force and position with --force TOPIC.FIELD"
+        f"name the {what} of {path} with --{what} TOPIC ({listed}), or force and position with --force TOPIC.FIELD"
         f" --position TOPIC.FIELD; palpate topics {path} lists them"
     )
 
 
 def _columns(
-    what: str, spec: str, path: Path, kind: Kind, bag: Bag | None, rotation: str = "quaternion"
+    what: str, spec: str, path: Path, kind: Kind, bag: bags.Bag | None, rotation: str = "quaternion"
 ) -> dict[str, str]:
     """The columns of the wrench and the pose, by role."""
     roles, counts = _COUNTS[what]
@@ -249,17 +223,17 @@ def _columns(
         if bag:
             rotation = "quaternion"  # a message that is known says its order itself
     if what == "pose":
-        return roles_of(rotation, names)
+        return pose_roles(rotation, names)
     if len(names) not in counts:
         raise InputError(f"--{what} needs {_ORDERS[what]}, got {len(names)} columns: {','.join(names)}")
     return dict(zip(roles, names, strict=False))
 
 
-def _of_topic(what: str, name: str, bag: Bag) -> list[str]:
+def _of_topic(what: str, name: str, bag: bags.Bag) -> list[str]:
     topic = bag.topic(name)
-    known = _WRENCHES if what == "wrench" else _POSES
-    if topic.kind in known:
-        return [f"{name}.{path}" for path in known[topic.kind]]
+    kinds = _WRENCHES if what == "wrench" else _POSES
+    if topic.kind in kinds:
+        return [f"{name}.{path}" for path in kinds[topic.kind]]
     raise InputError(
         f"{name} is a {topic.kind}, which palpate does not know as a {what}; name its fields:"
         f" --{what} {','.join(f'{name}.FIELD' for _ in range(3))}"
@@ -268,7 +242,7 @@ def _of_topic(what: str, name: str, bag: Bag) -> list[str]:
 
 def _of_matrix(what: str, name: str, path: Path, kind: Kind, rotation: str) -> list[str]:
     """The columns of a matrix of a MATLAB file; quaternions have two orders there, so they are not guessed at."""
-    columns = [own for own in open_table(path, kind).names if own.rpartition(".")[0] == name]
+    columns = [column for column in open_table(path, kind).names if column.rpartition(".")[0] == name]
     if what == "pose" and len(columns) > 3 and rotation == "quaternion":
         raise InputError(
             f"name the columns of {name} one by one, --pose {name}.0,{name}.1,...: x,y,z,qx,qy,qz,qw, the scalar last;"

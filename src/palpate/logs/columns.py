@@ -23,7 +23,7 @@ _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
 
-_HALF = 0.5**0.5
+_MIN_RATE_CORRELATION = 0.5**0.5
 """Correlation with the rate of a position above which that rate accounts for more than half of a column's power."""
 
 
@@ -58,41 +58,41 @@ class ColumnStatistics:
 
     @cached_property
     def unit_rate(self) -> Array:
-        """Likewise of the readings' rate, from row to row."""
+        """The readings' differences from row to row, likewise of unit length."""
         return _of_unit_length(np.gradient(self.unit_readings))
 
     @cached_property
     def step(self) -> float:
-        """From value to value, the typical one."""
+        """Median difference from row to row."""
         step = np.diff(self.values)
         return float(np.median(step)) if len(step) and np.isfinite(step).any() else 0.0
 
     @cached_property
     def is_time(self) -> bool:
-        """Whether it grows in even steps, as a time does."""
+        """True if the column grows in even steps, as a time does."""
         step = np.diff(self.values)
         return len(step) > 2 and bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
 
     @cached_property
     def counts_rows(self) -> bool:
-        """Whether it counts 0, 1, 2, ... or 1, 2, 3, ..."""
+        """True if the column counts 0, 1, 2, ... or 1, 2, 3, ..."""
         return len(self.values) > 2 and self.values[0] in {0, 1} and bool((np.diff(self.values) == 1).all())
 
     @property
     def named_time(self) -> bool:
-        """Whether its name, its unit or its kind is that of a time."""
+        """True if the column's name, unit or kind is that of a time."""
         return self.clock or self.score("time", "time") > 0
 
     @cached_property
     def changes(self) -> bool:
-        """Whether it holds more than two different numbers."""
+        """True if the column holds more than two different numbers."""
         return self.counts > 1
 
     @cached_property
     def counts(self) -> float:
-        """Its range in steps of its own resolution."""
-        there = self.values[np.isfinite(self.values)][:100_000]
-        return float(np.ptp(there) / self.resolution) if self.resolution else 0.0
+        """The column's range in steps of its resolution."""
+        finite = self.values[np.isfinite(self.values)][:100_000]
+        return float(np.ptp(finite) / self.resolution) if self.resolution else 0.0
 
     @cached_property
     def resolution(self) -> float:
@@ -102,7 +102,7 @@ class ColumnStatistics:
 
     @cached_property
     def span(self) -> float:
-        """From its least to its largest, without a rare outlier on either side."""
+        """Range from the 1st to the 99th percentile."""
         low, high = np.nanpercentile(self.values, [1, 99])
         return float(high - low)
 
@@ -117,17 +117,18 @@ class ColumnStatistics:
 def _of_unit_length(values: Array) -> Array:
     if not (np.isfinite(values).all() and np.ptp(values) > 0):
         return np.full(len(values), np.nan)
-    away = values - values.mean()
-    return away / float(np.linalg.norm(away))
+    centred, _ = _scaled(values)
+    return centred / float(np.linalg.norm(centred))
 
 
 def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float:
-    """How closely the ranks of two columns agree, from 0 to 1."""
+    """Rank correlation of two columns (Spearman), without its sign, 0 to 1."""
     from scipy.stats import spearmanr
 
-    a, b = first.readings, second.readings
-    there = np.isfinite(a) & np.isfinite(b)
-    rows = np.flatnonzero(there)[:: max(1, int(there.sum()) // 5000)]
+    a = first.readings
+    b = second.readings
+    finite = np.isfinite(a) & np.isfinite(b)
+    rows = np.flatnonzero(finite)[:: max(1, int(finite.sum()) // 5000)]
     if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
         return 0.0
     return abs(float(spearmanr(a[rows], b[rows]).statistic))
@@ -138,15 +139,24 @@ def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> floa
 
     In taps most rows are noise in free motion: the means by place (correlation ratio) tell more than any filter.
     """
-    a, b = position.readings, force.readings
-    there = np.isfinite(a) & np.isfinite(b)
-    if there.sum() < 16 or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
+    a = position.readings
+    b = force.readings
+    finite = np.isfinite(a) & np.isfinite(b)
+    if finite.sum() < 16 or np.ptp(a[finite]) == 0 or np.ptp(b[finite]) == 0:
         return 0.0
-    force_there = b[there] - b[there].mean()
-    place = np.floor(_BLOCKS * (a[there] - a[there].min()) / np.ptp(a[there])).astype(np.intp)
-    sums, count = np.bincount(place, force_there), np.bincount(place)
-    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (force_there @ force_there)
+    positions = _scale_to_one(a[finite])
+    forces = _scale_to_one(b[finite])
+    forces -= forces.mean()
+    block = np.floor(_BLOCKS * (positions - positions.min()) / np.ptp(positions)).astype(np.intp)
+    sums = np.bincount(block, forces)
+    count = np.bincount(block)
+    by_place = np.sum(sums**2 / np.maximum(count, 1)) / (forces @ forces)
     return max(filtered_power(position, force), float(by_place))
+
+
+def _scale_to_one(values: Array) -> Array:
+    """Values over the power of two above the largest magnitude: the same digits, and no square or range overflows."""
+    return np.ldexp(values, -np.frexp(np.abs(values).max())[1])
 
 
 def filtered_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
@@ -156,35 +166,57 @@ def filtered_power(position: ColumnStatistics, force: ColumnStatistics) -> float
     """
     from scipy.signal import coherence, welch
 
-    a, b = position.readings, force.readings
-    there = np.isfinite(a) & np.isfinite(b)
-    rows = max(int(there.sum()) // _BLOCKS, 4)
-    if there.sum() < 4 * rows or np.ptp(a[there]) == 0 or np.ptp(b[there]) == 0:
+    a = position.readings
+    b = force.readings
+    finite = np.isfinite(a) & np.isfinite(b)
+    rows = max(int(finite.sum()) // _BLOCKS, 4)
+    if finite.sum() < 4 * rows or np.ptp(a[finite]) == 0 or np.ptp(b[finite]) == 0:
         return 0.0
-    power = welch(b[there], nperseg=rows)[1]
-    return float(coherence(a[there], b[there], nperseg=rows)[1] @ power / power.sum())
+    power = welch(b[finite], nperseg=rows)[1]
+    return float(coherence(a[finite], b[finite], nperseg=rows)[1] @ power / power.sum())
 
 
 def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:
-    """Whether two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
+    """True if two columns are one reading in two units, as a sensor beside its own volts: exactly a line.
 
     A position and a force by their units are none, as a simulated spring is a line too.
     """
     if position.score("position", "length") > 1 and force.score("force", "force") > 1:
         return False
-    a, b = position.readings, force.readings
-    there = np.flatnonzero(np.isfinite(a) & np.isfinite(b))[:100_000]
-    slope, offset = np.polyfit(a[there], b[there], 1)
-    apart = np.abs(b[there] - slope * a[there] - offset)
-    return bool(np.max(apart) <= force.resolution + abs(slope) * position.resolution)
+    a = position.readings
+    b = force.readings
+    finite = np.flatnonzero(np.isfinite(a) & np.isfinite(b))[:100_000]
+    (position_readings, position_size), (load, load_size) = (_scaled(column[finite]) for column in (a, b))
+    if not (position_size > 0 and load_size > 0):  # one of them is constant
+        return False
+    slope = float(position_readings @ load) / float(position_readings @ position_readings)
+    apart = np.abs(load - slope * position_readings)
+    return bool(
+        np.max(apart) <= force.resolution / load_size + abs(slope) * (position.resolution / position_size)
+    )
+
+
+def _scaled(values: Array) -> tuple[Array, float]:
+    """Values about their mean, over the power of two below the largest, and that power, 0 where all are equal.
+
+    The squares of the result neither overflow nor underflow, and a power of two changes no digit.
+    """
+    centred = values - values.mean()
+    largest = float(np.max(np.abs(centred), initial=0.0))
+    if not largest > 0.0:
+        return centred, 0.0
+    size = float(np.ldexp(1.0, np.frexp(largest)[1] - 1))
+    return centred / size, size
 
 
 def is_rate(column: ColumnStatistics, position: ColumnStatistics) -> bool:
-    """Whether a column is the velocity of a position: it follows the rate, and that more closely than the position."""
+    """True if a column is the velocity of a position: it follows the rate, and that more closely than the position."""
     if len(column.values) != len(position.values):
         return False
-    own = column.unit_readings
-    return float(own @ position.unit_rate) > max(_HALF, abs(float(own @ position.unit_readings)))
+    readings = column.unit_readings
+    return float(readings @ position.unit_rate) > max(
+        _MIN_RATE_CORRELATION, abs(float(readings @ position.unit_readings))
+    )
 
 
 def roughness(column: ColumnStatistics) -> float:

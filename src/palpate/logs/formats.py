@@ -1,20 +1,17 @@
 """Formats of log files, recognised by their first bytes, not by their names; the logs that paths name."""
 
-import csv
 import re
 from collections.abc import Sequence
 from enum import Enum
-from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeAlias
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.errors import InputError, unknown
+from palpate.errors import InputError
 from palpate.files import RECORD
-from palpate.files.reading import ReadingBudget, ReadingLimits, read_text
+from palpate.files.reading import ReadingBudget, ReadingLimits
 from palpate.logs.tables.sheet import Sheet
 
 
@@ -32,7 +29,7 @@ class Kind(Enum):
 
     @property
     def is_bag(self) -> bool:
-        """Whether it holds messages by topic, each with times of its own."""
+        """True if it holds messages by topic, each with times of its own."""
         return self in {Kind.BAG1, Kind.MCAP, Kind.SQLITE, Kind.FOLDER}
 
 
@@ -80,17 +77,17 @@ def kind_of(path: Path) -> Kind:
         raise InputError(f"{path} is a MATLAB file of version 7.3 (HDF5); save it in MATLAB with: save -v7")
     if begin.startswith(b"PK\x03\x04") and _is_spreadsheet(path):
         return Kind.SHEETS
-    found = next((kind for magic, kind in _BEGINNINGS.items() if begin.startswith(magic)), Kind.TEXT)
-    return Kind.MAT if found is Kind.TEXT and path.suffix.lower() == ".mat" else found
+    detected = next((kind for magic, kind in _BEGINNINGS.items() if begin.startswith(magic)), Kind.TEXT)
+    return Kind.MAT if detected is Kind.TEXT and path.suffix.lower() == ".mat" else detected
 
 
 def _is_sheet(path: Path) -> bool:
-    """Whether a path is `BOOK.xlsx/SHEET`, a sheet of a book."""
+    """True if a path is `BOOK.xlsx/SHEET`, a sheet of a book."""
     return path.parent.is_file() and kind_of(path.parent) is Kind.SHEETS
 
 
 def _is_spreadsheet(path: Path) -> bool:
-    """Whether a zip archive holds the parts of a spreadsheet."""
+    """True if a zip archive holds the parts of a spreadsheet."""
     try:
         with ZipFile(path) as packed:
             return bool({"xl/workbook.xml", "xl/workbook.bin", "content.xml"} & set(packed.namelist()))
@@ -126,43 +123,21 @@ def open_table(
             return read_text_sheet(path, budget, delimiter)
 
 
-Bag: TypeAlias = Any
-"""A `palpate_bags.Bag`, open within `with`."""
-Topic: TypeAlias = Any
-"""A `palpate_bags.Topic`."""
-
-
-def bag_reader() -> Any:
-    """The package `palpate_bags`: its `Bag`, `from_bag` and `leaves`.
-
-    Raises:
-        InputError: it is not installed.
-    """
-    try:
-        return import_module("palpate_bags")
-    except ModuleNotFoundError as error:
-        if error.name != "palpate_bags":
-            raise
-        raise InputError(
-            "bags are read by palpate-bags, which is not installed: pip install 'palpate[bags]'"
-        ) from None
-
-
 ENDINGS = {
     ".csv", ".tsv", ".txt", ".dat", ".ddf", ".lvm", ".xlsx", ".parquet", ".mat", ".bag", *STORAGES
 }  # fmt: skip
-"""Of the files that are taken for logs in a folder."""
+"""File endings that count as logs in a folder."""
 
 
 def log_of(path: Path) -> Path:
     """The record in the folder of a run or a press; of another path, the path itself."""
     record = path / RECORD
-    beside = ("summary.json", "press.json")  # of a run or a simulated press; of a press over a wire
-    return record if record.is_file() and any((path / name).is_file() for name in beside) else path
+    companions = ("summary.json", "press.json")  # of a run or a simulated press; of a press over a wire
+    return record if record.is_file() and any((path / name).is_file() for name in companions) else path
 
 
 def is_folder_of_logs(path: Path) -> bool:
-    """Whether a path is a folder, and not itself one log, as a ROS 2 bag or the folder of a run is."""
+    """True if a path is a folder, and not itself one log, as a ROS 2 bag or the folder of a run is."""
     if not path.is_dir() or log_of(path) != path:
         return False
     return not any((path / "metadata.yaml").is_file() or file.suffix in STORAGES for file in path.iterdir())
@@ -178,11 +153,11 @@ def sheets_as_logs(paths: Sequence[Path], names: Sequence[str], limits: ReadingL
     """
     from palpate.logs.tables.spreadsheet import equal_sheets
 
-    found: list[Path] = []
+    logs: list[Path] = []
     for path in paths:
         book = path.is_file() and kind_of(path) is Kind.SHEETS
-        found.extend((equal_sheets(path, limits, names) if book else []) or [path])
-    return tuple(found)
+        logs.extend((equal_sheets(path, limits, names) if book else []) or [path])
+    return tuple(logs)
 
 
 def gather_logs(paths: Sequence[Path]) -> tuple[Path, ...]:
@@ -191,15 +166,15 @@ def gather_logs(paths: Sequence[Path]) -> tuple[Path, ...]:
     Raises:
         InputError: a folder holds none, or a log is named twice: pooled, it would count twice.
     """
-    found: list[Path] = []
+    logs: list[Path] = []
     for path in paths:
-        found.extend(_of_folder(path) if is_folder_of_logs(path) else [log_of(path)])
-    seen: dict[Path, Path] = {}
-    for path in found:
-        if path.resolve() in seen:
+        logs.extend(_of_folder(path) if is_folder_of_logs(path) else [log_of(path)])
+    resolved: dict[Path, Path] = {}
+    for path in logs:
+        if path.resolve() in resolved:
             raise InputError(f"{path} is named twice; a log counts once, leave one out")
-        seen[path.resolve()] = path
-    return tuple(found)
+        resolved[path.resolve()] = path
+    return tuple(logs)
 
 
 def _of_folder(folder: Path) -> list[Path]:
@@ -228,68 +203,29 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
 
 
 def read_covariates(
-    logs: Sequence[Path],
-    names: Sequence[str],
-    table: Path | None = None,
-    missing: Sequence[str] = (),
-    delimiter: str | None = None,
+    logs: Sequence[Path], names: Sequence[str], missing: Sequence[str] = (), delimiter: str | None = None
 ) -> dict[str, Array]:
-    """One number of each log by the covariate's name, each of shape (logs,): the mean of the log's column.
+    """The mean of a column of each log, by the column's name, each of shape (logs,).
 
     Args:
-        logs: paths of them.
-        names: of the covariates.
-        table: a CSV file with the column `log`, which holds the logs' file names, and a column for each covariate; the
-            logs' own columns when None.
-        missing: values in the logs that mean "no reading".
+        logs: paths.
+        names: of the columns.
+        missing: values that mean "no reading".
         delimiter: between two cells of a log; found when None.
 
     Raises:
-        InputError: a log has no such column or no row, or a value is no number.
+        InputError: a log has no such column, or the column has no reading.
     """
-    rows = None if table is None else _rows(table, names)
-    found = [
-        [_mean(log, name, missing, delimiter) for name in names] if rows is None else _row(log, rows, table)
-        for log in logs
-    ]
-    return dict(zip(names, np.array(found, np.float64).reshape(len(logs), len(names)).T, strict=True))
+    means = np.array([[_mean(log, name, missing, delimiter) for name in names] for log in logs], np.float64)
+    return dict(zip(names, means.reshape(len(logs), len(names)).T, strict=True))
 
 
 def _mean(log: Path, name: str, missing: Sequence[str], delimiter: str | None) -> float:
     kind = kind_of(log)
     if kind.is_bag:
-        raise InputError(f"{log} is a bag, which has no column {name}; give a table by --covariates")
+        raise InputError(f"{log} is a bag, which has no column {name}; leave --covariate {name} out")
     sheet = open_table(log, kind, delimiter)
     (column,) = sheet.numbers([sheet.resolve(name)], missing)
     if not np.isfinite(column).any():
-        raise InputError(f"{log}: column {name!r} has no reading; give a table by --covariates")
+        raise InputError(f"{log}: column {name!r} has no reading; leave --covariate {name} out")
     return float(np.nanmean(column))
-
-
-def _rows(table: Path, names: Sequence[str]) -> dict[str, list[float]]:
-    try:
-        rows = list(csv.DictReader(read_text(table, "a table of covariates").splitlines(), strict=True))
-    except (OSError, csv.Error) as error:
-        raise InputError(f"{table}: no table of covariates ({error}); check the path") from None
-    there = list(rows[0]) if rows else []
-    for name in ("log", *names):
-        if name not in there:
-            raise InputError(f"{table}: {unknown('column', name, there)}")
-    return {str(row["log"]): [_number(table, row, name) for name in names] for row in rows}
-
-
-def _number(table: Path, row: dict[str, str], name: str) -> float:
-    try:
-        value = float(row[name])
-    except (TypeError, ValueError):
-        value = np.nan
-    if not np.isfinite(value):
-        raise InputError(f"{table}: {name} of {row['log']} is {row[name]!r}, which is no number; fill it in")
-    return value
-
-
-def _row(log: Path, rows: dict[str, list[float]], table: Path | None) -> list[float]:
-    found = [rows[name] for name in (str(log), log.name, log.stem) if name in rows]
-    if not found:
-        raise InputError(f"{table}: {unknown('log', log.name, rows)}; add its row")
-    return found[0]

@@ -1,5 +1,7 @@
 """Contents of a log: topics, variables or columns, and their names on the command line."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -10,9 +12,10 @@ import numpy as np
 
 from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
+from palpate.logs import bags
 from palpate.logs.arm_logs import is_pose, is_wrench
 from palpate.logs.columns import NAMES, ColumnStatistics
-from palpate.logs.formats import Bag, Kind, Topic, bag_reader, kind_of, open_table
+from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.presets import preset_among
 from palpate.logs.proposal import Proposal, clock_of, from_columns
 from palpate.logs.read import is_run
@@ -82,7 +85,7 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: ReadingLimi
     path = Path(path)
     kind = kind_of(path)
     if kind.is_bag:
-        with bag_reader().Bag(path, kind, limits) as bag:
+        with bags.Bag(path, kind, limits) as bag:
             fields = {name: _fields(bag, name) for name in bag.topics}
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
             return Listing(entries, bag.troubles, from_topics(bag, fields))
@@ -107,14 +110,14 @@ def propose(table: Sheet) -> Proposal:
     return from_columns(table, _read_columns(table)[0])
 
 
-def _fields(bag: Bag, name: str) -> tuple[str, ...]:
+def _fields(bag: bags.Bag, name: str) -> tuple[str, ...]:
     topic = bag.topics[name]
     if not (topic.known and topic.count):
         return ()
-    return tuple(path for path, _ in bag_reader().leaves(bag.first(name)))
+    return tuple(path for path, _ in bags.leaves(bag.first(name)))
 
 
-def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:
+def _of_topic(bag: bags.Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:
     topic = bag.topics[name]
     first, last = topic.times or (None, None)
     long = first is not None and last is not None and last > first
@@ -122,8 +125,8 @@ def _of_topic(bag: Bag, name: str, fields: tuple[str, ...]) -> SignalEntry:
     return SignalEntry(name, topic.kind, topic.count, rate, first, last, _use(bag, name, fields), fields)
 
 
-def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
-    """How a topic is named on the command line, by its type."""
+def _use(bag: bags.Bag, name: str, fields: tuple[str, ...]) -> str:
+    """Option of the command line that names a topic, by its type."""
     topic = bag.topics[name]
     if not topic.known:
         return "unknown type: the bag does not define it"
@@ -136,12 +139,12 @@ def _use(bag: Bag, name: str, fields: tuple[str, ...]) -> str:
     return " ".join(uses) + (f" (in {topic.parent})" if topic.parent else "")
 
 
-def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
+def from_topics(bag: bags.Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
     """The command for a bag."""
-    there = [topic for topic in bag.topics.values() if topic.count and topic.known]
+    readable = [topic for topic in bag.topics.values() if topic.count and topic.known]
     guesses: list[str] = []
-    wrench = _topic([topic for topic in there if is_wrench(topic.kind)], "wrench", guesses)
-    pose = _topic([topic for topic in there if is_pose(topic.kind)], "pose", guesses)
+    wrench = _topic([topic for topic in readable if is_wrench(topic.kind)], "wrench", guesses)
+    pose = _topic([topic for topic in readable if is_pose(topic.kind)], "pose", guesses)
     name = preset_among(bag.topics)
     if name is not None:
         return Proposal({"preset": name}, (), (f"the topics are those of the preset {name}",))
@@ -159,22 +162,22 @@ def from_topics(bag: Bag, fields: Mapping[str, Sequence[str]]) -> Proposal:
     return Proposal(pair, tuple(guesses))
 
 
-def _topic(topics: Sequence[Topic], what: str, guesses: list[str]) -> Topic | None:
+def _topic(topics: Sequence[bags.Topic], what: str, guesses: list[str]) -> bags.Topic | None:
     """The topic with most messages; one of the base's own frames before another's."""
     if len(topics) > 1:
-        others = ", ".join(topic.name for topic in topics[:8])
+        listed = ", ".join(topic.name for topic in topics[:8])
         best = max(topics, key=lambda topic: (not topic.parent, topic.count))
-        guesses.append(f"{best.name} is taken for the {what}; there are {others}")
+        guesses.append(f"{best.name} is taken for the {what}; there are {listed}")
         return best
     return topics[0] if topics else None
 
 
-def _frame(bag: Bag, topic: Topic) -> str:
+def _frame(bag: bags.Bag, topic: bags.Topic) -> str:
     header = getattr(bag.first(topic.name), "header", None)
     return str(getattr(header, "frame_id", ""))
 
 
-def _joint(bag: Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
+def _joint(bag: bags.Bag, fields: Mapping[str, Sequence[str]], guesses: list[str]) -> dict[str, str] | None:
     """Position and effort of the joint whose effort changes most."""
     for name, paths in fields.items():
         if not bag.topics[name].kind.endswith("/JointState"):
@@ -197,9 +200,10 @@ def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> 
     paths = [f"{name}.{path}" for name, inner in fields.items() for path in inner]
     pair = []
     for role in ("position", "force"):
-        named, left = re.compile(NAMES[role], re.I), [path for path in paths if path not in pair]
-        fits = [path for path in left if named.search(path.rpartition(".")[2])]  # z and fz of one topic
-        fits = fits or [path for path in left if named.search(path)]
+        named = re.compile(NAMES[role], re.I)
+        unused = [path for path in paths if path not in pair]
+        fits = [path for path in unused if named.search(path.rpartition(".")[2])]  # z and fz of one topic
+        fits = fits or [path for path in unused if named.search(path)]
         if not fits:
             return None
         pair += [next((path for path in fits if path.endswith("z")), fits[0])]
@@ -214,34 +218,35 @@ def _read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:
     try:
         columns = table.glance(places)
     except InputError as error:
-        columns, unread = [np.empty(0) for _ in places], [str(error)]
+        columns = [np.empty(0) for _ in places]
+        unread = [str(error)]
     statistics = []
-    for place, values in zip(places, columns, strict=True):
-        name = table.names[place]
+    for index, values in zip(places, columns, strict=True):
+        name = table.names[index]
         stated = table.stated.get(name, Stated(None))
         scaled = (values + stated.offset) * stated.scale
-        statistics.append(ColumnStatistics(place, name, scaled, stated.unit, name in table.clocks))
+        statistics.append(ColumnStatistics(index, name, scaled, stated.unit, name in table.clocks))
     return statistics, unread
 
 
 def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> SignalEntry:
-    there = np.isfinite(column.values)
-    count = int(there.sum())
+    finite = np.isfinite(column.values)
+    count = int(finite.sum())
     if not count:
         return SignalEntry(column.name, "text", 0, None, None, None, "not numbers")
     kind = "date" if column.clock else "number"
-    about = f"{column.values[there].min():.6g} to {column.values[there].max():.6g}"
+    about = f"{column.values[finite].min():.6g} to {column.values[finite].max():.6g}"
     about += f" {column.unit}" if column.unit not in {None, "1"} else ""
     if clock is None or count < 2 or len(clock.values) != len(column.values):
         return SignalEntry(column.name, kind, count, None, None, None, about)
-    time = clock.values[there] * _factor(clock)
+    time = clock.values[finite] * _factor(clock)
     rate = (count - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else None
     about += " (time?)" if column is clock else ""
     return SignalEntry(column.name, kind, count, rate, float(time[0]), float(time[-1]), about)
 
 
 def _factor(clock: ColumnStatistics) -> float:
-    """From a time's own unit to seconds."""
+    """Factor from a time's own unit to seconds."""
     if clock.clock:
         return 1.0
     symbol = clock.unit or unit_in_name(clock.name, "time") or epoch_unit(float(clock.values[0]), clock.step)

@@ -19,25 +19,25 @@ from palpate.units import known_unit, unit, unit_in_name
 
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """Largest plausible range in SI units, and the assumed unit above it."""
-_COUNTS = 20
+_MIN_POSITION_STEPS = 20
 """Steps of its resolution that a position moves over at least: from fewer no stiffness is known to 5 %."""
-_FOLLOWS = 0.3
+_MIN_RANK_CORRELATION = 0.3
 """Rank correlation of a force with its position above which it follows: 1 - (1 - c)^3 where it follows in a share c of
 the rows and is noise in the others, so that a contact over a ninth of the log is seen."""
-_COHERENT = 0.5
+_MIN_EXPLAINED_POWER = 0.5
 """Share of the power of a column that is named a force above which it follows a filtered position: of two columns of
 noise it is under a tenth (`filtered_power`)."""
-_PAIRS = 800
+_MAX_PAIRS = 800
 """Most pairs of columns that are compared, the 780 of 40 columns without names among them: that takes seconds."""
 _NO_PAIR = "no two columns are a position that moves and a force that follows it"
 _JOINTS_ONLY = (
     "the columns are those of libfranka's logToCSV: joints and their torques, without wrench and pose of the tip;"
     " record O_F_ext_hat_K and O_T_EE of RobotState with its time, which --preset franka reads"
 )
-_STATES = 1000
+_MAX_STATE_RATE = 1000
 """Fastest rate at which an arm's controller gives its state [Hz]: that of libfranka; UR's is 500."""
-_RATE = 1000
-"""Of the example [Hz]; nothing is computed with it."""
+_EXAMPLE_RATE = 1000
+"""Rate in the printed example [Hz]; no result depends on it."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class Proposal:
         words = self.words
         if words is None:
             return None
-        place = str(log) if not str(log).startswith("-") else f"./{log}"
-        return " ".join(["palpate identify", *map(shlex.quote, (place, *words))])
+        path = str(log) if not str(log).startswith("-") else f"./{log}"
+        return " ".join(["palpate identify", *map(shlex.quote, (path, *words))])
 
 
 def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: str | None = None) -> Proposal:
@@ -87,27 +87,28 @@ def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: s
             return Proposal({**options, "preset": name}, (), facts)
         timing, guesses = _state_time(clock) if clock else (timing, guesses)
         usual = {key: preset(name)[key] for key in ("wrench", "pose")}
-        given = {
+        chosen = {
             key: ",".join(members[member].name for member in value.split(",")) for key, value in usual.items()
         }
-        changed = {} if given == usual else given
+        changed = {} if chosen == usual else chosen
         return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
     if all(f"{part}[{i}]" in members for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
         return Proposal(None, (_JOINTS_ONLY,))
-    others = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
+    varying = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
     unique: dict[tuple[bool, bool, bytes], ColumnStatistics] = {}
-    for column in others:
+    for column in varying:
         unique.setdefault(_identity(column), column)
-    others = list(unique.values())
-    space = _in_space(table, others, guesses)
+    varying = list(unique.values())
+    space = _in_space(table, varying, guesses)
     if space:
         return Proposal({**options, **timing, **space}, tuple(guesses))
-    pair = _pair(others, guesses)
+    pair = _pair(varying, guesses)
     if pair is None:
         return Proposal(None, (_NO_PAIR,))
     position, force = pair
-    place, load = (_with_unit(table, *column, guesses) for column in ((position, "length"), (force, "force")))
-    return Proposal({**options, **timing, "position": place, "force": load}, tuple(guesses))
+    position_spec = _with_unit(table, position, "length", guesses)
+    force_spec = _with_unit(table, force, "force", guesses)
+    return Proposal({**options, **timing, "position": position_spec, "force": force_spec}, tuple(guesses))
 
 
 def _identity(column: ColumnStatistics) -> tuple[bool, bool, bytes]:
@@ -121,8 +122,8 @@ def _identity(column: ColumnStatistics) -> tuple[bool, bool, bytes]:
 
 def _stem(column: ColumnStatistics) -> str:
     """The letters that a column's name begins with, which the channels of one device share: AI of AI0 and AI1."""
-    found = re.match(r"[^\W\d_]+", column.name)
-    return found[0] if found else ""
+    letters = re.match(r"[^\W\d_]+", column.name)
+    return letters[0] if letters else ""
 
 
 def _member(name: str) -> str:
@@ -133,24 +134,26 @@ def _member(name: str) -> str:
 
 
 def _state_time(clock: ColumnStatistics) -> tuple[dict[str, str], list[str]]:
-    """The time of a driver's states: no controller gives them faster than `_STATES`, which leaves one unit."""
-    symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _STATES > 0.5), "s")
+    """The time of a driver's states: no controller gives them faster than `_MAX_STATE_RATE`, which leaves one unit."""
+    symbol = next((s for s in ("us", "ms") if clock.step * unit(s).factor * _MAX_STATE_RATE > 0.5), "s")
     return {"time": clock.name if symbol == "s" else f"{clock.name}:{symbol}"}, []
 
 
 def _motion(name: str, members: Mapping[str, ColumnStatistics]) -> tuple[str, ...]:
-    """How far the tool moves in a log of a preset's columns, and with which force."""
+    """Sentence on the motion and the force in a log of a preset's columns."""
     options = preset(name)
     used = [members[column] for key in ("wrench", "pose") for column in options[key].split(",")]
     count = f"all {len(used) + ('time' in options)} columns of the preset {name} are there"
-    forces, places = used[:3], used[6:]
+    forces = used[:3]
+    places = used[6:]
     if options["rotation"].startswith("matrix"):
         places = [
             places[i] for i in ((12, 13, 14) if options["rotation"] == "matrix-by-columns" else (3, 7, 11))
         ]
     axis = int(np.argmax([place.span for place in places[:3]]))
-    moved, force = 1e3 * places[axis].span, forces[axis].span
-    return (f"{count}; the tool moves {moved:.3g} mm along {'xyz'[axis]}, with a force of {force:.3g} N",)
+    travel = 1e3 * places[axis].span
+    force = forces[axis].span
+    return (f"{count}; the tool moves {travel:.3g} mm along {'xyz'[axis]}, with a force of {force:.3g} N",)
 
 
 def clock_of(table: Sheet, columns: Sequence[ColumnStatistics]) -> ColumnStatistics | None:
@@ -173,8 +176,8 @@ def _timing(
     if clock is None:
         named = [name for name in table.names if re.search(NAMES["time"], name, re.IGNORECASE)]
         none = f"{named[0]!r} is no time that is read, and " if named else ""
-        guesses.append(f"{none}the log does not state its rate: --rate {_RATE} is only an example")
-        return {"rate": f"{_RATE}"}, None
+        guesses.append(f"{none}the log does not state its rate: --rate {_EXAMPLE_RATE} is only an example")
+        return {"rate": f"{_EXAMPLE_RATE}"}, None
     if not clock.named_time:
         guesses.append(f"{clock.name!r} is used as the time: it has even steps")
     call = _call(table, clock)
@@ -196,21 +199,25 @@ def _pair(
 
     A column that hardly moves is no position, and one that does not follow it is no force.
     """
-    moving = [column for column in columns if column.counts >= _COUNTS]
+    moving = [column for column in columns if column.counts >= _MIN_POSITION_STEPS]
     forces = _best(columns, lambda column: column.score("force", "force"))
     places = _best(
         [column for column in moving if column not in forces[:1]],
         lambda column: column.score("position", "length"),
     )
-    places = places[:_PAIRS]
-    places = [own for own in places if not any(own is not p and statistics.is_rate(own, p) for p in places)]
+    places = places[:_MAX_PAIRS]
+    places = [
+        candidate
+        for candidate in places
+        if not any(candidate is not p and statistics.is_rate(candidate, p) for p in places)
+    ]
     candidates = ((a, b) for a in places or moving for b in forces or columns if a is not b)
     by_name = bool(places and forces)
     follow = [
         pair
-        for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _PAIRS)
-        if statistics.rank_correlation(*pair) > _FOLLOWS
-        or (by_name and statistics.explained_power(*pair) > _COHERENT)
+        for pair in islice(candidates if places or forces else combinations(moving[:40], 2), _MAX_PAIRS)
+        if statistics.rank_correlation(*pair) > _MIN_RANK_CORRELATION
+        or (by_name and statistics.explained_power(*pair) > _MIN_EXPLAINED_POWER)
     ]
     pairs = [pair for pair in follow if not statistics.is_one_reading(*pair)]
     if not pairs:
@@ -218,13 +225,15 @@ def _pair(
     position, force = max(
         pairs, key=lambda pair: (_stem(pair[0]) == _stem(pair[1]), statistics.rank_correlation(*pair))
     )
-    left = dict.fromkeys(column.name for pair in pairs for column in pair if column not in (position, force))
-    if by_name and left:
-        more = ", ".join([*left][:8])
-        guesses.append(f"{position.name!r} and {force.name!r} are used; the names of {more} fit too")
+    unused = dict.fromkeys(
+        column.name for pair in pairs for column in pair if column not in (position, force)
+    )
+    if by_name and unused:
+        listed = ", ".join([*unused][:8])
+        guesses.append(f"{position.name!r} and {force.name!r} are used; the names of {listed} fit too")
     elif not by_name and (places or forces):
-        known, other = (position, force) if places else (force, position)
-        guesses.append(f"{other.name!r} is used: of all columns it correlates most with {known.name!r}")
+        reference, partner = (position, force) if places else (force, position)
+        guesses.append(f"{partner.name!r} is used: of all columns it correlates most with {reference.name!r}")
     elif not by_name:
         smooth, rough = sorted((position, force), key=statistics.roughness)
         cause = _cause(moving, smooth, rough)
@@ -239,22 +248,22 @@ def _pair(
 
 def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> ColumnStatistics | None:
     """The finest of the smoother columns whose motion both of a pair follow, as friction does, and not its place."""
-    found = [
+    causes = [
         column
         for column in moving[:40]
         if statistics.roughness(column) < min(map(statistics.roughness, pair))
-        and all(statistics.rank_correlation(column, own) <= _FOLLOWS for own in pair)
-        and all(statistics.filtered_power(column, own) > _COHERENT for own in pair)
+        and all(statistics.rank_correlation(column, response) <= _MIN_RANK_CORRELATION for response in pair)
+        and all(statistics.filtered_power(column, response) > _MIN_EXPLAINED_POWER for response in pair)
     ]
-    return max(found, key=lambda column: column.counts, default=None)
+    return max(causes, key=lambda column: column.counts, default=None)
 
 
 def _best(
     columns: Sequence[ColumnStatistics], score: Callable[[ColumnStatistics], int]
 ) -> list[ColumnStatistics]:
     """The columns of the highest score, if one is above 0."""
-    most = max(map(score, columns), default=0)
-    return [column for column in columns if score(column) == most] if most > 0 else []
+    best = max(map(score, columns), default=0)
+    return [column for column in columns if score(column) == best] if best > 0 else []
 
 
 def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: list[str]) -> str:
@@ -284,20 +293,18 @@ def _call(table: Sheet, column: ColumnStatistics) -> str:
 def _in_space(table: Sheet, columns: Sequence[ColumnStatistics], guesses: list[str]) -> dict[str, str]:
     """The options for a wrench and a pose in three dimensions, where six columns or more are named so."""
     force = _triple(columns, r"(?:f|force)[_. ]?{}")
-    place = _triple(columns, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
-    if not (force and place and max(column.counts for column in place) >= _COUNTS):
+    position = _triple(columns, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
+    if not (force and position and max(column.counts for column in position) >= _MIN_POSITION_STEPS):
         return {}
-    torque, turn = (
-        _triple(columns, r"(?:t|m|torque|moment)[_. ]?{}"),
-        _triple(columns, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw"),
-    )
+    torque = _triple(columns, r"(?:t|m|torque|moment)[_. ]?{}")
+    turn = _triple(columns, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw")
     guesses.append(
         "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
     )
     wrench = [_with_unit(table, column, "force", guesses) for column in force] + [
         _call(table, column) for column in torque
     ]
-    pose = [_with_unit(table, column, "length", guesses) for column in place] + [
+    pose = [_with_unit(table, column, "length", guesses) for column in position] + [
         _call(table, column) for column in turn
     ]
     return {"wrench": ",".join(wrench), "pose": ",".join(pose), "wrench_frame": "base"}

@@ -1,4 +1,4 @@
-"""From a log file, or a table in memory, to a record in SI units."""
+"""Logs and tables in memory as records in SI units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,8 +10,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
-from palpate.logs import roles
-from palpate.logs.formats import Kind, bag_reader, kind_of, open_table
+from palpate.logs import bags, roles
+from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.tables.parquet import read_record, stored_about
 from palpate.logs.tables.sheet import Sheet, Stated, find_sentinel, own_columns, read_frame
 from palpate.records import Record
@@ -73,8 +73,8 @@ def read_log(
     if kind.is_bag:
         if rate is not None:
             raise InputError(f"the messages of {path} have their own times; leave out --rate")
-        with bag_reader().Bag(path, kind, limits) as bag:
-            loaded = bag_reader().from_bag(bag, columns, missing, held)
+        with bags.Bag(path, kind, limits) as bag:
+            loaded = bags.from_bag(bag, columns, missing, held)
     else:
         loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
     roles.check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
@@ -91,8 +91,8 @@ def _record(loaded: roles.Loaded, path: Path, start: float | None, end: float | 
         meta["frames"] = loaded.frames
     if loaded.joints:
         meta["position_from"] = "joints"
-    kept = _cut(loaded.columns, start, end, path)
-    return Record(kept, {name: loaded.units[name] for name in kept}, meta)
+    arrays = _cut(loaded.columns, start, end, path)
+    return Record(arrays, {name: loaded.units[name] for name in arrays}, meta)
 
 
 def columns_of(path: str | Path, delimiter: str | None = None) -> list[str]:
@@ -131,7 +131,7 @@ RUN = {"time": "t", "position": "x_measured", "force": "force_sampled"}
 
 
 def is_run(path: Path) -> bool:
-    """Whether a file is the record of a run."""
+    """True if a file is the record of a run."""
     if kind_of(path) is not Kind.PARQUET:
         return False
     about = stored_about(path)
@@ -155,12 +155,12 @@ def read_run(path: Path, **options: Any) -> Record:
     return Record(record.columns, record.units, {**record.meta, **_NO_TOOL, **arm, "facts": [fact]})
 
 
-def _arm(path: Path, known: Any) -> dict[str, Any]:
+def _arm(path: Path, entries: Any) -> dict[str, Any]:
     """Compliances and masses on both sides of the force sensor, with standard deviations, if known."""
-    if not isinstance(known, dict):
+    if not isinstance(entries, dict):
         return {}
     try:
-        return {name: msgspec.convert(known[name], kind) for name, kind in _ARM.items() if name in known}
+        return {name: msgspec.convert(entries[name], kind) for name, kind in _ARM.items() if name in entries}
     except msgspec.ValidationError as error:
         raise InputError(f"{path}: its metadata of the arm is damaged ({error}); press again") from None
 
@@ -175,16 +175,16 @@ def measured_by(path: Path) -> dict[str, Any]:
     if instruments is None:
         return {}
     try:
-        found = msgspec.convert(instruments, _Instruments)
+        sensors = msgspec.convert(instruments, _Instruments)
     except msgspec.ValidationError as error:
         raise InputError(
             f"{path}: its metadata of the instruments is damaged ({error}); run it again"
         ) from None
-    if found.force is None or found.force.filter == "unknown":
+    if sensors.force is None or sensors.force.filter == "unknown":
         return {}
-    low_pass = LowPass.parse(found.force.filter)
-    lag = low_pass.lag + found.force.delay_s - found.position.lag_s
-    return {"lag": lag, "force_filter": found.force.filter}
+    low_pass = LowPass.parse(sensors.force.filter)
+    lag = low_pass.lag + sensors.force.delay_s - sensors.position.lag_s
+    return {"lag": lag, "force_filter": sensors.force.filter}
 
 
 _Kilograms = Annotated[float, msgspec.Meta(ge=0, le=1e3)]
@@ -227,19 +227,20 @@ def from_table(
         InputError: a fault in the file or with these arguments.
     """
     places = {role: table.resolve(split_spec(spec)[0]) for role, spec in columns.items()}
-    roles.check_apart(places, {role: table.names[place] for role, place in places.items()}, table.path)
+    roles.check_apart(places, {role: table.names[index] for role, index in places.items()}, table.path)
     words = [str(word) for word in missing]
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
     if not len(next(iter(arrays.values()))):
         raise InputError(f"{table.path} holds a header and no rows; give a log with a row for each sample")
     loaded = roles.Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
-    origin = _from_first(table, places, arrays)
+    origin = _subtract_start(table, places, arrays)
     for role, spec in columns.items():
-        name, stated = table.names[places[role]], table.stated.get(table.names[places[role]], Stated(None))
+        name = table.names[places[role]]
+        stated = table.stated.get(table.names[places[role]], Stated(None))
         epoch = _epoch(arrays["time"], origin) if role == "time" else None
         symbol = _symbol(role, spec, table, places[role], epoch, loaded.notes)
         if role != "time":
-            loaded.notes += _missing(role, arrays[role], name, given=bool(words))
+            loaded.notes += _mark_missing(role, arrays[role], name, declared=bool(words))
         loaded.units[role] = unit(symbol).si
         arrays[role] += stated.offset
         arrays[role] *= stated.scale * unit(symbol).factor
@@ -252,7 +253,7 @@ def from_table(
     return loaded
 
 
-def _from_first(table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
+def _subtract_start(table: Sheet, places: Mapping[str, int], arrays: Mapping[str, Array]) -> float:
     """Take the first row's time off before it is scaled, in whole numbers where floats would lose some.
 
     Returns:
@@ -274,13 +275,13 @@ def _epoch(time: Array, origin: float) -> str | None:
 
 
 def _symbol(
-    role: str, spec: str, table: Sheet, place: int, epoch: str | None, notes: list[dict[str, Any]]
+    role: str, spec: str, table: Sheet, index: int, epoch: str | None, notes: list[dict[str, Any]]
 ) -> str:
     """The unit's symbol of one column: said, else stated in the file, else carried by the name, else SI."""
     name, symbol = split_spec(spec)
-    own = table.names[place]
-    stated = table.stated.get(own, Stated(None))
-    if own in table.clocks:
+    title = table.names[index]
+    stated = table.stated.get(title, Stated(None))
+    if title in table.clocks:
         if (symbol or "s") != "s":
             raise InputError(
                 f"{name!r} holds dates and times, which are read as seconds; leave :{symbol} out"
@@ -289,7 +290,7 @@ def _symbol(
         return "s"
     if symbol is not None:
         roles.check_quantity(role, name, symbol)
-        _note_contradiction(name, symbol, own, role, stated, notes)
+        _note_contradiction(name, symbol, title, role, stated, notes)
         return symbol
     if stated.unit is not None:
         roles.check_quantity(role, name, stated.unit)
@@ -297,55 +298,66 @@ def _symbol(
             text = f"{name!r} is taken in {stated.unit}, by {stated.where}; give {name}:UNIT if that is wrong"
             notes.append({"code": "unit-stated", "text": text})
         return stated.unit
-    guess, why = unit_in_name(own, roles.quantity(role)), "its name"
-    if guess is None and epoch:
-        guess, why = epoch, "its values, which then are dates"
-    if guess and unit(guess).factor != 1.0:
-        text = f"no unit was given for {own!r}: {guess} is taken from {why}; give {name}:{guess} or the right unit"
-        notes.append({"code": "unit-guess", "text": text})
-        return guess
-    other = _other_unit(role, own)
-    if other:
-        text = f"{role} is read from {own!r}, whose name says {other}, a unit of {unit(other).quantity}"
+    code = "unit-stated"
+    why = "its name"
+    carried = unit_in_name(title, roles.quantity(role))
+    if carried is None and epoch:
+        code = "unit-guess"
+        why = "its values, which then are dates"
+        carried = epoch
+    if carried and unit(carried).factor != 1.0:
+        text = (
+            f"no unit was given for {title!r}: {carried} is taken from {why}; "
+            f"give {name}:{carried} or the right unit"
+        )
+        notes.append({"code": code, "text": text})
+        return carried
+    mismatch = _other_unit(role, title)
+    if mismatch:
+        text = (
+            f"{role} is read from {title!r}, whose name says {mismatch}, a unit of {unit(mismatch).quantity}"
+        )
         notes.append({"code": "columns-swapped", "text": f"{text}: is it the right column?"})
     return roles.si_unit(role)
 
 
 def _note_contradiction(
-    name: str, symbol: str, own: str, role: str, stated: Stated, notes: list[dict[str, Any]]
+    name: str, symbol: str, column: str, role: str, stated: Stated, notes: list[dict[str, Any]]
 ) -> None:
     """Note that a unit is another than the column's name carries, or the file states."""
-    other, where = (stated.unit, stated.where) if stated.unit and stated.where else (None, "its name")
-    if other is None and name == own:  # a column that is named by its number is meant so
-        other = unit_in_name(own, roles.quantity(role))
-    if other and unit(symbol) != unit(other):
-        text = f"{name!r} is taken in {symbol} as given, but {where} says {other}: is it {name}:{other}?"
+    contrary, where = (stated.unit, stated.where) if stated.unit and stated.where else (None, "its name")
+    if contrary is None and name == column:  # a column that is named by its number is meant so
+        contrary = unit_in_name(column, roles.quantity(role))
+    if contrary and unit(symbol) != unit(contrary):
+        text = (
+            f"{name!r} is taken in {symbol} as given, but {where} says {contrary}: is it {name}:{contrary}?"
+        )
         notes.append({"code": "unit-doubtful", "text": text})
 
 
 def _other_unit(role: str, name: str) -> str | None:
     """A unit that a column's name carries, of a quantity that the role is not."""
-    others = {"time", "length", "force"} - {roles.quantity(role)}
+    quantities = {"time", "length", "force"} - {roles.quantity(role)}
     if roles.family(role) not in {"time", "position", "force"}:
         return None
-    return next((symbol for other in sorted(others) if (symbol := unit_in_name(name, other))), None)
+    return next((symbol for quantity in sorted(quantities) if (symbol := unit_in_name(name, quantity))), None)
 
 
-def _missing(role: str, values: Array, name: str, given: bool) -> list[dict[str, Any]]:
+def _mark_missing(role: str, values: Array, name: str, declared: bool) -> list[dict[str, Any]]:
     """Turn values that mean "no reading" into NaN, and note it."""
     notes = []
-    sentinel = None if given or role not in {"position", "force"} else find_sentinel(values)
+    sentinel = None if declared or role not in {"position", "force"} else find_sentinel(values)
     if sentinel is not None:
         values[values == sentinel] = np.nan
     count = int(np.isnan(values).sum())
     if count:
-        share = f"{count} of {len(values)} rows ({count / len(values):.1%}) of {name!r}"
+        rows = f"{count} of {len(values)} rows ({count / len(values):.1%}) of {name!r}"
         why = f"hold {sentinel:g}, treated as no reading" if sentinel is not None else "hold no reading"
         row = int(np.flatnonzero(np.isnan(values))[0]) + 1
         notes.append(
             {
                 "code": "missing-samples",
-                "text": f"{share} {why} (the first is row {row}); they are interpolated",
+                "text": f"{rows} {why} (the first is row {row}); they are interpolated",
             }
         )
     if count == len(values):

@@ -31,7 +31,8 @@ class _Family(NamedTuple):
     """Quantities of the units that its columns may have beside its own."""
 
 
-_ANY_NUMBER, _ANGLE = _Family("number", "1"), _Family("angle", "rad")
+_ANY_NUMBER = _Family("number", "1")
+_ANGLE = _Family("angle", "rad")
 _FAMILIES = {
     "time": _Family("time", "s"),
     "position": _Family("length", "m", frozenset({"angle", "number"})),
@@ -74,8 +75,8 @@ def family(role: str) -> str:
 
 def quantity(role: str) -> str:
     """Quantity of a role; empty for an unknown one."""
-    known = _FAMILIES.get(family(role))
-    return known.quantity if known else ""
+    properties = _FAMILIES.get(family(role))
+    return properties.quantity if properties else ""
 
 
 def si_unit(role: str) -> str:
@@ -85,10 +86,11 @@ def si_unit(role: str) -> str:
 
 def check_quantity(role: str, name: str, symbol: str) -> None:
     """Refuse a unit that a role cannot have."""
-    found, known = unit(symbol).quantity, _FAMILIES.get(family(role))
-    if known and found not in {known.quantity, *known.allowed}:
+    measured = unit(symbol).quantity
+    properties = _FAMILIES.get(family(role))
+    if properties and measured not in {properties.quantity, *properties.allowed}:
         raise InputError(
-            f"{symbol!r} of {name}:{symbol} is a unit of {found}; {role} needs one of {quantity(role)}"
+            f"{symbol!r} of {name}:{symbol} is a unit of {measured}; {role} needs one of {quantity(role)}"
         )
 
 
@@ -100,24 +102,24 @@ def check_apart(places: Mapping[str, Any], names: Mapping[str, str], path: Path)
         names: what to call that.
         path: of the log.
     """
-    seen: dict[Any, str] = {}
+    roles: dict[Any, str] = {}
     for role in sorted(places, key=lambda role: (family(role) not in _FAMILIES, role)):
         if family(role) not in _FAMILIES:
             break
-        other = seen.setdefault(places[role], role)
-        if other != role:
-            both = " and ".join(sorted((other, role)))
+        first = roles.setdefault(places[role], role)
+        if first != role:
+            both = " and ".join(sorted((first, role)))
             raise InputError(f"{both} cannot be the same column of {path}, {names[role]!r}; name two")
 
 
 LARGEST, SMALLEST = 1e30, 1e-30
-"""In SI units. Their fourth powers fit in a float with room for sums, and those are the highest that are formed."""
-_FASTEST, _SLOWEST = 200e3, 0.5
+"""Range of numbers in SI units: their fourth powers, the highest formed, fit in a float with room for sums."""
+_MAX_RATE, _MIN_RATE = 200e3, 0.5
 """Rows a second: no sensor of force is read faster, and no contact is identified from fewer."""
 _TIMES = {"min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _CENTURY = (946_684_800.0, 4_102_444_800.0)
 """1 January of 2000 and of 2100 [s since 1970]."""
-_USUAL = 1e3
+_USUAL_RATE = 1e3
 """Rows a second that a contact is usually recorded with."""
 
 
@@ -130,7 +132,7 @@ def epoch_unit(first: float, step: float) -> str | None:
     """
     for symbol in ("s", "ms", "us", "ns"):
         begin, end = (seconds / _TIMES[symbol] for seconds in _CENTURY)
-        if begin <= first < end and step > 0 and _SLOWEST / 10 <= 1 / (step * _TIMES[symbol]) <= _FASTEST:
+        if begin <= first < end and step > 0 and _MIN_RATE / 10 <= 1 / (step * _TIMES[symbol]) <= _MAX_RATE:
             return symbol
     return None
 
@@ -141,10 +143,10 @@ def usual_unit(step: float) -> str:
     Args:
         step: from row to row, as the file counts it.
     """
-    if step > 0 and _SLOWEST <= 1 / step <= _FASTEST:
+    if step > 0 and _MIN_RATE <= 1 / step <= _MAX_RATE:
         return "s"
-    near = min(_TIMES, key=lambda symbol: abs(np.log(max(step, 1e-300) * _TIMES[symbol] * _USUAL)))
-    return near if step > 0 and 10 <= 1 / (step * _TIMES[near]) <= _FASTEST else "s"
+    near = min(_TIMES, key=lambda symbol: abs(np.log(max(step, 1e-300) * _TIMES[symbol] * _USUAL_RATE)))
+    return near if step > 0 and 10 <= 1 / (step * _TIMES[near]) <= _MAX_RATE else "s"
 
 
 def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Path) -> None:
@@ -159,11 +161,11 @@ def check_range(columns: Mapping[str, Array], names: Mapping[str, str], path: Pa
         InputError: a column and a value of it are named.
     """
     for role, values in columns.items():
-        there = values[np.isfinite(values)]
-        if not len(there):
+        finite = values[np.isfinite(values)]
+        if not len(finite):
             continue
-        largest = float(there[np.argmax(np.abs(there))])
-        span = float(np.ptp(there))
+        largest = float(finite[np.argmax(np.abs(finite))])
+        span = float(np.ptp(finite))
         where = f"{path}: {names.get(role, role)!r} ({role})"
         if abs(largest) > LARGEST:
             raise InputError(
@@ -192,30 +194,31 @@ def implausible_times(columns: Mapping[str, Array], start: float, spec: str) -> 
         return []
     back = int((step < 0).sum())
     if back:
-        return _going_back(columns, step, back, spec)
-    name, told = spec.rpartition(":")[0] or spec, ":" in spec
+        return _check_backwards(columns, step, back, spec)
+    name = spec.rpartition(":")[0] or spec
+    declared = ":" in spec
     dt = float(np.median(step[step > 0])) if (step > 0).any() else 0.0
-    if not told and np.all(step == 1.0) and start in {0.0, 1.0}:
+    if not declared and np.all(step == 1.0) and start in {0.0, 1.0}:
         text = f"{name!r} is {start:g}, {start + 1:g}, {start + 2:g}, ...: it counts rows rather than seconds"
         return [_note("time-doubtful", f"{text}; give --rate with the rows a second instead of --time")]
-    if dt and not _SLOWEST <= 1 / dt <= _FASTEST:
+    if dt and not _MIN_RATE <= 1 / dt <= _MAX_RATE:
         text = f"by {spec!r} there are {1 / dt:.3g} rows a second"
-        return [_note("time-doubtful", f"{text}{_likely(name, dt, told, spec)}")]
+        return [_note("time-doubtful", f"{text}{_suggest_unit(name, dt, declared, spec)}")]
     return []
 
 
-def _likely(name: str, dt: float, told: bool, spec: str) -> str:
+def _suggest_unit(name: str, dt: float, declared: bool, spec: str) -> str:
     """The unit by which the rate would be a usual one."""
-    own = spec.rpartition(":")[2] if told else "s"
-    count = dt / _TIMES.get(own, 1.0)
+    current = spec.rpartition(":")[2] if declared else "s"
+    count = dt / _TIMES.get(current, 1.0)
     symbol = usual_unit(count)
-    if symbol == own:
+    if symbol == current:
         return "; is its unit right?"
     return f"; is its unit {symbol}, with {1 / (count * _TIMES[symbol]):.4g} rows a second? Then say {name}:{symbol}"
 
 
-def _going_back(columns: Mapping[str, Array], step: Array, back: int, spec: str) -> list[dict[str, Any]]:
-    even = [role for role, values in columns.items() if role != "time" and _goes_on(values)]
+def _check_backwards(columns: Mapping[str, Array], step: Array, back: int, spec: str) -> list[dict[str, Any]]:
+    even = [role for role, values in columns.items() if role != "time" and _rises_evenly(values)]
     row = int(np.flatnonzero(step < 0)[0]) + 2
     text = f"the time {spec!r} goes back in {back} of {len(step)} rows (the first is row {row})"
     if even:
@@ -225,8 +228,8 @@ def _going_back(columns: Mapping[str, Array], step: Array, back: int, spec: str)
     return []
 
 
-def _goes_on(values: Array) -> bool:
-    """Whether a column rises or falls in even steps, as a time does."""
+def _rises_evenly(values: Array) -> bool:
+    """True if a column rises or falls in even steps, as a time does."""
     step = np.diff(values[np.isfinite(values)])
     if len(step) < 10:
         return False

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Rotation = Literal["quaternion", "quaternion-wxyz", "rotation-vector", "rpy", "matrix", "matrix-by-columns"]
 GB = 2.0
 """Largest unpacked size of a log [GB]; the default of `palpate.files.reading`."""
+SLIDE_END = "slide_end_s"
+"""Metadata of the record of a simulated slide: time from the first row [s] after which the rows are of the retreat."""
 _SHOWN = 40
 
 
@@ -64,7 +66,7 @@ class Signals:
 
     @property
     def plain(self) -> bool:
-        """Whether no signal is named."""
+        """True if no signal is named."""
         named = (self.time, self.rate, self.position, self.force, self.wrench, self.pose)
         return all(name is None for name in named)
 
@@ -72,7 +74,9 @@ class Signals:
     def names(self) -> list[str]:
         """The named columns, without their units."""
         specs = [self.time, self.position, self.force]
-        specs += [spec for each in (self.wrench, self.pose) if each for spec in each.split(",")]
+        specs += [
+            spec for specs_text in (self.wrench, self.pose) if specs_text for spec in specs_text.split(",")
+        ]
         return [split_spec(spec)[0] for spec in specs if spec]
 
     @property
@@ -95,6 +99,8 @@ class Signals:
         """
         bag = kind_of(path).is_bag
         about = stored_about(path) if kind_of(path) is Kind.PARQUET else None
+        if self.end is None and about is not None and SLIDE_END in about.meta:
+            return replace(self, end=_end_of_slide(path, about.meta)).complete(path, known_frame=known_frame)
         own_frame = {"wrench_frame"} & (about.meta.keys() if about else set())
         if not self.plain or is_run(path) or (not bag and _is_record(self._names(path))):
             return self, {name: about.meta[name] for name in own_frame} if about else {}
@@ -113,9 +119,9 @@ class Signals:
         options: dict[str, Any] = dict(proposal.options)
         if "preset" in options:
             options = _with_underscores(preset(options.pop("preset"))) | options
-        own = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
-        others = {name: value for name, value in options.items() if name not in own}
-        return replace(self, **own), others | {"read_as": shlex.join(proposal.words or ())}
+        fields = {name: value for name, value in options.items() if name in Signals.__dataclass_fields__}
+        remaining = {name: value for name, value in options.items() if name not in fields}
+        return replace(self, **fields), remaining | {"read_as": shlex.join(proposal.words or ())}
 
     def read(self, path: Path, *, samples: bool = False) -> Record:
         """The record of a log: of force and position, or of wrench and pose.
@@ -142,34 +148,39 @@ class Signals:
     def _of_bag(self, path: Path, cut: dict[str, Any], samples: bool) -> Record:
         from palpate.logs.arm_logs import read_wrench_and_pose
 
-        one = self._one_axis()
+        axis = self._one_axis()
         if self.time or self.rate:
             raise InputError(f"the messages of {path} have their own times; leave out --time and --rate")
-        if one is None:
-            held = "force_x" if samples else None
-            return read_wrench_and_pose(path, self.wrench, self.pose, self.rotation, held=held, **cut)
-        return read_named(path, held="force" if samples else None, **cut, **one)
+        if axis is None:
+            hold = "force_x" if samples else None
+            return read_wrench_and_pose(path, self.wrench, self.pose, self.rotation, held=hold, **cut)
+        return read_named(path, held="force" if samples else None, **cut, **axis)
 
     def _of_table(self, path: Path, cut: dict[str, Any]) -> Record:
         table = open_table(path, kind_of(path), self.delimiter, cut["limits"])
-        there = list(table.names)
-        time = self.time or ("time" if "time" in there and self.rate is None else None)
+        present = list(table.names)
+        time = self.time or ("time" if "time" in present and self.rate is None else None)
         columns: dict[str, Any] = {} if time is None else {"time": time}
-        saved = self.position is None and self.force is None and {*WRENCH[:3], *POSE[:3]} <= set(there)
+        saved = self.position is None and self.force is None and {*WRENCH[:3], *POSE[:3]} <= set(present)
         if self.wrench or self.pose or saved:
             from palpate.logs.arm_logs import read_wrench_and_pose
 
             self._one_axis()
-            own = [
-                ",".join(name for name in names if name in there) if saved else None
+            saved_columns = [
+                ",".join(name for name in names if name in present) if saved else None
                 for names in (WRENCH, POSE)
             ]
             rotation = "quaternion" if saved and self.pose is None else self.rotation
             return read_wrench_and_pose(
-                path, self.wrench or own[0], self.pose or own[1], rotation, **cut, **columns
+                path,
+                self.wrench or saved_columns[0],
+                self.pose or saved_columns[1],
+                rotation,
+                **cut,
+                **columns,
             )
         names: dict[str, Any] = {
-            role: getattr(self, role) or (role if role in there else None) for role in ("position", "force")
+            role: getattr(self, role) or (role if role in present else None) for role in ("position", "force")
         }
         timed = bool(columns) or self.rate is not None or table.rate is not None
         lacking = [] if timed else ["time"]
@@ -178,7 +189,7 @@ class Signals:
             named = {"force": "--force-column"}  # --force of palpate tune is a desired force
             flags = ", ".join(named.get(role, f"--{role}") for role in lacking)
             flags += " (or --rate)" if "time" in lacking else ""
-            listed = f"{', '.join(there[:_SHOWN])}{', ...' if len(there) > _SHOWN else ''}"
+            listed = f"{', '.join(present[:_SHOWN])}{', ...' if len(present) > _SHOWN else ''}"
             raise InputError(
                 f"name the columns of {path} with {flags}; there are: {listed} (palpate topics {path} proposes a "
                 "command)"
@@ -191,15 +202,15 @@ class Signals:
         Raises:
             InputError: they are mixed with wrench and pose, or one of them is missing.
         """
-        one = {"position": self.position, "force": self.force}
-        named = {role: name for role, name in one.items() if name is not None}
+        axis = {"position": self.position, "force": self.force}
+        named = {role: name for role, name in axis.items() if name is not None}
         if named and (self.wrench or self.pose):
             raise InputError(
                 "give --force and --position of one axis, or --wrench and --pose in three, not of both"
             )
         if len(named) == 1:
-            other = "force" if "position" in named else "position"
-            raise InputError(f"--{next(iter(named))} needs its --{other}, as TOPIC.FIELD")
+            partner = "force" if "position" in named else "position"
+            raise InputError(f"--{next(iter(named))} needs its --{partner}, as TOPIC.FIELD")
         return named or None
 
 
@@ -209,16 +220,16 @@ def read_log(path: str | Path | Any, **options: Any) -> Record:
     if not isinstance(path, str | Path):
         return read_named(path, **(options | _columns_of(path, options)))
     path = Path(path)
-    own: dict[str, Any] = {
+    fields: dict[str, Any] = {
         name: options[name] for name in ("rate", "start", "end", "missing", "delimiter") if name in options
     }
-    named = set(options) - {*own, "held", "limits"}
+    named = set(options) - {*fields, "held", "limits"}
     if named or (kind_of(path) is Kind.PARQUET and stored_about(path) is not None):
         return read_named(path, **options)
     if "limits" in options:
-        own |= {"max_size": options["limits"].size / 1e9, "max_seconds": options["limits"].seconds}
-    signals, others = Signals(**own).complete(path)
-    return read_as(signals.read(path), others.get("read_as", ""))
+        fields |= {"max_size": options["limits"].size / 1e9, "max_seconds": options["limits"].seconds}
+    signals, remaining = Signals(**fields).complete(path)
+    return read_as(signals.read(path), remaining.get("read_as", ""))
 
 
 def _columns_of(table: Any, options: Mapping[str, Any]) -> dict[str, str]:
@@ -243,10 +254,18 @@ def read_as(record: Record, words: str) -> Record:
     return Record(record.columns, record.units, {**record.meta, "facts": facts})
 
 
+def _end_of_slide(path: Path, about: Mapping[str, Any]) -> float:
+    """Time after which the rows are of the retreat [s]."""
+    try:
+        return float(about[SLIDE_END])
+    except (TypeError, ValueError):
+        raise InputError(f"{path}: the end of its slide is no number of seconds; slide again") from None
+
+
 def _is_record(names: list[str]) -> bool:
-    """Whether the columns are named as a record's own."""
-    there = set(names)
-    return {"force", "position"} <= there or {*WRENCH[:3], *POSE[:3]} <= there
+    """True if the columns are named as a record's own."""
+    columns = set(names)
+    return {"force", "position"} <= columns or {*WRENCH[:3], *POSE[:3]} <= columns
 
 
 def _with_underscores(options: dict[str, Any]) -> dict[str, Any]:

@@ -6,11 +6,13 @@ A row is a neuron, its threshold first.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.networks.network import backward, descend, forward, layers_of, network, random_layers
@@ -64,10 +66,8 @@ class Perceptron:
         self.learning_rate = net.learning_rate
         self._sizes, self._amplitude = net.sizes, net.amplitude
         self._weights, self._signals, self._deltas = net.start()
-        self._forward, self._learn = _forward.compiled, _learn.compiled
-        self.forward(np.zeros(self._sizes[0]))
-        self._descend(0.0 * self._amplitude, 0.0)
-        self._heard = False  # both compiled, nothing learned
+        self._bind()
+        self._heard = False
 
     @property
     def layers(self) -> tuple[Array, ...]:
@@ -110,16 +110,25 @@ class Perceptron:
         e = self._check(error, len(self._amplitude), "error")
         if not self._heard:
             raise InputError("learn needs the signals of a forward before it: call forward(inputs) first")
-        self._descend(e, self.learning_rate)
+        rate = cast_number("learning_rate", self.learning_rate)
+        self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, e, rate)
 
-    def _descend(self, error: Array, rate: float) -> None:
-        self._learn(self._sizes, self._weights, self._amplitude, self._signals, self._deltas, error, rate)
+    def _bind(self) -> None:
+        """Compile both, without learning anything."""
+        net, none = (self._sizes, self._weights, self._amplitude), 0.0 * self._amplitude
+        self._forward = machine_code(_forward, *net, self._signals, np.zeros(self._sizes[0]), none.copy())
+        self._learn = machine_code(_learn, *net, self._signals, self._deltas, none, 0.0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_forward", "_learn")}
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        self.__dict__.update(known)
+        self._bind()
 
     @staticmethod
     def _check(values: ArrayLike, n: int, name: str) -> Array:
-        array = np.ascontiguousarray(values, dtype=np.float64)
-        if array.shape != (n,):
-            raise InputError(f"{name} must have shape ({n},), got {array.shape}")
+        array = cast_array(name, values, (n,))
         if not np.isfinite(array).all():
             raise InputError(f"{name} must be finite, got {array}; leave the sample out")
         return array

@@ -49,7 +49,7 @@ class Reading(NamedTuple):
 
 @part
 class HeldTool(NamedTuple):
-    """The tool beyond the force sensor, as the sensor shows it: the sign is that of a press.
+    """The tool beyond the force sensor, as the sensor shows it; pressing is positive.
 
     Args:
         weight: in the base's axes, less what a driver takes off [N].
@@ -76,15 +76,15 @@ class Workcell(NamedTuple):
         normal: into the surface, in the base's axes.
         place: of the undeformed surface along the normal [m].
         surface: what is touched, without friction along it.
-        sensor: at the tip; it feels what the surface does, and what moves and holds the tool beyond it.
-        tool: that one.
+        sensor: at the tip; it reads the contact force, and the force that moves and holds the tool.
+        tool: beyond the sensor.
         step: of the physics [s].
         steps: of the physics in a tick.
         elastic: 1 where springs lead the links to a set-point, 0 where torques act on the links.
         yields: 1 where those springs are servos' own, and encoders show how they give way; 0 behind motors.
         spring: of each joint [N m/rad, N/m], shape (n,).
         damper: beside it, or of the link's own rate for a servo [N m s/rad, N s/m], shape (n,).
-        first: w^2 of the motors, which follow their set-points whatever pushes [1/s^2].
+        first: w^2 of the motors, which follow their set-points whatever the load [1/s^2].
         second: 2 z w [1/s].
     """
 
@@ -106,7 +106,7 @@ class Workcell(NamedTuple):
 
 @part
 class Body(NamedTuple):
-    """Where the arm is, and room for the laws; changed in place. Shapes (n,), (n, n)."""
+    """State of the arm, and room for the laws; changed in place. Shapes (n,), (n, n)."""
 
     q: Array
     qd: Array
@@ -117,13 +117,13 @@ class Body(NamedTuple):
     drive: Array  # torque on the links
     qdd: Array
     normal: Array  # row of J along the normal
-    centre: Array  # likewise, of the tool's centre of mass
-    yielding: Array  # L^-1 times that of the tip
+    centre: Array  # row along the normal of the tool's centre of mass
+    yielding: Array  # L^-1 times the row of the tip
 
 
 @part
 class TouchState(NamedTuple):
-    """State of surface and sensor, and the last force."""
+    """State of surface and sensor, and the contact force."""
 
     surface: SurfaceState
     reading: Reading
@@ -136,8 +136,9 @@ class TouchState(NamedTuple):
 def read_sensor(sensor, reading, force, time, noise):
     """The sensor after a step that ends at `time` [s]; `noise` are eight standard normal numbers of this tick.
 
-    A sample is of its own instant k/sampling, between two steps: so the lag of the readings is known exactly. The force
-    of a step is that of its beginning, held over it: a low-pass is half a step late with it, none a whole one.
+    A sample is taken at its own time k/sampling, between two steps, so that the lag of the readings is known exactly.
+    The force is constant over a step and is that of its beginning: with a low-pass the output is half a step late,
+    without one a whole step.
     """
     z = sensor.E @ reading.z + force * sensor.e
     shown, value, samples = sensor.c @ z + sensor.d * force, reading.value, reading.samples
@@ -152,7 +153,7 @@ def read_sensor(sensor, reading, force, time, noise):
 
 @law
 def apply_drive(cell, body, setpoint):
-    """Fills the torque on the links: it is the set-point itself, or the springs' to motors or set-points."""
+    """Fill the torque on the links: the set-point itself, or that of the springs to motors or set-points."""
     for i in range(len(body.q)):
         if cell.elastic == 0.0:
             body.drive[i] = setpoint[i]
@@ -168,46 +169,49 @@ def apply_drive(cell, body, setpoint):
 
 
 @law
-def lever_of(cell, tip):
-    """Turning times this is what the tool's centre moves along the normal beside the tip [m]."""
+def tool_lever(cell, tip):
+    """Lever by which a turning moves the tool's centre along the normal, relative to the tip [m]."""
     return cross(tip.R @ cell.tool.centre, cell.normal)
 
 
 @law
-def swung(cell, body):
-    """Joints that the tool's centre is followed for: none where the reading follows no acceleration."""
+def joints_of_tool(cell, body):
+    """Number of joints for which the row of the tool's centre is filled: none for a tool without inertia."""
     return len(body.q) * int(cell.tool.inertia != 0.0)
 
 
 @law
-def joint_rows(cell, body, tip):
-    """Fills the rows along the normal from the joints' axes."""
-    lever, push = lever_of(cell, tip), Wrench(cross(tip.p, cell.normal), cell.normal)
+def rows_from_joints(cell, body, tip):
+    """Fill the rows along the normal from the joints' axes."""
+    lever, push = tool_lever(cell, tip), Wrench(cross(tip.p, cell.normal), cell.normal)
     for i in range(len(body.q)):
         body.normal[i] = push.power(axis_of(body.room, i))
-    for i in range(swung(cell, body)):
+    for i in range(joints_of_tool(cell, body)):
         body.centre[i] = body.normal[i] + axis_of(body.room, i).w @ lever
 
 
 @law
-def jacobian_rows(cell, body, tip):
-    """Fills them from the Jacobian in the body's room."""
-    J, lever = body.room.J, lever_of(cell, tip)
+def rows_from_jacobian(cell, body, tip):
+    """Fill the rows along the normal from the Jacobian in the body's room."""
+    J, lever = body.room.J, tool_lever(cell, tip)
     for i in range(len(body.q)):
         body.normal[i] = cell.normal @ Vec3(J[0, i], J[1, i], J[2, i])
-    for i in range(swung(cell, body)):
+    for i in range(joints_of_tool(cell, body)):
         body.centre[i] = body.normal[i] + Vec3(J[3, i], J[4, i], J[5, i]) @ lever
 
 
 @law
 def accelerations(cell, body, tip, touch):
-    """Fills the joints' accelerations under drive and contact: the surface's state and the force on it [N].
+    """Fill the joints' accelerations under drive and contact.
 
     Args:
         cell: all of it.
         body: filled with M, h and the rows along the normal of this moment, its drive with the torques.
         tip: of this moment.
         touch: after the step before.
+
+    Returns:
+        State of the surface, force on it [N], and depth of the tip [m].
     """
     n, room = len(body.q), body.room
     factorise(room.M, body.L)
@@ -232,14 +236,14 @@ def accelerations(cell, body, tip, touch):
 
 
 @law
-def shown_of(tool, normal, tip, along):
-    """Force along the normal that a tool beyond the sensor adds to its reading, w + R b + m a of its centre [N].
+def tool_force(tool, normal, tip, along):
+    """Force along the normal that a tool adds to the sensor's reading, w + R b + m a of its centre [N].
 
     Args:
-        tool: what hangs there.
+        tool: beyond the sensor.
         normal: into the surface.
         tip: of this moment.
-        along: acceleration of the centre along the normal that the joints' accelerations make [m/s^2].
+        along: part of the centre's acceleration along the normal that is due to the joints' accelerations [m/s^2].
     """
     rest = normal @ (tool.weight + tip.R @ tool.bias)
     if tool.inertia == 0.0:
@@ -249,17 +253,17 @@ def shown_of(tool, normal, tip, along):
 
 
 @law
-def held_by(cell, body, tip):
-    """The same, of the cell after a step."""
+def tool_reading(cell, body, tip):
+    """Force along the normal that the cell's tool adds to the reading after a step [N]."""
     along = 0.0
-    for i in range(swung(cell, body)):
+    for i in range(joints_of_tool(cell, body)):
         along += body.centre[i] * body.qdd[i]
-    return shown_of(cell.tool, cell.normal, tip, along)
+    return tool_force(cell.tool, cell.normal, tip, along)
 
 
 @law
-def measured_by(sensor, share, touch, surface, force, held, depth, time, noise):
-    """The touch after a step that is this share of a tick; `held` is what the tool adds to the reading [N]."""
+def measure_touch(sensor, share, touch, surface, force, held, depth, time, noise):
+    """The touch after a step; `share` is 1 over the steps in a tick, `held` the tool's force in the reading [N]."""
     felt = max(force, 0.0)
     reading = read_sensor(sensor, touch.reading, felt + held, time, noise)
     return TouchState(surface, reading, force, touch.mean + share * felt, depth)
@@ -267,36 +271,36 @@ def measured_by(sensor, share, touch, surface, force, held, depth, time, noise):
 
 @law
 def tick(cell, body, touch, setpoint, k, noise):
-    """The k-th tick under a set-point that holds: torques [N m], or the motors' places [rad, m], shape (n,).
+    """The k-th tick under a constant set-point: torques [N m], or positions of the motors [rad, m], shape (n,).
 
     Semi-implicit Euler, first order; the contact force is solved together with the acceleration.
     """
-    # What a function with a branch in it is handed is counted at each step, if it is an array; so it is handed none.
+    # A function with a branch counts references to its array arguments at each step: it gets no arrays.
     sensor, step, share = cell.sensor, cell.step, 1.0 / cell.steps
     touch = TouchState(touch.surface, touch.reading, touch.force, 0.0, touch.depth)
     for j in range(cell.steps):
         apply_drive(cell, body, setpoint)
         tip = chain_motion(cell.chain, body.q, body.qd, body.room)
-        joint_rows(cell, body, tip)
+        rows_from_joints(cell, body, tip)
         surface, force, depth = accelerations(cell, body, tip, touch)
         for i in range(len(body.q)):
             body.qd[i] += step * body.qdd[i]
             body.q[i] += step * body.qd[i]
         time = (k * cell.steps + j + 1) * step
-        held = held_by(cell, body, tip)
-        touch = measured_by(sensor, share, touch, surface, force, held, depth, time, noise)
+        held = tool_reading(cell, body, tip)
+        touch = measure_touch(sensor, share, touch, surface, force, held, depth, time, noise)
     return touch
 
 
 @law
-def foreign(cell, body, touch, tip, setpoint, time, noise):
-    """One step whose M, h and J another engine has filled in; that engine moves the arm."""
+def step_foreign(cell, body, touch, tip, setpoint, time, noise):
+    """Contact, sensor and drive of one step whose M, h and J another engine has filled in; it moves the arm."""
     apply_drive(cell, body, setpoint)
-    jacobian_rows(cell, body, tip)
+    rows_from_jacobian(cell, body, tip)
     surface, force, depth = accelerations(cell, body, tip, touch)
-    held = held_by(cell, body, tip)
-    return measured_by(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
+    held = tool_reading(cell, body, tip)
+    return measure_touch(cell.sensor, 1.0 / cell.steps, touch, surface, force, held, depth, time, noise)
 
 
 compiled_tick = kernel(tick)
-compiled_foreign = kernel(foreign)
+compiled_foreign = kernel(step_foreign)

@@ -1,23 +1,21 @@
-"""Who moves the arm: palpate's own laws, compiled, or MuJoCo."""
+"""Engines that move a simulated arm, palpate's own laws or MuJoCo; its inner loop and gains."""
 
 from copy import copy
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import msgspec
 import numpy as np
 
-from palpate._jit import BoundKernel, kernel, law, part
-from palpate._vector import Mat3, Vec3, Vec6
+from palpate._jit import BoundKernel
+from palpate._vector import Mat3
 from palpate.arrays import Array
-from palpate.controllers.controller import controller
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, TorqueLoop, load_arm, names
 from palpate.force.gains import Gains, gains_for
 from palpate.press.cell import Body, TouchState, Workcell, compiled_foreign, compiled_tick
 from palpate.robots.serial.chain import Tip
-from palpate.robots.serial.serial_arm import ArmState, SerialArm, tip_of
-from palpate.robots.serial.task import into, joint_torque, task_model
-from palpate.signals.types import Sense, triple
+from palpate.robots.serial.serial_arm import SerialArm
+from palpate.signals.types import triple
 
 ENGINES = ("own", "mujoco")
 _HELD = 1e9
@@ -35,7 +33,7 @@ class Engine(Protocol):
 
 
 class Own:
-    """Physics by palpate's own laws."""
+    """Palpate's own laws move the arm."""
 
     def __init__(self) -> None:
         self._tick = BoundKernel(compiled_tick)
@@ -51,12 +49,12 @@ class Own:
 class ByMuJoCo:
     """MuJoCo moves the arm in its own model; contact, sensor and motors are palpate's laws.
 
-    Motors and contacts of the model itself are switched off, and joints beside the way to the tip are held: the torques
-    are the controller's, and the surface is the one that was asked for.
+    Motors and contacts of the model are switched off, and joints outside the chain to the tip are held: the torques are
+    those of the controller, the surface is that of the cell.
 
     Args:
         arm: what moves.
-        cell: as for `Own`; the rotors of its chain are those that MuJoCo takes.
+        cell: its chain's rotors replace those of the model.
         q: joint positions at the start.
     """
 
@@ -118,7 +116,7 @@ class ByMuJoCo:
         return np.asarray(body.normal * max(touch.force, 0.0))
 
     def _fill(self, body: Body) -> Tip:
-        """Puts M, h, J of this moment into the body's room; the tip."""
+        """Fill M, h and J in the body's room; return the tip."""
         engine, model, data, dofs = self._engine, self._model, self._data, self._dofs
         body.q[:], body.qd[:] = data.qpos[self._positions], data.qvel[dofs]
         engine.mj_fullM(model, data, self._M)
@@ -138,18 +136,18 @@ class ByMuJoCo:
 
 MODES = ("torque", "position")
 _TYPICAL = {"torque": "fr3", "position": "ur5e"}
-"""Whose inner loop and sensor stand for those of an arm of which nobody has said any."""
+"""Arm whose inner loop and sensor are taken for an arm whose own are unknown."""
 _DAMPED = 0.7
 """Damping ratio of the tip on its spring in free motion."""
 
 
 def usual_mode(name: str) -> str:
-    """How an arm is driven: torques, unless its own file says positions."""
+    """Mode in which an arm is driven: torque, unless its file states another."""
     return load_arm(name).kind if name in names() else "torque"
 
 
 def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
-    """The arm for `palpate.force`.
+    """Arm with inner loop and sensor, for `palpate.force`.
 
     Args:
         name: of the arm; another than those that come with palpate gets the typical loop.
@@ -171,7 +169,7 @@ def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
 
 
 def press_gains(arm: Arm, force: float) -> Gains:
-    """Gains for a force on any surface up to the arm's limit, without a relief of the lag; no proof is made here.
+    """Gains for a force on any surface up to the arm's stiffness limit, with no relief of the lag and no proof.
 
     Raises:
         InputError: a force that the sensor's noise hides, or that it cannot read.
@@ -180,10 +178,10 @@ def press_gains(arm: Arm, force: float) -> Gains:
 
 
 def check_mode(gains: Gains, mode: str | None) -> str:
-    """The mode that gains are for.
+    """Mode of the arm for which gains were tuned.
 
     Raises:
-        InputError: another was asked for.
+        InputError: `mode` is another one.
     """
     if mode is not None and gains.arm.kind != mode:
         raise InputError(
@@ -194,7 +192,7 @@ def check_mode(gains: Gains, mode: str | None) -> str:
 
 
 def mass_note(gains: Gains, mass: float | None = None) -> str | None:
-    """Remedy where gains assume a position arm's tip without mass; None where nothing is missing.
+    """Note with its remedy if gains assume that a position arm's tip has no mass; None otherwise.
 
     Args:
         gains: of the loop.
@@ -214,86 +212,3 @@ def mass_note(gains: Gains, mass: float | None = None) -> str | None:
 def series_of(arm: Arm) -> float | None:
     """Stiffness between the encoders and the surface [N/m]; None where the encoders sit on the links."""
     return arm.inner.stiffness if isinstance(arm.inner, PositionLoop) else None
-
-
-@controller
-class Spring(NamedTuple):
-    """F = K (x_d - x) - D xdot + h: a position with a spring in series, which the cautious law moves.
-
-    Args:
-        stiffness: K [N/m, N m/rad].
-        damping: D [N s/m, N m s/rad].
-    """
-
-    stiffness: Vec6
-    damping: Vec6
-
-    def start(self):
-        return 0.0
-
-    def step(self, state, sense, task, model):
-        return self.stiffness * (task.x - sense.x) - self.damping * sense.xd + model.h, state
-
-
-@law
-def half_turn(R):
-    """Sine of the rotation's angle times its axis: the rotation vector for the small turns of a held tip [rad]."""
-    return 0.5 * Vec3(R.r3.y - R.r2.z, R.r1.z - R.r3.x, R.r2.x - R.r1.y)
-
-
-@part
-class TaskFrame(NamedTuple):
-    """Axes in which a tip works.
-
-    Args:
-        axes: of the task, in rows; the first is the surface's normal.
-        held: axes of the tip when it stands as it should, in columns.
-        damping: of joints to spare [1/s].
-    """
-
-    axes: Mat3
-    held: Mat3
-    damping: float
-
-
-@part
-class ArmReadings(NamedTuple):
-    """Encoders and force sensor of an arm at one tick.
-
-    Args:
-        q: joint positions [rad, m], shape (n,).
-        qd: their rates, shape (n,).
-        force: along the normal [N].
-        found: what `describe_arm` says of q and qd.
-    """
-
-    q: Array
-    qd: Array
-    force: float
-    found: ArmState
-
-
-@law
-def tip_torque(frame, control, state, task, readings, own, torque):
-    """Fills the joints' torques from encoders and force reading: the controller's state.
-
-    Args:
-        frame: a `TaskFrame`.
-        control: in six directions.
-        state: its own.
-        task: what is asked for, in the task's axes.
-        readings: `ArmReadings`.
-        own: room for the laws.
-        torque: where it goes, shape (n,).
-    """
-    axes, room, tip = frame.axes, readings.found.room, tip_of(readings.found, readings.qd)
-    model = task_model(axes, room, tip, own)
-    x = into(axes, tip.p, half_turn(tip.R @ frame.held.T))
-    wrench = Vec6(Vec3(readings.force, 0.0, 0.0), Vec3(0.0, 0.0, 0.0))
-    sense = Sense(readings.q, readings.qd, x, into(axes, tip.v, tip.w), wrench)  # type: ignore[arg-type]
-    F, state = control.step(state, sense, task, model)
-    joint_torque(axes, room, model, own, F, frame.damping, readings.qd, torque)
-    return state
-
-
-compiled_tip_torque = kernel(tip_torque)

@@ -1,4 +1,4 @@
-"""From what was typed to an arm, a surface and gains."""
+"""A press prepared from its specification: arm, surface and gains, all checked."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,19 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.contact_frame.load import Payload
+from palpate.contact_frame.payload import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
-from palpate.press import sequence
-from palpate.press.by_torque import CONTROLLERS, ByTorque
+from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
-from palpate.press.pressing import Asked, Progress, press
-from palpate.press.sequence import SURE, Plan
+from palpate.press.pressing import Progress, press
+from palpate.press.sequence import CautiousDriver, Plan, PressDriver, plan_for
 from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.summary import PressRequest
+from palpate.press.tip_controller import CONTROLLERS, TorqueDriver
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
@@ -29,8 +30,8 @@ _UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
 
 
 @dataclass(frozen=True)
-class Question:
-    """The request as typed, but in SI.
+class PressSpec:
+    """Arm, surface and force of a press, as given by the user, in SI.
 
     Args:
         arm: a name, or the path of a file that ends in .toml, .xml, .mjcf or .urdf.
@@ -43,10 +44,11 @@ class Question:
         gains: file of `palpate tune`; made for the arm when left out.
         at: point of the surface [m]; before the tip at home when left out.
         normal: into the surface; the tip's own z at home when left out.
-        seconds: from the touch on [s].
+        seconds: of the hold, from where the force is reached on [s].
         probe: share of the force.
         seed: of the noise.
         payload: of `palpate payload`: the arm carries this tool, and its sensor shows what that one did.
+        end: hold, to rest in contact after a press that is done; else retreat.
     """
 
     arm: str
@@ -63,105 +65,111 @@ class Question:
     probe: float = 0.2
     seed: int = 0
     payload: Payload | None = None
+    end: str = "retreat"
 
 
 @dataclass(frozen=True)
-class Pressing:
+class PreparedPress:
     """A press that is ready to run.
 
     Args:
-        asked: with what, for the record.
-        plan: what is asked for.
+        request: arm, surface and loop.
+        plan: of the force.
     """
 
-    asked: Asked
+    request: PressRequest
     plan: Plan
 
     def run(self, progress: Progress | None = None) -> Record:
-        """Runs it; the record says itself what it is of."""
-        asked = self.asked
-        loop = asked.gains.arm
-        cell = cell_of(asked.arm, asked.place, asked.surface, loop, held_tool(asked.payload))
+        """Run the press; the record has its own metadata."""
+        request = self.request
+        loop = request.gains.arm
+        cell = cell_of(request.arm, request.place, request.surface, loop, held_tool(request.payload))
         arm, resting = (
-            SimulatedArm(asked.arm, loop, asked.place, cell, asked.physics, asked.seed) for _ in range(2)
+            SimulatedArm(request.arm, loop, request.place, cell, request.physics, request.seed)
+            for _ in range(2)
         )
-        if asked.payload is not None:
+        if request.payload is not None:
             arm.tare()
-            most = self.plan.force + SURE * loop.sensor.noise
-            sequence.check_range(abs(arm.zero), most, loop.sensor.full_scale)
-        gains = fit_gains(asked.gains, resting.at_rest(), self.plan)
-        driver = _driver(asked, arm, gains, self.plan.force)
-        record = press(arm, driver, asked.place, self.plan, progress)
-        meta = {**record.meta, **asked.meta(record), "tare_N": arm.zero}
+            max_force = self.plan.force + SURE * loop.sensor.noise
+            check_range(abs(arm.zero), max_force, loop.sensor.full_scale)
+        gains = fit_gains(request.gains, resting.at_rest(), self.plan)
+        driver = _driver(request, arm, gains, self.plan.force)
+        record = press(arm, driver, request.place, self.plan, gains, progress, request.end)
+        meta = {**record.meta, **request.meta(record), "tare_N": arm.zero}
         return Record(record.columns, record.units, meta)
 
 
-def _driver(asked: Asked, arm: SimulatedArm, gains: Gains, force: float) -> sequence.PressDriver:
+def _driver(request: PressRequest, arm: SimulatedArm, gains: Gains, force: float) -> PressDriver:
     """The driver of the controller asked for.
 
     Raises:
         InputError: no such controller; one of torques on an arm of positions.
     """
-    name, place = asked.controller, asked.place
+    name, place = request.controller, request.place
     if name == CAUTIOUS:
-        return sequence.CautiousDriver(arm, ForceLoop(gains), place.normal)
+        return CautiousDriver(arm, ForceLoop(gains), place.normal)
     if gains.arm.kind != "torque":
         raise InputError(f"--controller {name} gives torques, and the arm takes positions; add --mode torque")
-    return ByTorque(arm, place, name, gains.approach, 8.0 * gains.arm.sensor.noise, force)
+    return TorqueDriver(arm, place, name, gains.approach, 8.0 * gains.arm.sensor.noise, force)
 
 
-def fit_gains(gains: Gains, shown: Array, plan: Plan) -> Gains:
+def fit_gains(gains: Gains, readings: Array, plan: Plan) -> Gains:
     """The gains for the noise of an arm at rest.
 
     Args:
         gains: as they were tuned.
-        shown: by the sensor in each tick at rest [N], shape (n,).
+        readings: by the sensor in each tick at rest [N], shape (n,).
         plan: of the press.
 
     Raises:
         InputError: a drift, or a noise, with which there is no press.
     """
-    noise, drift, std = sequence.noise_and_drift(
-        gains.arm.tick * np.arange(len(shown), dtype=np.float64), shown
-    )
-    sequence.check_drift(drift, std, plan.force, plan.longest + plan.seconds, gains.arm.sensor)
-    return sequence.fitting(gains, noise, len(shown)) or gains
+    noise, drift, std = noise_and_drift(gains.arm.tick * np.arange(len(readings), dtype=np.float64), readings)
+    check_drift(drift, std, plan.force, plan.longest + plan.seconds, gains.arm.sensor)
+    return fitting(gains, noise, len(readings)) or gains
 
 
-def prepare_press(question: Question) -> Pressing:
-    """Everything checked, nothing run.
+def prepare_press(spec: PressSpec) -> PreparedPress:
+    """Check a specification, and prepare its press without running it.
 
     Raises:
-        InputError: whatever of it cannot be, in one line.
+        InputError: an arm, surface, pose or number with which there is no press, in one line.
     """
-    _check_words(question)
-    Plan(question.force, question.seconds, question.probe)
-    arm = _load(question, arm_of(question.arm, question.site))
-    place = place_of(arm, _array(question.at), _array(question.normal))
-    gains = _gains(question, arm, place)
-    _check_surface(question, gains)
-    notes = check_able(arm, place, gains.approach, question.force)
+    _check_words(spec)
+    Plan(spec.force, spec.seconds, spec.probe)
+    arm = _load(spec, arm_of(spec.arm, spec.site))
+    place = place_of(arm, _array(spec.at), _array(spec.normal))
+    gains = _gains(spec, arm, place)
+    _check_surface(spec, gains)
+    notes = check_able(arm, place, gains.approach, spec.force)
     massless = mass_note(gains, place.mass)
-    notes = [*arm.notes, *notes, *([massless] if massless else []), *_engine_notes(question, arm)]
-    asked = Asked(
-        arm=arm, gains=gains, place=place, surface=question.surface, controller=question.controller,
-        physics=question.physics, seed=question.seed, payload=question.payload, notes=tuple(notes),
-    )  # fmt: skip
-    return Pressing(
-        asked, sequence.plan_for(question.force, question.seconds, question.probe, GAP, gains.approach)
+    notes = [*arm.notes, *notes, *([massless] if massless else []), *_engine_notes(spec, arm)]
+    request = PressRequest(
+        arm=arm,
+        gains=gains,
+        place=place,
+        surface=spec.surface,
+        controller=spec.controller,
+        physics=spec.physics,
+        seed=spec.seed,
+        payload=spec.payload,
+        notes=tuple(notes),
+        end=spec.end,
     )
+    return PreparedPress(request, plan_for(spec.force, spec.seconds, spec.probe, GAP, gains.approach))
 
 
-def _load(question: Question, arm: SerialArm) -> SerialArm:
+def _load(spec: PressSpec, arm: SerialArm) -> SerialArm:
     """The arm with its tool, if there is one."""
-    if question.payload is None:
+    if spec.payload is None:
         return arm
-    if question.physics == "mujoco" and arm.scene is not None:
+    if spec.physics == "mujoco" and arm.scene is not None:
         raise InputError(
-            f"{question.arm} is MuJoCo's own model, in which --payload hangs nothing; give the tool a body there, or"
+            f"{spec.arm} is MuJoCo's own model, in which --payload hangs nothing; give the tool a body there, or"
             " leave --physics out"
         )
-    return with_tool(arm, question.payload)
+    return with_tool(arm, spec.payload)
 
 
 def arm_of(name: str, site: str | None) -> SerialArm:
@@ -192,20 +200,20 @@ def surface_of(text: str) -> KelvinVoigt:
     Raises:
         InputError: another text, a number out of range.
     """
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for part in text.split(","):
         name, sign, number = (word.strip() for word in part.partition("="))
         if name not in _UNITS or not sign:
             raise InputError(
                 f"--surface needs K=..,B=.. in N/m and N s/m (and M=.. in kg), as K=5000,B=50; got {text!r}"
             )
-        if name in found:
+        if name in numbers:
             raise InputError(f"--surface has {name} twice: {text!r}")
-        found[name] = _number(name, number)
-    if "K" not in found:
+        numbers[name] = _number(name, number)
+    if "K" not in numbers:
         raise InputError(f"--surface needs a stiffness, as K=5000; got {text!r}")
     try:
-        return KelvinVoigt(found["K"], found.get("B", 0.0), found.get("M", 0.0))
+        return KelvinVoigt(numbers["K"], numbers.get("B", 0.0), numbers.get("M", 0.0))
     except InputError as error:
         raise InputError(f"--surface: {error}") from None
 
@@ -220,48 +228,48 @@ def _number(name: str, text: str) -> float:
     return value
 
 
-def _check_words(question: Question) -> None:
-    if question.physics not in ENGINES:
-        raise unknown("physics", question.physics, ENGINES)
-    if question.mode is not None and question.mode not in MODES:
-        raise unknown("mode", question.mode, MODES)
-    if question.controller not in {CAUTIOUS, *CONTROLLERS}:
-        raise unknown("controller", question.controller, (CAUTIOUS, *CONTROLLERS))
-    if question.physics == "mujoco":
+def _check_words(spec: PressSpec) -> None:
+    if spec.physics not in ENGINES:
+        raise unknown("physics", spec.physics, ENGINES)
+    if spec.mode is not None and spec.mode not in MODES:
+        raise unknown("mode", spec.mode, MODES)
+    if spec.controller not in {CAUTIOUS, *CONTROLLERS}:
+        raise unknown("controller", spec.controller, (CAUTIOUS, *CONTROLLERS))
+    if spec.physics == "mujoco":
         mujoco()
 
 
-def _gains(question: Question, arm: SerialArm, place: Place) -> Gains:
-    if question.gains is not None:
-        gains = load_gains(question.gains)
-        check_mode(gains, question.mode)
-        _check_sensor(question, gains.arm.sensor, gains.force_limit)
+def _gains(spec: PressSpec, arm: SerialArm, place: Place) -> Gains:
+    if spec.gains is not None:
+        gains = load_gains(spec.gains)
+        check_mode(gains, spec.mode)
+        _check_sensor(spec, gains.arm.sensor, gains.force_limit)
         return gains
-    mode = question.mode or usual_mode(question.arm)
-    if question.controller != CAUTIOUS and question.mode is None:
+    mode = spec.mode or usual_mode(spec.arm)
+    if spec.controller != CAUTIOUS and spec.mode is None:
         mode = "torque"
-    loop = loop_of(question.arm, arm.title, mode, place.mass)
-    _check_sensor(question, loop.sensor, loop.sensor.full_scale)
-    return press_gains(loop, question.force * (1.0 - question.probe))
+    loop = loop_of(spec.arm, arm.title, mode, place.mass)
+    _check_sensor(spec, loop.sensor, loop.sensor.full_scale)
+    return press_gains(loop, spec.force * (1.0 - spec.probe))
 
 
-def _check_sensor(question: Question, sensor: Sensor, most: float) -> None:
+def _check_sensor(spec: PressSpec, sensor: Sensor, max_force: float) -> None:
     """Refuse a force that noise hides, or that is not below the largest that may be [N]."""
-    least = SURE * sensor.noise
-    lowest = question.force * (1.0 - question.probe)
-    if not least <= lowest:
+    min_force = SURE * sensor.noise
+    lowest = spec.force * (1.0 - spec.probe)
+    if not min_force <= lowest:
         raise InputError(
-            f"--force {question.force:g}, lowered by the probe to {lowest:g} N, is below {least:g} N, 8 "
+            f"--force {spec.force:g}, lowered by the probe to {lowest:g} N, is below {min_force:g} N, 8 "
             "standard deviations of the sensor's noise; ask for more, or for a smaller --probe"
         )
-    if question.force >= most:
+    if spec.force >= max_force:
         raise InputError(
-            f"--force {question.force:g} N is not below the force limit of {most:g} N; ask for less"
+            f"--force {spec.force:g} N is not below the force limit of {max_force:g} N; ask for less"
         )
 
 
-def _check_surface(question: Question, gains: Gains) -> None:
-    total = question.surface.stiffness + question.surface.damping / gains.theta
+def _check_surface(spec: PressSpec, gains: Gains) -> None:
+    total = spec.surface.stiffness + spec.surface.damping / gains.theta
     if total > gains.cap:
         raise InputError(
             f"the surface has K + B/theta = {total:.4g} N/m, and the gains are for at most {gains.cap:.4g} N/m; "
@@ -269,8 +277,8 @@ def _check_surface(question: Question, gains: Gains) -> None:
         )
 
 
-def _engine_notes(question: Question, arm: SerialArm) -> list[str]:
-    if question.physics == "mujoco" and arm.scene is not None:
+def _engine_notes(spec: PressSpec, arm: SerialArm) -> list[str]:
+    if spec.physics == "mujoco" and arm.scene is not None:
         return [
             "motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"
         ]

@@ -1,31 +1,31 @@
-"""A simulated press: its record, and its summary with the keys of `palpate run`."""
+"""A simulated press, from its approach to its retreat, and its record."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.bench import summary
-from palpate.contact_frame.arm import identify_contact
-from palpate.contact_frame.load import Payload
-from palpate.environments.kelvin_voigt import KelvinVoigt
-from palpate.errors import InputError
-from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
-from palpate.identification.sample_clock import sample_clock_of
-from palpate.press.engines import series_of
-from palpate.press.sequence import Action, Plan, PressDriver, PressSequence, Tick, TipSample
-from palpate.press.setting import Place, held_tool
+from palpate.press.sequence import (
+    Action,
+    ForceToReach,
+    Plan,
+    PressDriver,
+    PressSequence,
+    Tick,
+    TipSample,
+    lag_ticks,
+)
+from palpate.press.setting import Place
 from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.unload import HELD, SimulatedRetreat, Unloading, simulated_retreat, unload
 from palpate.records import Record
-from palpate.robots.serial.serial_arm import SerialArm
 
 Progress = Callable[[float, str], None]
 
-PHASES = {summary.APPROACH: "approach", summary.CONTACT: "contact", summary.LOST: "lost contact"}
-JOINT_LIMIT, TROUBLE = "joint limit", "trouble"
+JOINT_LIMIT, TROUBLE, NOT_REACHED = "joint limit", "trouble", "force not reached"
 _SHOWN = 200
 """Ticks between two looks at the progress."""
 
@@ -63,30 +63,40 @@ class _Rows:
 
 
 def press(
-    arm: SimulatedArm, driver: PressDriver, place: Place, plan: Plan, progress: Progress | None = None
+    arm: SimulatedArm,
+    driver: PressDriver,
+    place: Place,
+    plan: Plan,
+    gains: Gains,
+    progress: Progress | None = None,
+    end: str = "retreat",
 ) -> Record:
-    """Approaches, touches, presses.
+    """Approach, touch, press, and retreat from the surface, whatever ended the press.
 
     Args:
-        arm: simulated.
+        arm: at its start.
         driver: of the arm.
-        place: where.
+        place: pose at the start, and the surface before it.
         plan: of the force.
+        gains: of the arm: lag, noise, and speed of the approach, ten times which is that of the retreat.
         progress: called now and then with the time [s] and the phase; may raise KeyboardInterrupt to end the press.
+        end: hold, to rest in contact after a press that is done; else retreat.
 
     Returns:
-        One row a tick; ``meta["end"]`` says why it ended, ``meta["why"]`` in a sentence.
+        One row a tick; ``meta["end"]`` says why it ended, ``meta["why"]`` in a sentence, ``meta["unloaded"]`` how.
 
     Raises:
         KeyboardInterrupt: of `progress`, before there is a row.
     """
-    rows, sequence = _Rows(arm.arm.joints), PressSequence(arm, driver, plan.force_at, arm.loop.tick)
+    rows = _Rows(arm.arm.joints)
+    goal = ForceToReach(plan.force, place.normal, lag_ticks(gains))
+    sequence = PressSequence(arm, driver, plan.force_at, arm.loop.tick, goal)
     ending, k = None, 0
     while ending is None:
         try:
             tick = sequence.tick()
             if progress is not None and k % _SHOWN == 0:
-                progress(k * arm.loop.tick, tick.action.trouble or PHASES[tick.action.phase])
+                progress(k * arm.loop.tick, tick.action.trouble or summary.PHASES[tick.action.phase])
         except KeyboardInterrupt:
             if not rows.rows:
                 raise
@@ -97,20 +107,49 @@ def press(
         if np.isfinite(row).all():
             rows.rows.append(row)
         k += 1
-    return _record(arm, rows, ending)
+    unloading = HELD
+    if ending.end == summary.DIVERGED:
+        unloading = Unloading("could not unload: the simulated arm has diverged", completed=False)
+    elif ending.end != summary.DONE or end != "hold":
+        unloading = _unload(arm, place, gains, plan.force, rows)
+    return _record(arm, rows, ending, unloading)
+
+
+def _unload(arm: SimulatedArm, place: Place, gains: Gains, force: float, rows: _Rows) -> Unloading:
+    """Retreat along the normal, as a press over a wire does; each tick is a row."""
+
+    def keep_row(sample: TipSample, velocity: Array) -> bool:
+        action = Action(summary.RETREAT, float(place.normal @ velocity), velocity, 0.0)
+        row = _row(arm, place, Tick(sample, 0.0, action), None, sample.time)
+        if not np.isfinite(row).all():
+            return False
+        rows.rows.append(row)
+        return True
+
+    arm.hold_place()
+    start = place.pose[:3, 3]
+    plan = simulated_retreat(gains, place.normal, float(place.normal @ (arm.pose[:3, 3] - start)), force)
+    return unload(SimulatedRetreat(arm, plan, start, keep_row, arm.zero), plan)
 
 
 def _row(arm: SimulatedArm, place: Place, tick: Tick, touch: TipSample | None, time: float) -> Array:
     (_, force, position, *_), action, truth = tick.sample, tick.action, arm.truth
-    seen, pressing = place.axes @ position, action.phase == summary.CONTACT
-    true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else seen
+    tip, pressing = place.axes @ position, action.phase == summary.CONTACT
+    true = place.axes @ arm.arm.forward_kinematics(truth.q)[:3, 3] if np.isfinite(truth.q).all() else tip
     reading = float(place.normal @ force)
-    moved = seen[0] - float(place.normal @ touch.position) if touch is not None and pressing else 0.0
+    displacement = tip[0] - float(place.normal @ touch.position) if touch is not None and pressing else 0.0
     numbers = [
-        [time, action.phase], truth.q, truth.qd, true, seen, [action.speed],
-        [truth.force, reading, reading, tick.desired * pressing], truth.torque, truth.saturated,
-        [truth.depth, float(truth.touching), moved, action.bound],
-    ]  # fmt: skip
+        [time, action.phase],
+        truth.q,
+        truth.qd,
+        true,
+        tip,
+        [action.speed],
+        [truth.force, reading, reading, tick.desired * pressing],
+        truth.torque,
+        truth.saturated,
+        [truth.depth, float(truth.touching), displacement, action.bound],
+    ]
     return np.concatenate([np.asarray(part, dtype=float) for part in numbers])
 
 
@@ -130,193 +169,27 @@ def _judge(
         )
     if action.ended is not None:
         return summary.Ending(TROUBLE, f"{action.ended}; at {k * tick:.3f} s")
-    if sequence.touch is None:
-        late = (k + 1) * tick >= plan.longest
-        return (
-            summary.Ending(summary.NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s")
-            if late
-            else None
-        )
-    if sequence.next_since < plan.seconds:
+    if sequence.reached:
+        done = sequence.next_since >= plan.seconds
+        return summary.Ending(summary.DONE, "as asked for") if done else None
+    if sequence.in_contact:
+        late = sequence.in_contact * tick >= max(plan.longest, plan.seconds)
+        shortfall = sequence.shortfall(arm.loop.sensor.noise)
+        return summary.Ending(NOT_REACHED, f"{shortfall}, within {k * tick:.3g} s") if late else None
+    if (k + 1 - sequence.last_contact) * tick < plan.longest:
         return None
-    if action.phase != summary.CONTACT:
-        return summary.Ending(summary.LOST_CONTACT, "the surface was lost, and not in contact at the end")
-    return summary.Ending(summary.DONE, "as asked for")
+    if sequence.touched:
+        return summary.Ending(
+            summary.LOST_CONTACT, f"the surface was lost, and not met again within {plan.longest:.3g} s"
+        )
+    return summary.Ending(summary.NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s")
 
 
-def _record(arm: SimulatedArm, rows: _Rows, ending: summary.Ending) -> Record:
+def _record(arm: SimulatedArm, rows: _Rows, ending: summary.Ending, unloading: Unloading) -> Record:
     units = rows.columns()
     for i, slides in enumerate(arm.arm.chain.slide, start=1):
         if slides:
             units |= {f"q{i}": "m", f"qd{i}": "m/s", f"torque{i}": "N"}
     table = np.array(rows.rows).reshape(-1, len(units))
     columns = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(units)}
-    return Record(columns, units, {"end": ending.end, "why": ending.why})
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Arm, surface and loop of a press, for the record.
-
-    Args:
-        arm: what moved.
-        gains: of the cautious law, and the arm as it sees it.
-        place: where.
-        surface: what was touched.
-        controller: by name.
-        physics: by name.
-        seed: of the noise.
-        notes: what a reader should know.
-        payload: the tool that was carried; None without one.
-    """
-
-    arm: SerialArm
-    gains: Gains
-    place: Place
-    surface: KelvinVoigt
-    controller: str
-    physics: str
-    seed: int
-    notes: tuple[str, ...]
-    payload: Payload | None = None
-
-    def meta(self, record: Record) -> dict[str, Any]:
-        """Metadata of the record, plain values."""
-        loop = self.gains.arm
-        known: dict[str, tuple[float, str]] = self.surface.truth()  # type: ignore[no-untyped-call]
-        truth = {name: {"value": value, "unit": unit} for name, (value, unit) in known.items()}
-        return {
-            "seed": self.seed,
-            "truth": truth,
-            "arm": self.arm.title,
-            "mode": loop.kind,
-            "controller": self.controller,
-            "physics": self.physics,
-            "rate_hz": loop.rate,
-            "instruments": {
-                "force": {"filter": loop.sensor.low_pass, "delay_s": self.delay(record)},
-                "position": {"lag_s": 0.0},
-            },
-            "notes": list(self.notes),
-            "place_m": self.place.point.tolist(),
-            **self.between,
-        }
-
-    @property
-    def between(self) -> dict[str, Any]:
-        """Compliance and mass between encoders and surface, as `palpate identify` reads them: value and std."""
-        tool = {} if self.payload is None else self.payload.meta
-        inner = self.gains.arm.inner
-        if not isinstance(inner, PositionLoop):
-            return tool
-        known = {"robot_stiffness_N_per_m": (inner.stiffness, 0.0), **tool}
-        if inner.mass is not None:  # of which the part beyond the sensor counts as the tool's
-            known["robot_mass_kg"] = (max(inner.mass - held_tool(self.payload).inertia, 0.0), 0.0)
-        return known
-
-    def delay(self, record: Record) -> float:
-        """From the sampling of a force to its reading [s]: identification finds the clock of a slower sensor itself.
-
-        Of one about as fast as the ticks it takes each row for fresh: a reading is then as old as its tick is after
-        the sensor's sample, in the mean.
-        """
-        return float(self._ages(record).mean())
-
-    def delay_std(self, record: Record) -> float:
-        """Standard deviation of that [s]: ages run from 0 to a tick again and again, and each run is one chance.
-
-        An arm of positions has a lag besides that nobody tells: its drive trains damp.
-        """
-        if self.gains.arm.kind == "position":
-            return self.gains.arm.tick / float(np.sqrt(12.0))
-        ages = self._ages(record)
-        runs = max(int((np.diff(ages) < 0.0).sum()), 1)
-        return float(ages.std() / np.sqrt(runs))
-
-    def _ages(self, record: Record) -> Array:
-        """Of each row's reading [s], where identification takes each for fresh; else 0."""
-        if sample_clock_of(record["force_sampled"]).period != 1.0:
-            return np.zeros(1)
-        t, sampling = record["t"], self.gains.arm.sensor.sampling
-        return np.asarray(t - np.floor(t * sampling + 1e-9) / sampling)
-
-
-def summarise(record: Record, asked: Asked) -> dict[str, Any]:
-    """Plain JSON values: how it went, the force, the motors' limits, what was identified, the truth."""
-    pressing, t = record["phase"] == summary.CONTACT, record["t"]
-    n = asked.arm.joints
-    result: dict[str, Any] = {
-        "arm": asked.arm.title,
-        "mode": asked.gains.arm.kind,
-        "controller": asked.controller,
-        "physics": asked.physics,
-        "end": record.meta["end"],
-        "why": record.meta["why"],
-        "seed": asked.seed,
-        "duration_s": float(t[-1]) if len(t) else 0.0,
-        "contact_at_s": float(t[np.argmax(pressing)]) if pressing.any() else None,
-        "contacts_lost": summary.losses(record),
-        "force": None,
-        "tip": None,
-        "saturated": {f"joint{i}": _mean(record[f"saturated{i}"]) for i in range(1, n + 1)},
-        "identified": None,
-        "truth": record.meta["truth"],
-        "loop": _loop(asked),
-        "pose": {"smallest_singular_value": asked.place.weakest, "tip_mass_kg": asked.place.mass},
-        "tare_N": record.meta["tare_N"],
-        "sensor_saturated": _mean(
-            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= _full_scale(asked)
-        ),
-        "notes": list(asked.notes),
-    }
-    if pressing.any():
-        last = pressing & (t > t[pressing][-1] - summary.WINDOW)
-        result["force"] = summary.force_figures(record, pressing, last)
-        start = [record[name][0] for name in ("y", "z")]
-        moved = [
-            float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
-        ]
-        result["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
-        result["identified"] = identification_of(record, asked)
-    return result
-
-
-def identification_of(record: Record, asked: Asked) -> dict[str, Any]:
-    """Identification of the record's measured columns, with the known instruments."""
-    loop = asked.gains.arm
-    log = Record(
-        {"time": record["t"], "position": record["x_measured"], "force": record["force_sampled"]},
-        {"time": "s", "position": "m", "force": "N"},
-        {"tool_mass_kg": (0.0, 0.0), **asked.between},
-    )
-    low_pass = loop.low_pass
-    try:
-        found, _ = identify_contact(
-            log,
-            lag=low_pass.lag + asked.delay(record),
-            lag_std=asked.delay_std(record),
-            force_filter=low_pass,
-        )
-    except InputError as error:
-        return {"why_not": str(error), "parameters": {}, "warnings": []}
-    told = found.to_json()
-    return {key: told[key] for key in ("model", "parameters", "warnings")}
-
-
-def _loop(asked: Asked) -> dict[str, Any]:
-    gains = asked.gains
-    return {
-        "rate_hz": gains.arm.rate,
-        "theta_s": gains.theta,
-        "stiffness_cap": gains.cap,
-        "approach_speed_m_s": gains.approach,
-        "series_stiffness": series_of(gains.arm),
-    }
-
-
-def _full_scale(asked: Asked) -> float:
-    return float(asked.gains.arm.sensor.full_scale)
-
-
-def _mean(values: Any) -> float:
-    return float(np.mean(values)) if len(values) else 0.0
+    return Record(columns, units, {"end": ending.end, "why": ending.why, "unloaded": unloading.how})

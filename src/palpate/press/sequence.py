@@ -1,133 +1,36 @@
-"""Sequence of every press and slide: at rest, from free motion to contact to the end, whoever moves the arm.
+"""Sequence of every press and slide: from free motion to contact to the end.
 
-A simulated arm and one over a wire are read and moved alike. A driver is the law between the two. At
-rest in free motion the force sensor is tared; its noise and drift are compared with those that the gains assume.
+A simulated arm and one over a wire are read and moved alike. A driver is the law between reading and motion.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.bench.summary import APPROACH, CONTACT, LOST
 from palpate.errors import InputError
-from palpate.force.arm import Sensor
 from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains
-from palpate.force.guard import BEYOND, DRIFTS, LATE, SWINGS, TROUBLES
-from palpate.force.sliding import slide_state
+from palpate.press.at_rest import SETTLING_BAND, SURE
+from palpate.press.troubles import Troubles
 
 if TYPE_CHECKING:
     from palpate.force.sliding.sliding_loop import SlidingLoop
     from palpate.force.sliding.turning_tool import TurningTool
 
 
-TARE = 0.5
-"""At rest in free motion before a press [s]."""
-SURE = 8.0
-"""Standard deviations of a reading, which no reading of a press shows by chance."""
-
-
-def check_range(shown: float, most: float, full_scale: float) -> None:
-    """Refuse a sensor that is saturated, or too far from zero.
-
-    Args:
-        shown: in free motion, the largest component [N].
-        most: that is to be read [N].
-        full_scale: of the sensor [N].
-
-    Raises:
-        InputError: it stands at the end of its scale, or could not read that force.
-    """
-    if shown >= 0.99 * full_scale:
-        raise InputError(
-            f"the force sensor shows {shown:.3g} N in free motion, the end of its scale; unload it"
-        )
-    if shown + most > full_scale:
-        raise InputError(
-            f"the force sensor shows {shown:.3g} N in free motion, so that it cannot read a force of up to {most:g} N"
-            f" (full scale {full_scale:g} N); tare it, or lower the force and its limit"
-        )
-
-
-_PARTS = 10
-_SURELY = 4.5
-"""Student's t of eight degrees of freedom at 99.9 %: a line through the means of ten parts."""
-_SHARE = 0.05
-"""Of the desired force, the band within which a press counts as settled: a drift that leaves it is no reading of it."""
-
-
-def noise_and_drift(times: Array, force: Array) -> tuple[float, float, float]:
-    """Noise [N], drift and the drift's standard deviation [N/s] of readings at rest.
-
-    The drift is that of the means of ten parts, so that a hum, or the memory of a low-pass, counts once in each part.
-
-    Args:
-        times: of the readings [s], shape (n,), ten or more.
-        force: [N], shape (n,).
-    """
-    t, f = (np.array([part.mean() for part in np.array_split(v, _PARTS)]) for v in (times, force))
-    t = t - t.mean()
-    drift = float(t @ f / (t @ t))
-    left = f - f.mean() - drift * t
-    about = force - force.mean() - drift * (times - times.mean())
-    return float(about.std()), drift, float(np.sqrt(left @ left / (_PARTS - 2) / (t @ t)))
-
-
-def fitting(gains: Gains, noise: float, count: int) -> Gains | None:
-    """The gains for a noise that was measured; None if they are for that already.
-
-    No lag and no gain depends on the noise: it decides what counts as a touch.
-
-    Args:
-        gains: as they were tuned.
-        noise: standard deviation of the readings at rest [N].
-        count: of the readings.
-
-    Raises:
-        InputError: a noise that hides the force.
-    """
-    sensor = gains.arm.sensor
-    if noise <= sensor.noise * (1.0 + SURE / np.sqrt(2.0 * count)):
-        return None
-    sensor = msgspec.structs.replace(sensor, noise=noise)
-    return msgspec.structs.replace(gains, arm=msgspec.structs.replace(gains.arm, sensor=sensor))
-
-
-def check_drift(drift: float, std: float, force: float, seconds: float, sensor: Sensor) -> None:
-    """Refuse a sensor that surely drifts by more than its maker's figure, or than the press can bear.
-
-    Args:
-        drift: of the force at rest [N/s].
-        std: its standard deviation [N/s].
-        force: desired [N].
-        seconds: that the press may last [s].
-        sensor: of the gains; without a drift, so much is borne as leaves the force within 5 %.
-
-    Raises:
-        InputError: it drifts by more.
-    """
-    borne = _SHARE * force / seconds
-    most = borne if sensor.drift is None else max(sensor.drift, borne)
-    if abs(drift) - _SURELY * std > most:
-        raise InputError(
-            f"the force drifts by {drift:.2g} N/s at rest, and at most {most:.2g} N/s is borne: let the sensor warm up,"
-            " tare again, or press for a shorter time"
-        )
-
-
-_STEPS = 6
+PROBE_STEPS = 6
 """Down and up again, three times."""
-_PATIENCE = 3.0
-"""How many times longer than the approach should take the surface is looked for."""
+SEARCH_FACTOR = 3.0
+"""Duration of the search for the surface, over that of the approach to where it should be."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +39,7 @@ class Plan:
 
     Args:
         force: [N].
-        seconds: from the first touch on [s].
+        seconds: of the hold, from where the force is reached on [s].
         probe: share of the force by which it is lowered now and then, so that the surface shows itself; 0 for never.
         longest: time to look for the surface [s].
     """
@@ -153,17 +56,17 @@ class Plan:
             raise InputError(f"the probe is a share of the force from 0 to 0.9, got {self.probe:g}")
 
     def force_at(self, since: float) -> float:
-        """Desired force at a time since the touch [N]: steady, in the middle third in steps down and up, steady."""
+        """Desired force at a time of the hold [N]: steady, in the middle third in steps down and up, steady."""
         third = self.seconds / 3.0
         if not third <= since < 2.0 * third:
             return self.force
-        lowered = int((since - third) / (third / _STEPS)) % 2 == 0
+        lowered = int((since - third) / (third / PROBE_STEPS)) % 2 == 0
         return self.force * (1.0 - self.probe * lowered)
 
 
 def plan_for(force: float, seconds: float, probe: float, gap: float, speed: float) -> Plan:
     """A plan that looks for the surface three times as long as the way to it takes, and a second."""
-    return Plan(force, seconds, probe, 1.0 + _PATIENCE * gap / speed)
+    return Plan(force, seconds, probe, 1.0 + SEARCH_FACTOR * gap / speed)
 
 
 def mean_over(forces: Array, lag: float, tick: float) -> Array:
@@ -176,6 +79,11 @@ def mean_over(forces: Array, lag: float, tick: float) -> Array:
     """
     width = max(round(lag / tick), 1)
     return np.convolve(forces, np.full(width, 1.0 / width), "valid") if len(forces) > width else forces
+
+
+def lag_ticks(gains: Gains) -> int:
+    """Ticks of the loop's lag theta, over which a force is averaged."""
+    return max(round(gains.theta / gains.arm.tick), 1)
 
 
 class TipSample(NamedTuple):
@@ -212,10 +120,10 @@ class Action(NamedTuple):
 
 
 class PressDriver(Protocol):
-    """Moves the arm once a tick."""
+    """Law that moves the arm once a tick."""
 
     def step(self, sample: TipSample, desired: float, since: float) -> Action:
-        """Presses with the desired force [N], or looks for the surface; `since` is the time since the touch [s]."""
+        """Press with the desired force [N], or look for the surface; `since` is the time of the hold [s]."""
         ...
 
 
@@ -227,84 +135,113 @@ class Tick(NamedTuple):
     action: Action
 
 
+class ForceToReach(NamedTuple):
+    """Force that a press has to reach before its hold begins.
+
+    Args:
+        force: desired [N].
+        normal: into the surface, shape (3,).
+        lag: of the loop, in ticks: over so many the force is averaged.
+    """
+
+    force: float
+    normal: Array
+    lag: int
+
+
 class PressSequence:
     """A press or a slide, tick by tick.
+
+    The hold begins where the mean force over the loop's lag reaches the settling band of the desired force in contact.
+    Its clock stands still while contact is lost, and goes on when the force is reached in the next contact. A contact
+    in which the force was never reached is none.
 
     Args:
         arm: what moves.
         driver: of that arm.
-        desired: desired force [N] at a time since the touch [s].
+        desired: desired force [N] at a time of the hold [s].
         tick: of the arm [s].
+        wanted: the force to reach; None where the driver's contact itself is a force that is held.
     """
 
-    def __init__(self, arm: MovableArm, driver: PressDriver, desired: Callable[[float], float], tick: float):
+    def __init__(
+        self,
+        arm: MovableArm,
+        driver: PressDriver,
+        desired: Callable[[float], float],
+        tick: float,
+        wanted: ForceToReach | None = None,
+    ):
         self._arm, self._driver, self._desired, self._tick = arm, driver, desired, tick
+        self._wanted = wanted
+        self._forces = deque[float](maxlen=1 if wanted is None else wanted.lag)
+        self._contact, self._count, self._ticks, self._last = 0, 0, 0, 0.0
         self.touch: TipSample | None = None
-        self._last = 0.0
+        """First reading of the contact in which the force was reached, or may be."""
+        self.reached, self.touched, self.largest = False, False, 0.0
+        """The force was reached in the present contact; in any; largest mean force over the lag [N]."""
+        self.last_contact = 0
+        """Ticks until the last one of a contact in which the force was reached; 0 before it."""
 
-    def _since(self, time: float) -> float:
-        """Time since the touch in whole ticks [s]; 0 before it."""
-        return 0.0 if self.touch is None else round((time - self.touch.time) / self._tick) * self._tick
+    @property
+    def since(self) -> float:
+        """Time of the hold [s]."""
+        return self._ticks * self._tick
 
     @property
     def next_since(self) -> float:
-        """Time since the touch at the next tick [s]; 0 before it."""
-        return self._since(self._last + self._tick)
+        """Time of the hold at the next tick [s]."""
+        return (self._ticks + self.reached) * self._tick
+
+    @property
+    def in_contact(self) -> int:
+        """Ticks of the present contact."""
+        return self._contact
 
     def tick(self) -> Tick:
-        """Reads the arm and moves it."""
+        """Read the arm and move it."""
         sample = self._arm.read()
+        if self.reached:
+            self._ticks += round((sample.time - self._last) / self._tick)
         self._last = sample.time
-        since = self._since(sample.time)
-        desired = self._desired(since)
-        action = self._driver.step(sample, desired, since)
-        if self.touch is None and action.phase == CONTACT:
-            self.touch = sample
+        desired = self._desired(self.since)
+        action = self._driver.step(sample, desired, self.since)
+        self._note_contact(sample, action.phase == CONTACT)
         return Tick(sample, desired, action)
 
+    def _note_contact(self, sample: TipSample, contact: bool) -> None:
+        self._contact, self._count = self._contact + 1 if contact else 0, self._count + 1
+        if contact and self.touch is None:
+            self.touch = sample
+        elif not contact and not self.touched:
+            self.touch = None
+        reached = self._is_force_reached(sample)
+        self.reached = contact and (self.reached or reached)
+        self.touched = self.touched or self.reached
+        if self.reached:
+            self.last_contact = self._count
 
-_SLIDES = (
-    slide_state.REFUTED,
-    slide_state.STEPPED,
-    slide_state.JERKS,
-    slide_state.LOST,
-    slide_state.AWAY,
-)
-BORNE = {slide_state.SLIDING_TROUBLES[code] for code in (LATE, DRIFTS, BEYOND, SWINGS, *_SLIDES)}
-"""Troubles with which a press or a slide goes on, however long they last."""
+    def _is_force_reached(self, sample: TipSample) -> bool:
+        """True if the mean force over the loop's lag, all of it in contact, is in the band or above it."""
+        if self._wanted is None:
+            return True
+        force, normal, lag = self._wanted
+        self._forces.append(float(sample.force @ normal))
+        mean = sum(self._forces) / lag
+        self.largest = max(self.largest, mean)
+        return self._contact >= lag and mean >= (1.0 - SETTLING_BAND) * force
 
-
-class Troubles:
-    """Troubles of the law: each is shown when it begins, and one that lasts longer than the lag ends the press.
-
-    Those of `BORNE` end none. Missed ticks are not shown: the wire counts them, and ends the press at too many.
-
-    Args:
-        lag: of the loop [s].
-        show: called with the sentence of a trouble.
-    """
-
-    def __init__(self, lag: float, show: Callable[[str], None]):
-        self._lag, self._show = lag, show
-        self._now, self._since = "", 0.0
-        self.ticks: Counter[str] = Counter()
-
-    def lasting(self, trouble: str, time: float) -> str | None:
-        """The sentence of a trouble that has lasted too long; None of none.
+    def shortfall(self, noise: float) -> str:
+        """Sentence on the largest force, where the desired one was never reached.
 
         Args:
-            trouble: of this tick, empty for none.
-            time: by the clock of the arm [s].
+            noise: standard deviation of a reading in free motion [N].
         """
-        trouble = "" if trouble == TROUBLES[LATE] else trouble
-        if trouble != self._now:
-            self._now, self._since = trouble, time
-        if not trouble:
-            return None
-        if trouble not in self.ticks:
-            self._show(trouble)
-        self.ticks[trouble] += 1
-        return trouble if time - self._since > self._lag and trouble not in BORNE else None
+        if self._wanted is None:
+            return "no surface was held"
+        if self.largest <= SURE * noise:
+            return "no surface was met"
+        return f"the force of {self._wanted.force:g} N was never reached, {self.largest:.3g} N at most"
 
 
 class CautiousDriver:
@@ -364,12 +301,14 @@ class SlidingDriver:
 
     def step(self, sample: TipSample, desired: float, since: float) -> Action:
         """One tick, as `PressDriver` describes it."""
-        loop, way = self.loop, self._direction(since)
+        loop, direction = self.loop, self._direction(since)
         if self._tool is None or sample.rotation is None:
-            velocity = loop.update(sample.force, sample.position, way, sample.missed)
+            velocity = loop.update(sample.force, sample.position, direction, sample.missed)
             self._arm.move(velocity)
         else:
-            twist = self._tool.update(sample.force, sample.position, sample.rotation, way, sample.missed)
+            twist = self._tool.update(
+                sample.force, sample.position, sample.rotation, direction, sample.missed
+            )
             velocity = twist[:3]
             self._arm.move(velocity, twist[3:])
         self._slid = self._slid or loop.sliding

@@ -6,8 +6,8 @@ import numpy as np
 
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
-from palpate.contact_frame.load import Payload
-from palpate.contact_frame.tool_payload import side_of
+from palpate.contact_frame.payload import Payload
+from palpate.contact_frame.tool_payload import weight_sign
 from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
@@ -24,12 +24,12 @@ GAP = 0.003
 _STEP = 5e-4
 """Longest step of the physics [s]."""
 _RESOLVED = 0.5
-"""Radians of the fastest spring in a step, at most: a quarter of where semi-implicit Euler would diverge."""
+"""Largest frequency of a spring times the step [rad]: a quarter of where semi-implicit Euler diverges."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the press is.
+    """Pose and surface of a press.
 
     Args:
         q: joint positions at the start, the tip before the surface, shape (n,).
@@ -57,11 +57,11 @@ class Place:
 
 
 def place_of(arm: SerialArm, at: Array | None, normal: Array | None, gap: float = GAP) -> Place:
-    """Where the arm starts and what it faces.
+    """Pose at which the arm starts, and the surface before it.
 
     Args:
         arm: what moves, six joints and more.
-        at: point of the surface that is to be touched [m]; the point before the tip at home when left out.
+        at: point of the surface to touch [m]; the point before the tip at home when left out.
         normal: into the surface; the tip's own z at home when left out.
         gap: between tip and surface [m].
 
@@ -84,38 +84,43 @@ def place_of(arm: SerialArm, at: Array | None, normal: Array | None, gap: float 
     along = n @ J[:3]
     mass = 1.0 / float(along @ np.linalg.solve(M, along)) if np.linalg.norm(along) > 0.0 else np.inf
     return Place(
-        q=q, normal=n, axes=_axes(n), pose=pose, place=float(n @ pose[:3, 3]) + gap, mass=mass,
+        q=q,
+        normal=n,
+        axes=_axes(n),
+        pose=pose,
+        place=float(n @ pose[:3, 3]) + gap,
+        mass=mass,
         weakest=float(arm.singular_values(q)[-1]),
-    )  # fmt: skip
+    )
 
 
 def check_able(arm: SerialArm, place: Place, speed: float, force: float) -> list[str]:
-    """Notes on what the pose costs.
+    """Notes on a pose near a singular one.
 
     Args:
         arm: what moves.
         place: where.
         speed: of the approach [m/s].
-        force: the largest that will be asked for [N].
+        force: largest desired force [N].
 
     Raises:
-        InputError: a pose so near a singular one that a joint would have to be faster than it can, or one in which the
-            force, beside the arm's own weight, is more than a motor gives.
+        InputError: a pose so near a singular one that a joint would exceed its speed, or in which force and weight
+            exceed a motor's torque.
     """
     J = arm.jacobian(place.q)
     _, s, V = np.linalg.svd(J)
     known = np.isfinite(arm.speed)
-    most = float(arm.speed[known].min()) if known.any() else 1.0
-    least = speed / most
+    max_speed = float(arm.speed[known].min()) if known.any() else 1.0
+    min_singular_value = speed / max_speed
     joint = arm.names[int(np.argmax(np.abs(V[len(s) - 1])))]
-    if s[-1] <= least:
+    if s[-1] <= min_singular_value:
         raise InputError(
             f"the pose is {'singular' if s[-1] < 1e-9 else 'nearly singular'}: the smallest singular value of the "
-            f"Jacobian is {s[-1]:.3g}, and at {1e3 * speed:.3g} mm/s at least {least:.3g} is needed for joints of "
-            f"{most:.3g} rad/s; move {joint} away from where it is, or choose another --at or --normal"
+            f"Jacobian is {s[-1]:.3g}, and at {1e3 * speed:.3g} mm/s at least {min_singular_value:.3g} is needed for "
+            f"joints of {max_speed:.3g} rad/s; move {joint} away from where it is, or choose another --at or --normal"
         )
     _check_torques(arm, place, J, force)
-    quick = 0.25 / most
+    quick = 0.25 / max_speed
     if s[-1] > quick:
         return []
     note = (
@@ -138,7 +143,7 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
 def cell_of(
     arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL
 ) -> Workcell:
-    """The simulated cell of an arm whose inner loop is known; the tool is what its sensor shows of one."""
+    """The simulated cell of an arm with its inner loop, before a surface, with the tool as its sensor shows it."""
     motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
     chain = arm.chain._replace(rotor=0.0 * arm.chain.rotor) if motors else arm.chain
     J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
@@ -158,15 +163,25 @@ def cell_of(
         fastest = max(fastest, _fastest(links, damper))
     steps = int(np.ceil(loop.tick / min(_STEP, _RESOLVED / fastest) - 1e-9))
     return Workcell(
-        chain=chain, normal=triple(place.normal), place=place.place, surface=surface,
-        sensor=_sensor(loop, loop.tick / steps), tool=tool, step=loop.tick / steps, steps=steps,
-        elastic=float(motors or servo), yields=float(servo), spring=spring, damper=damper, first=float(first),
+        chain=chain,
+        normal=triple(place.normal),
+        place=place.place,
+        surface=surface,
+        sensor=_sensor(loop, loop.tick / steps),
+        tool=tool,
+        step=loop.tick / steps,
+        steps=steps,
+        elastic=float(motors or servo),
+        yields=float(servo),
+        spring=spring,
+        damper=damper,
+        first=float(first),
         second=float(second),
-    )  # fmt: skip
+    )
 
 
 def _joint_springs(arm: SerialArm, links: Array, along: Array, stiffness: float) -> Array:
-    """Joints as stiff as their motors are strong, the tip along the normal as stiff as the arm is said to be."""
+    """Joint stiffnesses proportional to the torque limits, with which the tip has this stiffness along the normal."""
     strength = arm.torque if np.isfinite(arm.torque).all() else np.diag(links)
     return np.asarray(strength * stiffness * float(along @ (along / strength)))
 
@@ -182,14 +197,19 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide = np.zeros((3, 3))
     wide[: len(b), : len(b)] = E
     return WristSensor(
-        E=Mat3(*map(triple, wide)), e=_pad(e), c=_pad(c), d=0.0 if len(b) else 1.0,
-        step=float(step), sampling=float(loop.sensor.sampling), noise=float(loop.sensor.noise),
+        E=Mat3(*map(triple, wide)),
+        e=_pad(e),
+        c=_pad(c),
+        d=0.0 if len(b) else 1.0,
+        step=float(step),
+        sampling=float(loop.sensor.sampling),
+        noise=float(loop.sensor.noise),
         full_scale=float(loop.sensor.full_scale),
-    )  # fmt: skip
+    )
 
 
 def _facing(home: Array, normal: Array, point: Array) -> Array:
-    """The pose nearest to home whose z points along the normal."""
+    """Pose whose z points along the normal and whose x is nearest to that at home."""
     z, x = normal, home[:3, 0]
     x = x - (x @ z) * z
     if np.linalg.norm(x) < 1e-6:
@@ -202,8 +222,8 @@ def _facing(home: Array, normal: Array, point: Array) -> Array:
 
 def _axes(normal: Array) -> Array:
     """The normal, and two directions along the surface."""
-    other = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    y = other - (other @ normal) * normal
+    unit_vector = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    y = unit_vector - (unit_vector @ normal) * normal
     y /= np.linalg.norm(y)
     return np.array([normal, y, np.cross(normal, y)])
 
@@ -223,11 +243,11 @@ def _pad(values: Array) -> Vec3:
 def held_tool(payload: Payload | None) -> HeldTool:
     """A tool as a sensor shows it, with the sign of a press.
 
-    A weight that points down is that of a sensor that shows what the tool exerts on it: the opposite of a press.
+    A weight that points down belongs to a sensor that shows the force of the tool on the sensor, opposite to a press.
     """
     if payload is None:
         return NO_TOOL
-    sign = -(side_of(np.array(payload.weight)) or -1.0)
+    sign = -(weight_sign(np.array(payload.weight)) or -1.0)
     follows = payload.mass if payload.inertia is None else payload.inertia
     return HeldTool(
         weight=sign * Vec3(*payload.weight),
@@ -238,30 +258,29 @@ def held_tool(payload: Payload | None) -> HeldTool:
 
 
 def with_tool(arm: SerialArm, payload: Payload) -> SerialArm:
-    """The arm with the tool's mass at its centre, on the last link; its control knows of it, as of any payload.
+    """The arm with the tool's mass at its centre, on the last link; its control includes it, as any payload.
 
-    How the mass spreads about its centre was not weighed, and is left out. A MuJoCo model that the arm was read from
-    does not have the tool, and is left behind.
+    The tool's inertia about its centre was not weighed and is left out. A MuJoCo model from which the arm was read does
+    not have the tool and is dropped.
     """
     chain, last = arm.chain, arm.joints - 1
     mass = max(payload.mass, payload.inertia or 0.0)
     at = chain.tip + chain.tip_turn @ np.array(payload.centre or (0.0, 0.0, 0.0))
-    whole = chain.mass[last] + mass
-    com = (chain.mass[last] * chain.com[last] + mass * at) / whole
-    moment = (
-        chain.inertia[last]
-        + _point(chain.mass[last], chain.com[last] - com)
-        + _point(mass, at - com)
-    )  # fmt: skip
-    least, spread = spread_of(_change(chain.inertia, last, moment))
+    total_mass = chain.mass[last] + mass
+    com = (chain.mass[last] * chain.com[last] + mass * at) / total_mass
+    moment = chain.inertia[last] + _point(chain.mass[last], chain.com[last] - com) + _point(mass, at - com)
+    smallest, spread = spread_of(_change(chain.inertia, last, moment))
     loaded = chain._replace(
-        mass=_change(chain.mass, last, whole), com=_change(chain.com, last, com), least=least, spread=spread
+        mass=_change(chain.mass, last, total_mass),
+        com=_change(chain.com, last, com),
+        least=smallest,
+        spread=spread,
     )
     return replace(arm, title=f"{arm.title} with a tool of {mass:.3g} kg", chain=loaded, scene=None)
 
 
 def _point(mass: float, off: Array) -> Array:
-    """Inertia of a point mass about a point that it is off from [kg m^2], shape (3, 3)."""
+    """Inertia of a point mass at an offset from the reference point [kg m^2], shape (3, 3)."""
     return np.asarray(mass * (off @ off * np.eye(3) - np.outer(off, off)))
 
 

@@ -6,33 +6,32 @@ from typing import Any
 
 import numpy as np
 
-from palpate._jit import BoundKernel
-from palpate._vector import ZERO3, Mat3, Vec6
+from palpate._vector import ZERO3
 from palpate.arrays import Array
 from palpate.environments.surface import UNTOUCHED, rest_for
 from palpate.errors import InputError
 from palpate.force.arm import Arm, TorqueLoop
+from palpate.press.at_rest import TARE
 from palpate.press.cell import Body, Reading, TouchState, Workcell
-from palpate.press.engines import ArmReadings, ByMuJoCo, Engine, Own, Spring, TaskFrame, compiled_tip_torque
-from palpate.press.sequence import TARE, TipSample
+from palpate.press.engines import ByMuJoCo, Engine, Own
+from palpate.press.sequence import TipSample
 from palpate.press.setting import Place
+from palpate.press.tip_controller import TipController
 from palpate.robots.serial.chain import room_for
-from palpate.robots.serial.inverse import pose_error, rotation_by
-from palpate.robots.serial.serial_arm import SerialArm, arm_state_for, compiled_description
-from palpate.robots.serial.task import TaskRoom
-from palpate.signals.types import Task, alike, triple
+from palpate.robots.serial.inverse import pose_error
+from palpate.robots.serial.serial_arm import SerialArm
+from palpate.signals.rotations import matrix_from_vector
+from palpate.signals.types import Task
 
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
-_SPARE = 5.0
-"""Damping of the joints to spare [1/s]."""
 
 
 def body_at(q: Array, motor: Array) -> Body:
     """State of the body at rest."""
     n = len(q)
-    one = [np.zeros(n) for _ in range(7)]
-    return Body(q.copy(), one[0], motor.copy(), one[1], room_for(n), np.zeros((n, n)), *one[2:])
+    zeros = [np.zeros(n) for _ in range(7)]
+    return Body(q.copy(), zeros[0], motor.copy(), zeros[1], room_for(n), np.zeros((n, n)), *zeros[2:])
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class SimulatedArm:
         cell: of the same.
         physics: own or mujoco, or an engine of its own.
         seed: of the noise.
-        resolution: of a joint's position [rad, m]; 0 for encoders that see everything.
+        resolution: of a joint's position [rad, m]; 0 for exact encoders.
     """
 
     def __init__(
@@ -96,9 +95,9 @@ class SimulatedArm:
         self._engine: Engine = by_name if isinstance(physics, str) else physics
         self._k, self.zero = 0, 0.0
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
-        self._saturated = np.zeros(arm.joints)
+        self._saturated, self._acted = np.zeros(arm.joints), False
         self._seen = self._before = self._encoders()
-        self._tip = _TipLoop(arm, loop, place) if isinstance(loop.inner, TorqueLoop) else None
+        self._tip = TipController(arm, loop, place) if isinstance(loop.inner, TorqueLoop) else None
         rest = place.q + sag if self._tip is None else arm.gravity_torque(place.q)
         self._line = deque([rest] * loop.delay_ticks)
 
@@ -117,22 +116,27 @@ class SimulatedArm:
 
         In the first half its low-pass settles.
         """
-        shown = []
+        readings = []
         for _ in range(round(TARE / self.loop.tick)):
             self.move(np.zeros(3))
-            shown.append(self._touch.reading.value)
-        return np.array(shown[len(shown) // 2 :], dtype=np.float64)
+            readings.append(self._touch.reading.value)
+        return np.array(readings[len(readings) // 2 :], dtype=np.float64)
 
     def tare(self) -> None:
-        """Rests in free motion, and takes what the sensor shows in the second half of that for zero."""
+        """Rest in free motion, and take the mean reading of the second half as the sensor's zero."""
         self.zero = float(self.at_rest().mean())
 
     def move(self, velocity: Array, turning: Array | None = None) -> None:
         """Moves the tip for a tick with a velocity [m/s], and a turning if there is one [rad/s], each of shape (3,)."""
         self._goal[:3, 3] += self.loop.tick * np.asarray(velocity)
         if turning is not None:
-            self._goal[:3, :3] = rotation_by(self.loop.tick * turning) @ self._goal[:3, :3]
+            self._goal[:3, :3] = matrix_from_vector(self.loop.tick * turning) @ self._goal[:3, :3]
         self._follow_goal()
+
+    def hold_place(self) -> None:
+        """Take the present pose as the goal of the next moves, after a controller of torques moved the arm."""
+        if self._tip is not None and self._acted:
+            self._goal = self.pose
 
     def move_to(self, pose: Array) -> None:
         """Moves the tip for a tick towards a pose, homogeneous, shape (4, 4)."""
@@ -153,12 +157,13 @@ class SimulatedArm:
         """
         if self._tip is None:
             raise InputError("a controller of torques needs --mode torque")
+        self._acted = True
         self._act(controller, task)
 
     def change_surface(self, cell: Workcell) -> None:
-        """Puts the surface of another cell in the place of this one's, such that it bears the force of this moment.
+        """Replace the surface by that of another cell, at a depth at which it carries the present force.
 
-        Palpate's own physics alone can; MuJoCo keeps the step it began with.
+        For palpate's own physics; MuJoCo keeps the step of the cell that it began with.
         """
         touching, old = self._touch.surface, self.cell.surface
         if touching.contact == 1.0:
@@ -173,12 +178,17 @@ class SimulatedArm:
         """True values, known to the simulation only."""
         body, touch = self._body, self._touch
         return Truth(
-            body.q.copy(), body.qd.copy(), touch.mean, touch.depth, touch.surface.contact == 1.0,
-            body.drive.copy(), self._saturated.copy(),
-        )  # fmt: skip
+            body.q.copy(),
+            body.qd.copy(),
+            touch.mean,
+            touch.depth,
+            touch.surface.contact == 1.0,
+            body.drive.copy(),
+            self._saturated.copy(),
+        )
 
     def _follow(self) -> Array:
-        """Set-points of the motors whose pose follows the goal, by resolved rates of least size."""
+        """Set-points of the motors that follow the goal, by the smallest joint rates."""
         q, tick = self._setpoint, self.loop.tick
         J = self.arm.jacobian(q)
         error = pose_error(self.arm.forward_kinematics(q), self._goal)
@@ -190,9 +200,9 @@ class SimulatedArm:
         assert self._tip is not None
         qd = (self._seen - self._before) / self.loop.tick
         torque = self._tip.torque(controller, task, self._seen, qd, self._touch.reading.value - self.zero)
-        held = np.clip(torque, -self.arm.torque, self.arm.torque)
+        limited = np.clip(torque, -self.arm.torque, self.arm.torque)
         self._saturated = (np.abs(torque) > self.arm.torque).astype(float)
-        self._advance(held)
+        self._advance(limited)
 
     def _advance(self, setpoint: Array) -> None:
         self._line.append(setpoint)
@@ -208,51 +218,3 @@ class SimulatedArm:
         if self._resolution == 0.0:
             return turned.copy()
         return np.asarray(self._resolution * np.round(turned / self._resolution))
-
-
-def task_room_for(n: int) -> TaskRoom:
-    """Room for an arm of n joints."""
-    return TaskRoom(np.zeros((n, n)), np.zeros((7, n)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6))
-
-
-class _TipLoop:
-    """The controller that an arm of torques runs at each tick."""
-
-    def __init__(self, arm: SerialArm, loop: Arm, place: Place):
-        inner = loop.inner
-        assert isinstance(inner, TorqueLoop)
-        J, M = arm.jacobian(place.q), arm.mass_matrix(place.q)
-        mobility = J @ np.linalg.solve(M, J.T)
-        turning = float(1.0 / np.linalg.eigvalsh(mobility[3:, 3:])[-1]) / inner.mass
-        spring, damper = float(inner.stiffness), float(inner.damping)
-        self.spring = Spring(
-            Vec6(alike(spring), alike(spring * turning)), Vec6(alike(damper), alike(damper * turning))
-        )
-        self._chain, self._axes = arm.chain, place.axes
-        axes, held = (Mat3(*map(triple, m)) for m in (place.axes, place.pose[:3, :3]))
-        self._frame = TaskFrame(axes, held, _SPARE)
-        n = arm.joints
-        self._found, self._room = arm_state_for(n), task_room_for(n)
-        self._states: dict[type, Any] = {}
-        self._laws: dict[type, BoundKernel] = {}
-        self._n = n
-
-    def towards(self, goal: Array) -> Task:
-        """The task of standing at a pose."""
-        self._frame = self._frame._replace(held=Mat3(*map(triple, goal[:3, :3])))
-        x: Any = Vec6(triple(self._axes @ goal[:3, 3]), ZERO3)
-        nothing = 0.0 * x
-        return Task(x, nothing, nothing, nothing, nothing)
-
-    def torque(self, controller: Any, task: Task, q: Array, qd: Array, force: float) -> Array:
-        """Of the joints [N m], shape (n,)."""
-        kind = type(controller)
-        if kind not in self._states:
-            self._states[kind], self._laws[kind] = controller.start(), BoundKernel(compiled_tip_torque)
-        state, torque = self._states[kind], np.zeros(self._n)
-        compiled_description(self._chain, q, qd, self._found)
-        readings = ArmReadings(q, qd, float(force), self._found)
-        self._states[kind] = self._laws[kind](
-            self._frame, controller, state, task, readings, self._room, torque
-        )
-        return torque

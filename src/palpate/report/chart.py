@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import floor
+from math import floor, isinf, isnan, log10
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,15 +24,25 @@ COLOURS = (
     | assets.SERIES
     | {name: assets.PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card")}
 )
-"""Colours of what is drawn, by the tokens that a page turns to dark."""
+"""Colours of lines and areas by the names of a page's custom properties."""
 KNOWN: Mapping[str, Any] = {"colour": "ink", "width": 1.1, "dash": "--"}
-"""Look of what is desired, or known to be true."""
-MOST = 1200
-"""Places of a line that lie in the page, about: two for each point of a screen that a panel is wide."""
+"""Look of a desired or true value."""
+MAX_POINTS = 1200
+"""Approximate points of a line in a page: two for each pixel of a panel's width."""
 _DASHES: Mapping[str, list[int]] = {"": [], "--": [6, 4], ":": [2, 3]}
-_PIXELS = 80.0
-"""Height of a chart in a page, to an inch of the figure's panel."""
+_LINES: Mapping[str, Any] = {"": "-", "--": (0, (5, 4)), ":": ":"}
+"""Kinds of lines in a page, and in a figure."""
+_PIXELS_PER_INCH = 80.0
+"""Height of a chart in a page [pixels] for each inch of the figure's panel."""
 _MARGIN = 0.05
+_WIDTH, _WIDTH_WITH_HEAD = 9.0, 13.0
+"""Width of a figure [in]."""
+_HEAD_LETTERS, _HEAD_LINE = 150, 0.2
+"""Letters of a line of the head, and its height [in]."""
+ABSENT = "absent"
+"""Value in a page's column at an x where its line has no point; the line goes on."""
+_DIGITS = 5
+"""Significant digits of a column, relative to its range."""
 _UNIT = re.compile(r"\[([^\]]+)\]\s*$")
 
 
@@ -40,8 +51,8 @@ class Series:
     """A line over x, or dots.
 
     Args:
-        x: its places, in order, shape (n,).
-        y: its values; NaN are gaps, shape (n,).
+        x: coordinates in order, shape (n,).
+        y: values; NaN are gaps, shape (n,).
         colour: one of `COLOURS`.
         label: in the legend; empty for none.
         width: of the line [pt]; 0 for none.
@@ -62,7 +73,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Interval:
-    """An interval of y that changes along x: its places in order, and its ends there, each of shape (n,)."""
+    """An interval of y that changes along x: x in order, and both ends, each of shape (n,)."""
 
     x: Array
     low: Array
@@ -73,7 +84,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Band:
-    """An interval of y along the whole chart; a line where both ends are one."""
+    """An interval of y along the whole chart; a line if both ends are equal."""
 
     low: float
     high: float
@@ -85,7 +96,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Mark:
-    """Stretches of x, each from its first to its second end; moments where both are one."""
+    """Intervals of x, each from its first to its second end; moments if both are equal."""
 
     spans: Sequence[tuple[float, float]]
     colour: str
@@ -124,7 +135,7 @@ class Chart:
     @property
     def ends(self) -> tuple[float, float]:
         """Ends of the x axis."""
-        places = np.concatenate([one.x for one in self.series])
+        places = np.concatenate([series.x for series in self.series])
         low, high = self.xlim or (np.min(places), np.max(places))
         return float(low), float(high)
 
@@ -136,26 +147,45 @@ class Chart:
         """
         if self.ylim is not None:
             return self.ylim
-        values = [*(one.y for one in self.series), [end for b in self.bands for end in (b.low, b.high)]]
-        values += [end for one in self.intervals for end in (one.low, one.high)]
-        known = np.concatenate([np.asarray(one, dtype=float) for one in values])
-        known = known[np.isfinite(known)]
-        known = np.log10(known[known > 0.0]) if "y" in self.log else known
-        low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+        values = np.concatenate(
+            [
+                *(series.y for series in self.series),
+                *(end for interval in self.intervals for end in (interval.low, interval.high)),
+                [end for band in self.bands for end in (band.low, band.high)],
+            ]
+        )
+        values = values[np.isfinite(values)]
+        values = np.log10(values[values > 0.0]) if "y" in self.log else values
+        low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
         room = _MARGIN * (high - low) or 0.5
         if "y" not in self.log:
             return low - room, high + room
         low, power = 10.0 ** (low - room), 10.0 ** floor(low - room)
         return power * floor(low / power), 10.0 ** (high + room)
 
+    @property
+    def axis_key(self) -> tuple[Any, ...]:
+        """Ends and kind of the x axis, equal for charts that are zoomed together."""
+        return self.ends, "x" in self.log
 
-def figure_of(charts: Sequence[Chart], columns: int = 1) -> Figure:
-    """The charts under each other, over one axis where all have the same, or in rows of several."""
+
+def build_figure(charts: Sequence[Chart], columns: int = 1, head: Sequence[str] = ()) -> Figure:
+    """Draw charts below each other, over one axis if all have the same, or in rows of several.
+
+    Args:
+        charts: in the order to be read.
+        columns: charts in a row.
+        head: lines of text above all charts, the longest wrapped.
+    """
     rows, high = -(-len(charts) // columns), charts[0].height
-    one_axis = columns == 1 and len({(chart.ends, "x" in chart.log) for chart in charts}) == 1
+    one_axis = columns == 1 and len({chart.axis_key for chart in charts}) == 1
+    lines = [part for line in head if line for part in wrap(style.literal(line), _HEAD_LETTERS)]
+    wide = _WIDTH if columns == 1 or not head else _WIDTH_WITH_HEAD
     with style.ink():
-        size = (9.0, high * rows + (0.5 if one_axis else 0.0))
+        size = (wide, high * rows + (0.5 if one_axis else 0.0) + _HEAD_LINE * len(lines))
         figure, axes = style.grid(size, rows, columns, sharex=one_axis)
+        if lines:
+            figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=10.5)
         for axis, chart in zip(axes, charts, strict=False):
             draw(axis, chart)
         for axis in axes[len(charts) :]:
@@ -167,22 +197,23 @@ def figure_of(charts: Sequence[Chart], columns: int = 1) -> Figure:
 
 def draw(axis: Axes, chart: Chart) -> None:
     """Draw a chart in a panel of a figure."""
-    for area in chart.intervals:
-        colour, label = COLOURS[area.colour], area.label or None
-        axis.fill_between(area.x, area.low, area.high, color=colour, alpha=0.22, linewidth=0, label=label)
-    for one in chart.series:
-        line: dict[str, Any] = {"linewidth": one.width, "linestyle": _line(one.dash)}
-        if one.dots:
-            line = {"linestyle": "None", "marker": "o", "markersize": one.dots}
-        axis.plot(one.x, one.y, color=COLOURS[one.colour], label=one.label or None, alpha=one.alpha, **line)
+    for interval in chart.intervals:
+        axis.fill_between(
+            interval.x, interval.low, interval.high, alpha=0.22, linewidth=0, **_look_in_figure(interval)
+        )
+    for series in chart.series:
+        line: dict[str, Any] = {"linewidth": series.width, "linestyle": _LINES[series.dash]}
+        if series.dots:
+            line = {"linestyle": "None", "marker": "o", "markersize": series.dots}
+        axis.plot(series.x, series.y, alpha=series.alpha, **line, **_look_in_figure(series))
     for band in chart.bands:
-        level = {"linewidth": band.width, "linestyle": _line(band.dash)}
-        _interval((axis.axhline, level), (axis.axhspan, 0.2), (band.low, band.high), band.colour, band.label)
+        line = {"linewidth": band.width, "linestyle": _LINES[band.dash]}
+        _span((axis.axhline, line), (axis.axhspan, 0.2), (band.low, band.high), _look_in_figure(band))
+    moment = {"linewidth": 1.1, "linestyle": _LINES["--"]}
     for mark in chart.marks:
-        moment = {"linewidth": 1.1, "linestyle": _line("--")}
         for i, ends in enumerate(mark.spans):
-            label = "" if i else mark.label
-            _interval((axis.axvline, moment), (axis.axvspan, 0.12), ends, mark.colour, label)
+            look = _look_in_figure(mark) | ({"label": None} if i else {})
+            _span((axis.axvline, moment), (axis.axvspan, 0.12), ends, look)
     axis.set(xlabel=style.literal(chart.x), ylabel=style.literal(chart.y))
     axis.set_title(style.literal(chart.title), loc="left")
     axis.set(**{name: ends for name in ("xlim", "ylim") if (ends := getattr(chart, name))})
@@ -194,89 +225,100 @@ def draw(axis: Axes, chart: Chart) -> None:
         style.legend(axis)
 
 
-def _interval(line: Any, area: Any, ends: tuple[float, float], colour: str, label: str) -> None:
-    """A line where both ends are one, else an area."""
-    own = {"color": COLOURS[colour], "label": label or None}
+def _span(line: Any, area: Any, ends: tuple[float, float], look: dict[str, Any]) -> None:
+    """Draw a line if both ends are equal, else an area."""
     if ends[0] == ends[1]:
-        line[0](ends[0], **line[1], **own)
+        line[0](ends[0], **line[1], **look)
     else:
-        area[0](*ends, alpha=area[1], linewidth=0, **own)
+        area[0](*ends, alpha=area[1], linewidth=0, **look)
 
 
-def _line(dash: str) -> Any:
-    return (0, (5, 4)) if dash == "--" else dash or "-"
+def _look_in_figure(part: Series | Interval | Band | Mark) -> dict[str, Any]:
+    return {"color": COLOURS[part.colour], "label": part.label or None}
 
 
-def panels(charts: Sequence[Chart], most: int = MOST) -> list[dict[str, Any]]:
-    """The charts for a page, in order, as plain values, each with about so many places of a line.
+def panels(charts: Sequence[Chart], max_points: int = MAX_POINTS) -> list[dict[str, Any]]:
+    """Charts for a page as plain values, in order, each line with about `max_points` points.
 
     Each is `{"spec", "columns"}` as `palpate.chart` takes it, and the `group` of those that are zoomed together.
     """
-    keys = [(chart.ends, "x" in chart.log) for chart in charts]
-    names = [chart.x for chart in charts]
-    found = []
-    for chart, key in zip(charts, keys, strict=True):
-        x = chart.x or next((name for own, name in zip(keys, names, strict=True) if own == key and name), "")
-        found.append(_panel(chart, x, most) | {"group": keys.index(key)})
-    return found
+    keys = [chart.axis_key for chart in charts]
+    names = {chart.axis_key: chart.x for chart in reversed(charts) if chart.x}
+    return [
+        _panel(chart, chart.x or names.get(key, ""), max_points) | {"group": keys.index(key)}
+        for chart, key in zip(charts, keys, strict=True)
+    ]
 
 
-def _panel(chart: Chart, x: str, most: int) -> dict[str, Any]:
-    """A chart, thinned so that peaks stay; what has no name, or another's, is not in its legend."""
-    lines = [(one.x, one.y) for one in chart.series]
-    lines += [(one.x, end) for one in chart.intervals for end in (one.low, one.high)]
-    places, values = _join([_within(*line, *chart.ends) for line in lines], most)
-    columns = {"t": _column(places, "x" in chart.log)}
-    columns |= {f"c{i}": _column(column, "y" in chart.log) for i, column in enumerate(values)}
-    series = [look(one) | {"of": f"c{i}"} for i, one in enumerate(chart.series)]
-    for i, one in enumerate(chart.intervals):
-        k = len(chart.series) + 2 * i
-        series.append(_area(one) | {"low": f"c{k}", "high": f"c{k + 1}"})
-    for band in chart.bands:
-        is_line = band.low == band.high
-        ends = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
-        own = look(band) if is_line else _area(band)
-        series.append(own | {key: f"{key}{len(series)}" for key in ends})
-        columns |= {series[-1][key]: assets.packed_column(np.full(len(places), v)) for key, v in ends.items()}
-    labels = [one["label"] for one in series]
-    for i, (label, line) in enumerate(zip(labels, series, strict=True)):
-        line["silent"] = not label or label in labels[:i]
-    if not any(labels):
+def _panel(chart: Chart, x: str, max_points: int) -> dict[str, Any]:
+    """A chart, thinned so that peaks stay. A legend has each label once."""
+    columns, series = _lines(chart, max_points)
+    known: set[str] = set()
+    for line in series:
+        line["silent"] = not line["label"] or line["label"] in known
+        known.add(line["label"])
+    if not any(known):
         series[0] |= {"label": chart.y.split(" [")[0], "silent": False}
-    spans = [(one.colour, float(low), float(high)) for one in chart.marks for low, high in one.spans]
+    spans = [(mark.colour, float(low), float(high)) for mark in chart.marks for low, high in mark.spans]
     unit = _UNIT.search(x)
     spec = {
-        "title": chart.title, "y": chart.y, "x": x, "unit": unit[1] if unit else " ", "log": chart.log,
-        "height": round(min(300.0, max(150.0, _PIXELS * chart.height))), "range": [float(end) for end in chart.range],
+        "title": chart.title,
+        "y": chart.y,
+        "x": x,
+        "unit": unit[1] if unit else " ",
+        "log": chart.log,
+        "height": round(min(300.0, max(150.0, _PIXELS_PER_INCH * chart.height))),
+        "range": [float(end) for end in chart.range],
         "series": series,
         "marks": [{"x": low, "colour": colour} for colour, low, high in spans if low == high],
         "shades": [[low, high, colour] for colour, low, high in spans if low < high],
         "keys": [
-            {"label": one.label, "colour": one.colour, "kind": _key(one)}
-            for one in chart.marks if one.label and one.spans
+            {"label": mark.label, "colour": mark.colour, "kind": _kind(mark)}
+            for mark in chart.marks
+            if mark.label and mark.spans
         ],
-    }  # fmt: skip
+    }
     return {"spec": spec, "columns": columns}
 
 
-def _area(one: Interval | Band) -> dict[str, Any]:
-    return {"kind": "band", "colour": one.colour, "label": one.label}
+def _lines(chart: Chart, max_points: int) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The columns of a panel by name, and its lines, intervals and bands, which name their columns."""
+    lines = [(part.x, part.y) for part in chart.series]
+    lines += [(part.x, end) for part in chart.intervals for end in (part.low, part.high)]
+    places, values = _join([_within(*line, *chart.ends) for line in lines], max_points)
+    columns = {"t": _column(places, "x" in chart.log)}
+    columns |= {f"c{i}": _column(column, "y" in chart.log) for i, column in enumerate(values)}
+    series = [look(part) | {"of": f"c{i}"} for i, part in enumerate(chart.series)]
+    for i, interval in enumerate(chart.intervals):
+        k = len(chart.series) + 2 * i
+        series.append(_area(interval) | {"low": f"c{k}", "high": f"c{k + 1}"})
+    for band in chart.bands:
+        is_line = band.low == band.high
+        levels = {"of": band.low} if is_line else {"low": band.low, "high": band.high}
+        names = {key: f"{key}{len(series)}" for key in levels}
+        columns |= {names[key]: [float(v)] * len(places) for key, v in levels.items()}
+        series.append((look(band) if is_line else _area(band)) | names)
+    return columns, series
 
 
-def look(one: Series | Band) -> dict[str, Any]:
-    """How a page draws a line, and its entry in a legend."""
+def _area(part: Interval | Band) -> dict[str, Any]:
+    return {"kind": "band", "colour": part.colour, "label": part.label}
+
+
+def look(part: Series | Band) -> dict[str, Any]:
+    """Look of a line and of its entry in the legend of a page."""
     return {
-        "label": one.label,
-        "colour": one.colour,
-        "width": round(1.1 * one.width, 2),
-        "dash": _DASHES[one.dash],
-        "alpha": getattr(one, "alpha", 1.0),
-        "dots": 1.25 * getattr(one, "dots", 0.0),
+        "label": part.label,
+        "colour": part.colour,
+        "width": round(1.1 * part.width, 2),
+        "dash": _DASHES[part.dash],
+        "alpha": getattr(part, "alpha", 1.0),
+        "dots": 1.25 * getattr(part, "dots", 0.0),
     }
 
 
-def _key(one: Mark) -> str:
-    return "band" if any(low < high for low, high in one.spans) else "known"
+def _kind(mark: Mark) -> str:
+    return "band" if any(low < high for low, high in mark.spans) else "known"
 
 
 def _within(x: Array, y: Array, low: float, high: float) -> tuple[Array, Array]:
@@ -284,36 +326,37 @@ def _within(x: Array, y: Array, low: float, high: float) -> tuple[Array, Array]:
     return x[inside], y[inside]
 
 
-def _join(lines: Sequence[tuple[Array, Array]], most: int) -> tuple[Array, list[Array]]:
-    """All places of thinned lines in order, and each line's values there: infinite where it has no place."""
-    alike = [next(i for i, (other, _) in enumerate(lines) if np.array_equal(other, x)) for x, _ in lines]
-    thin = {}
-    for first in dict.fromkeys(alike):
-        same = [y for i, (_, y) in zip(alike, lines, strict=True) if i == first]
-        thin[first] = np.unique(np.concatenate([style.rows_shown(y, most // len(same)) for y in same]))
-    shown = [(x[thin[i]], y[thin[i]]) for i, (x, y) in zip(alike, lines, strict=True)]
-    places = np.unique(np.concatenate([x for x, _ in shown]))
-    columns = [np.full(len(places), np.inf) for _ in shown]
-    for column, (x, y) in zip(columns, shown, strict=True):
+def _join(lines: Sequence[tuple[Array, Array]], max_points: int) -> tuple[Array, list[Array]]:
+    """All x of thinned lines in order, and each line's values there: infinite where it has no point.
+
+    Lines over the same places are thinned together, so that all keep their peaks.
+    """
+    first = [next(i for i, (other, _) in enumerate(lines) if np.array_equal(other, x)) for x, _ in lines]
+    rows = {}
+    for i in dict.fromkeys(first):
+        together = [y for k, (_, y) in zip(first, lines, strict=True) if k == i]
+        rows[i] = np.unique(
+            np.concatenate([style.rows_shown(y, max_points // len(together)) for y in together])
+        )
+    thinned = [(x[rows[i]], y[rows[i]]) for i, (x, y) in zip(first, lines, strict=True)]
+    places = np.unique(np.concatenate([x for x, _ in thinned]))
+    columns = [np.full(len(places), np.inf) for _ in thinned]
+    for column, (x, y) in zip(columns, thinned, strict=True):
         column[np.searchsorted(places, x)] = y
     return places, columns
 
 
-def _column(values: Array, powers: bool) -> Any:
-    """Packed; on a scale of powers as they are, for there the smallest count as much as the largest."""
-    if not powers:
-        return assets.packed_column(values)
-    known = [None if not v > 0.0 else float(f"{v:.5g}") for v in values.tolist()]
-    return [assets.ABSENT if np.isinf(v) else k for v, k in zip(values, known, strict=True)]
-
-
-def panel_scripts() -> tuple[str, ...]:
-    """Scripts of a page's panels, which are read as JSON from `#panels`, by the id of their element."""
-    return assets.scripts(*assets.CHARTS, "panels.js")
-
-
-def page_figures(figures: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Figures for `page.html`, each an image (`source`) or `panels`, with a caption; and the scripts that they need."""
-    drawn = {str(i): one["panels"] for i, one in enumerate(figures, 1) if "panels" in one}
-    codes = (*assets.scripts(*assets.TABLES), *panel_scripts()) if drawn else assets.scripts(*assets.TABLES)
-    return {"figures": figures, "panels": assets.data(drawn) if drawn else "", "scripts": codes}
+def _column(values: Array, logarithmic: bool) -> list[Any]:
+    """Values for JSON, finer than a screen: None is a gap, `ABSENT` a place that the line does not have."""
+    finite = values[np.isfinite(values)]
+    spread = float(np.ptp(finite)) if len(finite) else 0.0
+    digits = _DIGITS - floor(log10(spread)) if spread else _DIGITS
+    column: list[Any] = []
+    for value, rounded in zip(values.tolist(), np.round(values, digits).tolist(), strict=True):
+        if isinf(value):
+            column.append(ABSENT)
+        elif isnan(value) or (logarithmic and value <= 0.0):
+            column.append(None)
+        else:  # on a logarithmic axis the smallest count as much as the largest
+            column.append(float(f"{value:.5g}") if logarithmic else rounded)
+    return column

@@ -11,13 +11,13 @@ from palpate.records import Record
 from palpate.report.look.assets import DATA, PAIRS
 
 FRAMES = 96
-"""Of a film."""
+"""Number of pictures in a film."""
 Panel = tuple[float, float, float, float]
 """Left, top, width and height of a part of the picture."""
 
 
-def frames_of(record: Record, before: float) -> Indices:
-    """Rows evenly in time, from so many seconds before the first contact to the end."""
+def frame_rows(record: Record, before: float) -> Indices:
+    """Rows evenly in time, from `before` seconds before the first contact to the end."""
     t, pressing = record["t"], record["phase"] == CONTACT
     touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
     start = max(float(t[0]), touch - before)
@@ -25,7 +25,7 @@ def frames_of(record: Record, before: float) -> Indices:
 
 
 def sheet() -> str:
-    """Colours by light and by dark: the pages' own."""
+    """Style sheet with the pages' colours for light and dark."""
     names = ("ink", "quiet", "line", "card")
     light, dark = ("".join(f"--{name}:{PAIRS[name][i]};" for name in names) for i in (0, 1))
     return (
@@ -39,15 +39,15 @@ def sheet() -> str:
     )
 
 
-def film_of(parts: Sequence[str], left: float, width: float, height: float) -> str:
-    """The SVG of a film, from its parts: so much of it from the left."""
+def film_svg(parts: Sequence[str], left: float, width: float, height: float) -> str:
+    """The SVG of a film from its parts; `left`, `width` and `height` bound the picture."""
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left:g} 0 {width:g} {height:g}">'
     return "\n".join([head, "<!-- Made by palpate -->", f"<style>{sheet()}</style>", *parts, "</svg>\n"])
 
 
 @dataclass(frozen=True)
 class FilmView:
-    """Where a point of the base's axes is drawn."""
+    """A parallel projection from the base's axes into the picture."""
 
     right: Array
     up: Array
@@ -60,19 +60,19 @@ class FilmView:
 
 
 def trace_panel(t: Array, value: Array, known: Array, panel: Panel, words: str) -> list[str]:
-    """A value over the film's time [s] and where it now is, beside what is desired or true; words above it."""
+    """A moving dot on a value over the film's time [s], beside the desired or true value; words above."""
     left, top, width, height = panel
     seconds = float(t[-1] - t[0])
-    most = 1.1 * max(float(value.max()), float(known.max()), 1e-9)
+    top_value = 1.1 * max(float(value.max()), float(known.max()), 1e-9)
     x = left + width * (t - t[0]) / max(seconds, 1e-9)
-    line, asked = (np.column_stack([x, top + height * (1.0 - v / most)]) for v in (value, known))
+    line, desired = (np.column_stack([x, top + height * (1.0 - v / top_value)]) for v in (value, known))
     across, along = (
         animation(name, [f"{v:.1f}" for v in values], seconds)
         for name, values in zip(("cx", "cy"), line.T, strict=True)
     )
     return [
         f'<path class="flat" d="M{left:g} {top + height:g}h{width:g}"/>',
-        f'<polyline class="want" points="{coordinates(asked)}"/>',
+        f'<polyline class="want" points="{coordinates(desired)}"/>',
         f'<polyline class="force" points="{coordinates(line)}"/>',
         f'<circle class="dot" r="5" cx="{x[0]:.1f}" cy="{line[0, 1]:.1f}">{across}{along}</circle>',
         text(left, top - 8, words),
@@ -85,31 +85,33 @@ def text(x: float, y: float, words: str) -> str:
 
 
 def animation(name: str, values: Sequence[str], seconds: float) -> str:
-    """An attribute that takes values one after the other, again and again."""
+    """An attribute that runs through values in a loop."""
     return (
         f'<animate attributeName="{name}" dur="{max(seconds, 0.1):.3f}s" repeatCount="indefinite" '
         f'values="{";".join(values)}"/>'
     )
 
 
-def view_of(points: Array, panel: Panel, azimuth: float, low: float) -> FilmView:
-    """From where an eye sees points in a panel, as large as it allows.
+def fit_view(points: Array, panel: Panel, azimuth: float, elevation: float) -> FilmView:
+    """The projection that shows points in a panel, as large as it allows.
 
     Args:
         points: shape (n, 3).
         panel: of the picture.
         azimuth: of the eye about the base's z [rad].
-        low: angle above the base's xy plane [rad].
+        elevation: angle above the base's xy plane [rad].
     """
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    towards = np.array([np.cos(azimuth) * np.cos(low), np.sin(azimuth) * np.cos(low), np.sin(low)])
+    towards = np.array(
+        [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
+    )
     up = np.cross(towards, right)
     flat = np.column_stack([points @ right, -(points @ up)])
-    least, most = flat.min(axis=0), flat.max(axis=0)
+    lowest, high = flat.min(axis=0), flat.max(axis=0)
     left, top, width, height = panel
-    scale = float(min(width / max(most[0] - least[0], 1e-6), height / max(most[1] - least[1], 1e-6))) * 0.9
+    scale = float(min(width / max(high[0] - lowest[0], 1e-6), height / max(high[1] - lowest[1], 1e-6))) * 0.9
     middle = np.array([left + 0.5 * width, top + 0.5 * height])
-    return FilmView(right, up, scale, middle - scale * 0.5 * (least + most))
+    return FilmView(right, up, scale, middle - scale * 0.5 * (lowest + high))
 
 
 def coordinates(points: Array) -> str:

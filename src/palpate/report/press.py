@@ -1,5 +1,6 @@
 """The report of a press: tables, a film, figures, one page."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +9,14 @@ import numpy as np
 from palpate.arrays import Array, Indices
 from palpate.bench.summary import CONTACT
 from palpate.files import write_text
-from palpate.identification.uncertainty import Verdict
-from palpate.press.pressing import Asked
 from palpate.press.setting import Place
+from palpate.press.summary import PressRequest
 from palpate.records import Record
-from palpate.report import page, style
-from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
-from palpate.report.film import animation, coordinates, film_of, frames_of, text, trace_panel, view_of
-from palpate.report.identification.page import TONES
-from palpate.report.identification.words import CALLED
-from palpate.report.run.table import alert_line, alerts, force_cards, settling, surface_table
+from palpate.report import style
+from palpate.report.chart import KNOWN, Band, Chart, Series, build_figure, panels
+from palpate.report.film import animation, coordinates, film_svg, fit_view, frame_rows, text, trace_panel
+from palpate.report.page import Answer, Table, answer_page, data_address, warning_alerts
+from palpate.report.run.table import alert_line, alerts, settling, surface_table
 from palpate.report.run.table import sentence as outcome
 from palpate.robots.serial.serial_arm import SerialArm
 from palpate.units import NONE, plain, quantity
@@ -37,44 +36,36 @@ _MARKER = (
 )
 
 
-def film(record: Record, arm: SerialArm, place: Place, half: str = "") -> str:
-    """The film of a press.
-
-    Args:
-        record: of the press.
-        arm: what moved.
-        place: where.
-        half: `arm` or `tip` for that half alone, which is legible on a telephone; both if empty.
-    """
-    rows = frames_of(record, _BEFORE)
+def film(record: Record, arm: SerialArm, place: Place) -> str:
+    """The film of a press as SVG: the arm to scale, its tip in the surface, and the force."""
+    rows = frame_rows(record, _BEFORE)
     seconds = float(record["t"][rows[-1]] - record["t"][rows[0]])
     q = np.column_stack([record[f"q{i}"] for i in range(1, arm.joints + 1)])[rows]
-    left, width = {"": (0.0, _WIDE), "arm": (0.0, _TIP[0] - 20.0), "tip": (_TIP[0] - 20.0, _TIP[2] + 40.0)}[
-        half
+    t, force, desired = (record[name][rows] for name in ("t", "force", "force_desired"))
+    words = f"force and desired force, up to {float(force.max()):.3g} N in {seconds:.3g} s"
+    parts = [
+        *_arm_panel(arm, place, q, seconds),
+        *_tip_panel(record, rows, seconds),
+        *trace_panel(t, force, desired, _FORCE, words),
     ]
-    parts = _arm_panel(arm, place, q, seconds) if half != "tip" else []
-    if half != "arm":
-        t, force, wanted = (record[name][rows] for name in ("t", "force", "force_desired"))
-        words = f"force and desired force, up to {float(force.max()):.3g} N in {seconds:.3g} s"
-        parts += [*_tip_panel(record, rows, seconds), *trace_panel(t, force, wanted, _FORCE, words)]
-    return film_of(parts, left, width, _HIGH)
+    return film_svg(parts, 0.0, _WIDE, _HIGH)
 
 
 def _arm_panel(arm: SerialArm, place: Place, q: Array, seconds: float) -> list[str]:
-    bones = [arm.joint_places(one) for one in q]
+    bones = [arm.joint_places(angles) for angles in q]
     patch = _patch(place, 0.16)
     ground = np.column_stack([bones[0][:, :2], 0.0 * bones[0][:, 2]])
     shown = np.vstack([bones[0], bones[-1], patch, ground])
     reach = shown.mean(axis=0)  # seen from the side of where the arm reaches, a little from above
-    view = view_of(shown, _ARM, float(np.arctan2(reach[1], reach[0])) - np.radians(60.0), np.radians(18.0))
-    seen = [view(b) for b in bones]
-    moving = animation("points", [coordinates(s) for s in seen], seconds)
+    view = fit_view(shown, _ARM, float(np.arctan2(reach[1], reach[0])) - np.radians(60.0), np.radians(18.0))
+    pictures = [view(points) for points in bones]
+    moving = animation("points", [coordinates(points) for points in pictures], seconds)
     return [
         f'<polygon class="surface" points="{coordinates(view(patch))}" fill-opacity="0.55"/>',
         f'<polyline class="shadow" points="{coordinates(view(ground))}"/>',
         _MARKER,
         '<polyline class="arm" marker-start="url(#joint)" marker-mid="url(#joint)" ',
-        f'points="{coordinates(seen[0])}">{moving}</polyline>',
+        f'points="{coordinates(pictures[0])}">{moving}</polyline>',
         text(_ARM[0], _HIGH - 8, "the arm, to scale"),
     ]
 
@@ -83,8 +74,8 @@ def _tip_panel(record: Record, rows: Indices, seconds: float) -> list[str]:
     """The tip along the normal, drawn so large that its way is seen."""
     left, top, width, height = _TIP
     depth = record["penetration"][rows]
-    most = float(np.max(np.abs(depth))) or 1e-3
-    middle, y0, scale = left + 0.5 * width, top + 0.45 * height, 0.4 * height / most
+    deepest = float(np.max(np.abs(depth))) or 1e-3
+    middle, y0, scale = left + 0.5 * width, top + 0.45 * height, 0.4 * height / deepest
     places = y0 + scale * depth
     dents = [_dent(left, width, y0, max(float(p) - y0, 0.0), top + height) for p in places]
     probes = [
@@ -111,113 +102,85 @@ def _patch(place: Place, half: float) -> Array:
     return np.array([centre + u + v, centre + u - v, centre - u - v, centre - u + v])
 
 
-def write_report(record: Record, asked: Asked, summary: dict[str, Any], folder: Path) -> None:
-    """Writes figures, film.svg and report.html into a folder."""
-    figures = []
-    for name, (charts, caption) in charts_of(record, asked).items():
-        style.save(figure_of(charts, 3 if name == "torque" else 1), folder / f"{name}.png")
-        figures.append({"panels": panels(charts), "caption": caption})
-    write_text(folder / "film.svg", film(record, asked.arm, asked.place))
-    captions = {
-        "arm": "The arm, to scale, in real time.",
-        "tip": "The tip, its motion enlarged; and the force.",
-    }
-    halves = [
-        {
-            "source": page.data_address(film(record, asked.arm, asked.place, half).encode(), "image/svg+xml"),
-            "caption": told,
-        }
-        for half, told in captions.items()
+def write_report(record: Record, request: PressRequest, summary: dict[str, Any], folder: Path) -> None:
+    """Write figures, film.svg and report.html into a folder."""
+    moving = film(record, request.arm, request.place)
+    write_text(folder / "film.svg", moving)
+    source = data_address(moving.encode(), "image/svg+xml")
+    figures: list[dict[str, Any]] = [
+        {"source": source, "caption": "The press in real time; the motion of the tip is enlarged."}
     ]
-    loop, parameters = summary["loop"], (summary["identified"] or {}).get("parameters", {})
-    contact = summary["force"] is not None
-    wanted = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
-    answer = page.PageAnswer(
-        title=f"A press of {asked.arm.title}{wanted}",
-        sentence=sentence(summary, parameters),
-        about=f"{asked.arm.title}, {asked.gains.arm.kind}s at {loop['rate_hz']:g} Hz, {asked.controller} control, "
-        f"{'MuJoCo' if asked.physics == 'mujoco' else 'own'} physics, simulated, seed {asked.seed}.",
-        alerts=_alerts(summary),
-        cards={
-            "": force_cards(summary) if contact else [],
-            "The surface, by palpate identify": _surface(parameters, summary["truth"]),
-        },
-        pairs=halves,
-        figures=figures if contact else (),
-        folds=[(table.title, "all numbers", table.rows) for table in tables(summary)],
+    charts = build_charts(record, request)
+    for name, (panel_charts, caption) in charts.items():
+        style.save(build_figure(panel_charts, 3 if name == "torque" else 1), folder / f"{name}.png")
+        figures.append({"panels": panels(panel_charts), "caption": caption})
+    contact, loop = summary["force"] is not None, summary["loop"]
+    force_words = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
+    physics = "MuJoCo" if request.physics == "mujoco" else "own"
+    page = replace(
+        build_answer(request.arm.title, summary),
+        title=f"A press of {request.arm.title}{force_words}",
+        about=f"{request.arm.title}, {request.gains.arm.kind}s at {loop['rate_hz']:g} Hz, "
+        f"{request.controller} control, {physics} physics, simulated, seed {request.seed}.",
+        alerts=[*alerts(summary), *warning_alerts(_further_notes(summary))],
+        figures=figures if contact else figures[:1],
     )
-    write_text(folder / "report.html", page.answer_page(answer, room="press", command=summary["command"]))
+    write_text(folder / "report.html", answer_page(page, room="press", command=summary["command"]))
 
 
-def sentence(summary: dict[str, Any], parameters: dict[str, Any]) -> str:
-    """How the force went, and the stiffness that was identified."""
-    found = parameters.get("K")
-    if found is None or found["value"] is None or not found["ci95"]:
+def sentence(summary: dict[str, Any]) -> str:
+    """Outcome of the press, and the identified stiffness."""
+    stiffness = _parameters(summary).get("K")
+    if stiffness is None or stiffness["value"] is None or not stiffness["ci95"]:
         return outcome(summary)
-    half = 0.5 * (found["ci95"][1] - found["ci95"][0])
-    return f"{outcome(summary)} The stiffness of the surface is {quantity(found['value'], 'N/m', half)}."
+    half = 0.5 * (stiffness["ci95"][1] - stiffness["ci95"][0])
+    return f"{outcome(summary)} The stiffness of the surface is {quantity(stiffness['value'], 'N/m', half)}."
 
 
-def _surface(found: dict[str, Any], truth: dict[str, Any]) -> list[page.Card]:
-    """A card a parameter: value, verdict, its limit, and the truth of the simulation."""
-    cards = []
-    for name in (name for name in ("K", "B", "M") if name in found):
-        p, number, unit, half = found[name], "", "", ""
-        known = f" Truth: {quantity(truth[name]['value'], p['unit'])}." if name in truth else ""
-        if p["value"] is not None and p["ci95"]:
-            text = quantity(p["value"], p["unit"], 0.5 * (p["ci95"][1] - p["ci95"][0]))
-            number, _, rest = text.partition(" ± ")
-            half, _, unit = rest.partition(" ")
-        why, tone = f"{p['reason']}.{known}", TONES[Verdict(p["verdict"])]
-        cards.append(page.Card(f"{name}, {CALLED[name]}", number, unit, half, why, tone, p["verdict"], name))
-    return cards
-
-
-def _alerts(summary: dict[str, Any]) -> list[dict[str, str]]:
-    """Failures first, then the notes of the press."""
-    shown = alerts(summary)
-    told = {alert_line(alert) for alert in shown}
-    return [*shown, *page.warning_alerts(note for note in notes(summary) if note not in told)]
+def _parameters(summary: dict[str, Any]) -> dict[str, Any]:
+    """The identified parameters, as JSON has them; none where nothing was identified."""
+    parameters: dict[str, Any] = (summary["identified"] or {}).get("parameters", {})
+    return parameters
 
 
 def notes(summary: dict[str, Any]) -> list[str]:
-    """Warnings of the page."""
-    found = [alert_line(alert) for alert in alerts(summary)]
+    """Warnings of the press, the failures first."""
+    return [*map(alert_line, alerts(summary)), *_further_notes(summary)]
+
+
+def _further_notes(summary: dict[str, Any]) -> list[str]:
+    remarks = []
     if summary["sensor_saturated"]:
-        share = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
-        found.append(f"The force sensor was saturated in {share}: its reading is not the force.")
+        ticks = f"{100 * summary['sensor_saturated']:.2g} % of the ticks"
+        remarks.append(f"The force sensor was saturated in {ticks}: its reading is not the force.")
     identified = summary["identified"] or {}
-    found += [note["text"][0].upper() + note["text"][1:] + "." for note in _of_tool(identified)]
+    of_tool = [note["text"] for note in identified.get("warnings", ()) if note["code"] == "tool-inertia"]
     if identified.get("why_not"):
-        found.append(f"Nothing was identified: {identified['why_not']}.")
-    return [*found, *(f"{note[0].upper()}{note[1:]}." for note in summary["notes"])]
+        of_tool.append(f"Nothing was identified: {identified['why_not']}")
+    return [*remarks, *(f"{text[0].upper()}{text[1:]}." for text in (*of_tool, *summary["notes"]))]
 
 
-def _of_tool(identified: dict[str, Any]) -> list[dict[str, Any]]:
-    """Warnings that a tool's inertia is the cause of."""
-    return [note for note in identified.get("warnings", ()) if note["code"] == "tool-inertia"]
-
-
-def tables(summary: dict[str, Any]) -> list[page.Table]:
-    """Force first, then what was identified."""
+def tables(summary: dict[str, Any]) -> list[Table]:
+    """The force, then the identified surface."""
     if summary["force"] is None:
         return []
-    found = (summary["identified"] or {}).get("parameters", {})
-    surface = surface_table("The surface, by palpate identify", found, summary["truth"])
-    return [_force_table(summary), *([surface] if found else [])]
+    parameters = _parameters(summary)
+    surface = surface_table("The surface, by palpate identify", parameters, summary["truth"])
+    return [_force_table(summary), *([surface] if parameters else [])]
 
 
-def answer_of(title: str, summary: dict[str, Any]) -> page.CommandAnswer:
+def build_answer(title: str, summary: dict[str, Any]) -> Answer:
     """The answer of a press by the arm of this title."""
-    found = (summary["identified"] or {}).get("parameters", {})
-    head = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated"
-    said = f"{head}\n{sentence(summary, found)}"
-    return page.CommandAnswer(summary, title, said, tables(summary), notes(summary))
+    context = f", seed {summary['seed']}, {summary['duration_s']:.1f} s simulated\n"
+    answer_sentence, answer_tables = sentence(summary), tables(summary)
+    return Answer(
+        summary, title, context=context, sentence=answer_sentence, tables=answer_tables, notes=notes(summary)
+    )
 
 
-def _force_table(summary: dict[str, Any]) -> page.Table:
+def _force_table(summary: dict[str, Any]) -> Table:
     f, loop = summary["force"], summary["loop"]
-    return page.Table(
+    return Table(
         "Force",
         ("", "value"),
         (
@@ -233,7 +196,7 @@ def _force_table(summary: dict[str, Any]) -> page.Table:
     )
 
 
-def charts_of(record: Record, asked: Asked) -> dict[str, tuple[list[Chart], str]]:
+def build_charts(record: Record, request: PressRequest) -> dict[str, tuple[list[Chart], str]]:
     """Charts of a press and their caption, by the name of their figure."""
     t, pressing = record["t"], record["phase"] == CONTACT
     touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
@@ -245,7 +208,7 @@ def charts_of(record: Record, asked: Asked) -> dict[str, tuple[list[Chart], str]
     near = (max(touch - 0.1, float(t[0])), min(touch + 0.5, float(t[-1])))
     depths = [
         Series(t, 1e3 * record["penetration"], "F", "true", 1.4),
-        Series(t, 1e3 * (record["x_measured"] - asked.place.place), "measured", "by the encoders", 1.0),
+        Series(t, 1e3 * (record["x_measured"] - request.place.place), "measured", "by the encoders", 1.0),
     ]
     depth = Chart("depth [mm]", depths, [Band(0.0, 0.0, "quiet")], x="time [s]", height=2.1)
     return {
@@ -257,13 +220,13 @@ def charts_of(record: Record, asked: Asked) -> dict[str, tuple[list[Chart], str]
             [Chart("force [N]", forces, height=2.1), depth],
             "Force and depth of the tip. Encoders before elastic joints measure their deflection, too.",
         ),
-        "torque": (_torques(record, asked), "Torque of each joint, the arm's weight included."),
+        "torque": (_torques(record, request), "Torque of each joint, the arm's weight included."),
     }
 
 
-def _torques(record: Record, asked: Asked) -> list[Chart]:
+def _torques(record: Record, request: PressRequest) -> list[Chart]:
     """A chart a joint, in per cent of its motor's limit; in N m where nobody says how much that is."""
-    limits = np.asarray(asked.arm.torque, dtype=float)
+    limits = np.asarray(request.arm.torque, dtype=float)
     known = bool(np.isfinite(limits).all())
     scales = 100.0 / limits if known else np.ones(len(limits))
     return [
@@ -271,7 +234,10 @@ def _torques(record: Record, asked: Asked) -> list[Chart]:
             "of the limit [%]" if known else "torque [N m]",
             [Series(record["t"], scale * record[f"torque{i}"], "ink", width=1.2)],
             [Band(end, end, "measured", "", 1.0, "--") for end in ((-100.0, 100.0) if known else ())],
-            x="time [s]", title=name, ylim=(-110.0, 110.0) if known else None, height=1.9,
+            x="time [s]",
+            title=name,
+            ylim=(-110.0, 110.0) if known else None,
+            height=1.9,
         )
-        for i, (name, scale) in enumerate(zip(asked.arm.names, scales, strict=False), 1)
-    ]  # fmt: skip
+        for i, (name, scale) in enumerate(zip(request.arm.names, scales, strict=False), 1)
+    ]

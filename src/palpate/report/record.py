@@ -1,7 +1,8 @@
-"""A record in Python: its columns in a line each, drawn over time, and as a page."""
+"""A record in Python: a line for each column, and a chart over time."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,24 +10,23 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.records import Record
-from palpate.report.chart import Chart, Series, figure_of, panels
-from palpate.report.page import PageAnswer, Table, answer_page, as_html, as_text
+from palpate.report.chart import Chart, Series, build_figure, panels
+from palpate.report.page import Answer, Table, answer_page
 from palpate.report.style import with_peaks
 from palpate.text import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEAD = ("column", "unit", "least", "mean", "largest", "missing")
 _TIMES = ("time", "t")
-_DRAWN = 12
+_MAX_COLUMNS = 12
 """Columns of a figure; more are not legible."""
 _POINTS = 4000
-"""Points of a line, about: what is more is drawn by its extremes."""
+"""Points of a line, about; longer columns are drawn by their extremes."""
 
 
 def line(record: Record) -> str:
-    """How many columns and rows, which time, from where."""
+    """Number of columns and rows, range of the time, source."""
     count, clock = len(record), _clock(record)
     columns = (
         f"{len(record.columns)} column{'s' * (len(record.columns) != 1)} of {count} row{'s' * (count != 1)}"
@@ -37,29 +37,21 @@ def line(record: Record) -> str:
     return printable(f"{columns}{span}{named}")
 
 
-def text(record: Record) -> str:
-    """A line on the whole, and one a column."""
-    return as_text(f"Record: {line(record)}", [HEAD, *rows(record)])
-
-
-def html(record: Record) -> str:
-    """The same as a table."""
-    return as_html(f"Record: {line(record)}", [HEAD, *rows(record)])
-
-
-def rows(record: Record) -> list[tuple[str, ...]]:
+def build_answer(record: Record) -> Answer:
     """Name, unit, extremes and mean of each column, and how many of its values are missing."""
-    return [
+    rows = [
         (printable(name), printable(record.units[name]), *_numbers(np.asarray(column)))
         for name, column in record.columns.items()
     ]
+    head = ("column", "unit", "least", "mean", "largest", "missing")
+    return Answer(title="Record", sentence=line(record), tables=[Table("", head, rows)])
 
 
 def _numbers(column: Array) -> tuple[str, ...]:
     finite = column[np.isfinite(column)]
     figures = (finite.min(), finite.mean(), finite.max()) if len(finite) else ()
-    told = [f"{float(number):.5g}" for number in figures] or ["-"] * 3
-    return (*told, str(len(column) - len(finite)))
+    texts = [f"{float(number):.5g}" for number in figures] or ["-"] * 3
+    return (*texts, str(len(column) - len(finite)))
 
 
 def _clock(record: Record) -> str | None:
@@ -72,34 +64,31 @@ def draw(record: Record) -> Figure:
     Raises:
         InputError: there is nothing to draw.
     """
-    charts = charts_of(record)
+    charts = build_charts(record)
     if not charts:
         raise InputError("this record has no numeric column besides its time; there is nothing to draw")
-    return figure_of(charts)
+    return build_figure(charts)
 
 
-def charts_of(record: Record) -> list[Chart]:
-    """A chart a column, of the first twelve that have numbers."""
+def build_charts(record: Record) -> list[Chart]:
+    """A chart for each of the first twelve columns that have numbers."""
     clock = _clock(record)
-    names = [name for name in record.columns if name != clock and np.isfinite(record[name]).any()][:_DRAWN]
+    names = [name for name in record.columns if name != clock and np.isfinite(record[name]).any()]
     time = record[clock] if clock else np.arange(len(record), dtype=float)
     return [
         Chart(
-            f"{name} [{record.units[name]}]", [Series(*with_peaks(time, record[name], _POINTS), "s0", width=0.9)],
-            x="time [s]" if clock else "row", height=1.6,
+            f"{name} [{record.units[name]}]",
+            [Series(*with_peaks(time, record[name], _POINTS), "s0", width=0.9)],
+            x="time [s]" if clock else "row",
+            height=1.6,
         )
-        for name in names
-    ]  # fmt: skip
+        for name in names[:_MAX_COLUMNS]
+    ]
 
 
 def page(record: Record) -> str:
-    """The table and the figure as a page."""
-    charts = charts_of(record)
-    first = f"Its first {_DRAWN} columns" if len(record.columns) > _DRAWN else "Its columns"
-    answer = PageAnswer(
-        title="A record",
-        sentence=line(record),
-        tables=[Table("Columns", HEAD, rows(record))],
-        figures=[{"panels": panels(charts), "caption": f"{first} over time."}] if charts else (),
-    )
+    """The table and the charts as a page."""
+    charts = build_charts(record)
+    figures = [{"panels": panels(charts), "caption": "Columns over time."}] if charts else []
+    answer = replace(build_answer(record), figures=figures)
     return answer_page(answer, room="record", command="palpate.read_log(...).report(...)")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.arrays import Array, Indices, Mask
+from palpate.arrays import Array, Indices
 from palpate.errors import InputError
 from palpate.files import SIGNATURE, whole
 from palpate.report.look import assets
@@ -29,47 +29,37 @@ if TYPE_CHECKING:
 _BY_DARK = dict(PAIRS[name] for name in ("ink", "quiet", "grid", "line", "card"))
 
 
-def with_peaks(x: Array, values: Array, most: int) -> tuple[Array, Array]:
-    """A line through values over x, of about so many points that keep its peaks."""
-    rows = rows_shown(values, most)
+def with_peaks(x: Array, values: Array, max_points: int) -> tuple[Array, Array]:
+    """Thin a line through values over x to about `max_points` points that keep its peaks."""
+    rows = rows_shown(values, max_points)
     return x[rows], values[rows]
 
 
-def rows_shown(values: Array, most: int, dense: Mask | None = None) -> Indices:
-    """Rows to be shown, in order: of every stretch those with the smallest and the largest value.
+def rows_shown(values: Array, max_rows: int) -> Indices:
+    """Rows to draw, in order: the smallest and the largest value of every stretch.
 
     Args:
-        values: that must keep their peaks, shape (n,); NaN are passed over.
-        most: rows, about.
-        dense: rows of which half of all that are shown are to be, shape (n,).
+        values: whose peaks stay, shape (n,); NaN are skipped.
+        max_rows: approximate number of rows.
     """
     n = len(values)
-    if n <= most:
+    if n <= max_rows:
         return np.arange(n)
-    if dense is not None and dense.any() and not dense.all():
-        inside, outside = np.flatnonzero(dense), np.flatnonzero(~dense)
-        share = max(most // 2, most - len(outside))
-        parts = [
-            inside[rows_shown(values[inside], share)],
-            outside[rows_shown(values[outside], most - min(share, len(inside)))],
-        ]
-        return np.unique(np.concatenate(parts))
-    edges = np.linspace(0, n, max(most // 2, 1) + 1).astype(int)
-    kept = [0, n - 1]
-    for a, b in pairwise(edges):
-        piece = values[a:b]
+    edges = np.linspace(0, n, max(max_rows // 2, 1) + 1).astype(int)
+    rows = [0, n - 1]
+    for start, end in pairwise(edges):
+        piece = values[start:end]
         if len(piece) and np.isfinite(piece).any():
-            kept += [a + int(np.nanargmin(piece)), a + int(np.nanargmax(piece))]
+            rows += [start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))]
         elif len(piece):
-            kept.append(a)
-    return np.unique(kept)
+            rows.append(start)
+    return np.unique(rows)
 
 
-def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
+def svg(drawing: Figure, *, signed: bool = False) -> bytes:
     """The figure without a background, its colours turned where the reader's page is dark; needs no other file.
 
-    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be. `tight`
-    leaves out what is empty around it.
+    The same figure gives the same bytes. A file of its own is `signed`; what lies in a page need not be.
     """
     import matplotlib
 
@@ -77,8 +67,7 @@ def svg(drawing: Figure, *, signed: bool = False, tight: bool = False) -> bytes:
     with matplotlib.rc_context(
         {"svg.hashsalt": "palpate", "svg.fonttype": "none", "path.simplify_threshold": 0.3}
     ):
-        within = {"bbox_inches": "tight", "pad_inches": 0.04} if tight else {}
-        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None}, **within)
+        drawing.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*", "", text, flags=re.DOTALL)
@@ -102,7 +91,7 @@ def _sheet(names: dict[str, str]) -> str:
 INK, QUIET, GRID, LINE, CARD = (PAIRS[name][0] for name in ("ink", "quiet", "grid", "line", "card"))
 K, B, M, F = (DATA[name] for name in ("K", "B", "M", "F"))
 """One colour a quantity, the same by light and by dark: stiffness, damping, mass; true force and contact."""
-MEASURED, FAIL, DOUBT, OK = (DATA[name] for name in ("measured", "fail", "warn", "ok"))
+MEASURED, FAIL, OK = (DATA[name] for name in ("measured", "fail", "ok"))
 SERIES = tuple(assets.SERIES.values())
 """Colours of compared series that are no quantity."""
 KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4))}
@@ -110,17 +99,13 @@ KNOWN: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (5, 4)
 FORMATS = (".png", ".svg", ".pdf")
 DPI = 110
 _COARSEST, _FINEST = 30, 1200
-_NARROW = 5.6
-"""Inches under which a legend does not fit on one line."""
-_LONG = 15
-"""Letters of a label of which no three stand beside each other there."""
 
 
 @contextmanager
 def ink(size: float | None = None) -> Iterator[None]:
-    """Letters, ticks and frames of what is drawn inside are in ink, not in black, so that a page can turn them.
+    """Draw letters, ticks and frames in ink instead of black, so that a dark page can turn them.
 
-    What is given no colour takes those of `SERIES` in turn.
+    Lines without a colour take those of `SERIES` in turn.
 
     Args:
         size: of the letters [pt]; matplotlib's own if none is given.
@@ -167,36 +152,16 @@ def plain(axis: Axes) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def panel(axis: Axes, quantity: str, below: str = "") -> Axes:
-    """An instrument's face: no frame, a light grid, the quantity lying above the axis, the other at its lower right."""
-    axis.grid(visible=True, color=GRID, linewidth=0.8)
-    axis.set_axisbelow(True)
-    axis.spines[:].set_visible(False)
-    axis.tick_params(length=0, which="both", labelcolor=QUIET)
-    axis.annotate(
-        quantity,
-        (0, 1),
-        (0, 5),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        color=QUIET,
-        va="bottom",
-    )
-    if below:
-        axis.set_xlabel(below, loc="right", color=QUIET)
-    return axis
-
-
 def logarithmic(axis: Axes, which: str) -> None:
     """Powers of ten along `x` or `y` as plain numbers, with steps between where they are few; limits first."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     axis.set(**{f"{which}scale": "log"})
-    own = axis.xaxis if which == "x" else axis.yaxis
+    scale = axis.xaxis if which == "x" else axis.yaxis
     low, high = axis.get_xlim() if which == "x" else axis.get_ylim()
-    own.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0)))
-    own.set_major_formatter("{x:g}")
-    own.set_minor_formatter(NullFormatter())
+    scale.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0)))
+    scale.set_major_formatter("{x:g}")
+    scale.set_minor_formatter(NullFormatter())
 
 
 def legend(axis: Axes, **options: Any) -> None:
@@ -205,40 +170,13 @@ def legend(axis: Axes, **options: Any) -> None:
     axis.legend(fontsize=8.5, borderaxespad=0.2, **options)
 
 
-def legend_above(axis: Axes) -> None:
-    """The legend over the line of the quantity, in rows where the panel is narrow."""
-    import matplotlib
-    from matplotlib.transforms import ScaledTranslation
-
-    handles, labels = axis.get_legend_handles_labels()
-    lift = 8 + 1.2 * float(matplotlib.rcParams["font.size"])
-    if not handles:
-        return
-    drawing = axis.figure.get_figure(root=True)
-    assert drawing is not None
-    above = axis.transAxes + ScaledTranslation(0, lift / 72, drawing.dpi_scale_trans)
-    narrow = drawing.get_figwidth() < _NARROW
-    axis.legend(
-        loc="lower left" if narrow else "lower right",
-        bbox_to_anchor=(0.0 if narrow else 1.0, 1.0),
-        bbox_transform=above,
-        ncols=6 if not narrow else 3 if max(map(len, labels)) < _LONG else 2,
-        frameon=False,
-        borderaxespad=0.0,
-        borderpad=0.0,
-        handlelength=1.5,
-        columnspacing=1.2,
-        labelcolor=QUIET,
-    )
-
-
 def literal(text: str) -> str:
     """A text from outside as it is to be drawn: dollars are dollars, not formulas."""
     return printable(text).replace("$", r"\$")
 
 
 def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:
-    """Writes the figure, the file there whole or not at all.
+    """Write the figure atomically.
 
     Args:
         drawing: the figure.
@@ -263,7 +201,7 @@ def save(drawing: Figure, path: Path, dpi: int | None = None) -> Path:
 
 
 def check_dpi(dpi: int | None) -> None:
-    """Refuses a resolution of which no picture can be made, or none that fits into memory.
+    """Refuse a resolution that makes no picture, or one too large for the memory.
 
     Raises:
         InputError: it is one.
@@ -273,7 +211,7 @@ def check_dpi(dpi: int | None) -> None:
 
 
 def _spell_out(drawing: Figure) -> None:
-    """A label of the user's that is no formula is drawn as it is written."""
+    """Draw a user's label as it is written if it is no formula."""
     from matplotlib.mathtext import MathTextParser
 
     for text in _labels(drawing):
@@ -291,7 +229,7 @@ def _labels(drawing: Figure) -> Iterator[Text]:
     yield from drawing.texts
     for axis in drawing.axes:
         yield from (axis.xaxis.label, axis.yaxis.label)
-        yield from (one for one in axis.get_children() if isinstance(one, Text))
+        yield from (child for child in axis.get_children() if isinstance(child, Text))
         legend = axis.get_legend()
         if legend is not None:
             yield from legend.get_texts()

@@ -3,143 +3,230 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import inf, isfinite
+from dataclasses import replace
+from math import ceil, floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 
-from palpate.force.describe import UNCOVERED, sentence
+from palpate.force.describe import UNCOVERED, claim_scope, claim_title
 from palpate.force.expected import BAND, OVERSHOOT, STIFFENING_AT, settling_bound, stiffening
 from palpate.force.tuning import RIGID, Tuning
-from palpate.report import page as pages
-from palpate.report.chart import KNOWN, Band, Chart, Series, figure_of, panels
+from palpate.report.chart import KNOWN, Band, Chart, Mark, Series, build_figure, panels
+from palpate.report.page import Answer, Table, answer_page
 from palpate.text import print_hanging, printable
-from palpate.units import plain, quantity, quantity_between
+from palpate.units import plain, quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import Console
 
 
-def rows(told: Tuning) -> list[tuple[str, str]]:
+def rows(tuning: Tuning) -> list[tuple[str, str]]:
     """Results as pairs of name and value."""
-    gains, arm = told.gains, told.gains.arm
-    slowest = max(step.settling for step in told.steps)
-    (low, high), at = told.exact, told.margins
-    found = [
+    gains, arm = tuning.gains, tuning.gains.arm
+    slowest = _slowest(tuning)
+    (low, high), at = tuning.exact, tuning.margins
+    pairs = [
         ("arm", f"{arm.title} ({arm.kind}, {arm.rate:g} Hz)"),
         ("lag theta", f"{1e3 * gains.theta:.3g} ms"),
         ("force", f"{gains.force:g} N"),
         ("stiffest surface", f"{gains.cap:.4g} N/m (K + B/theta)"),
         ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
         ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
-        ("peak at touch", _peak(told)),
+        ("peak at touch", _peak(tuning)),
         ("settling", f"{slowest:.3g} s with known stiffness" if isfinite(slowest) else "-"),
-        ("overshoot", f"{100 * told.overshoot:.2g} % with known stiffness"),
+        ("overshoot", f"{100 * tuning.overshoot:.2g} % with known stiffness"),
         ("margins", f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms"),
         ("stable, exact", f"{low:.4g} to {high:.4g} N/m with constant gain, B = 0"),
     ]
-    found += [("first touches", _domain(told)), ("stiffening", _stiffening(told))]
-    if told.known is not None:
-        a, b = told.known.stiffness
-        source = "given" if told.known.source == "told" else told.known.source
-        found.append(("surface", f"{a:.4g} to {b:.4g} N/m ({source})"))
-    found += [("proved", sentence(c, gains)) for c in told.certificate.claims] or [("proved", "nothing")]
-    return found
+    pairs += [("first touches", _domain(tuning)), ("stiffening", _stiffening(tuning))]
+    if tuning.known is not None:
+        a, b = tuning.known.stiffness
+        source = "given" if tuning.known.source == "told" else tuning.known.source
+        pairs.append(("surface", f"{a:.4g} to {b:.4g} N/m ({source})"))
+    proved = [f"{claim_title(c)}: {claim_scope(c, gains)}" for c in tuning.certificate.claims]
+    return [*pairs, *(("proved", text) for text in proved or ["nothing"])]
 
 
-def _domain(told: Tuning) -> str:
-    if told.domain is None:
+def _domain(tuning: Tuning) -> str:
+    if tuning.domain is None:
         return "noise hides a touch at the approach speed: overshoot and settling are not predicted"
-    low, high = told.domain
-    seconds = settling_bound(told.gains, high)
+    low, high = tuning.domain
+    seconds = settling_bound(tuning.gains, high)
     return (
         f"{low:.4g} to {high:.4g} N/m: overshoot below {100.0 * OVERSHOOT:g} % in 99.9 %, settling below "
         f"{seconds:.3g} s + F/(K v_max) + 4 B/K in 99 %; softer surfaces are detected later"
     )
 
 
-def _stiffening(told: Tuning) -> str:
-    near, half = (stiffening(told.gains, told.steps[1], e) for e in STIFFENING_AT)
+def _stiffening(tuning: Tuning) -> str:
+    near, half = (stiffening(tuning.gains, tuning.steps[1], e) for e in STIFFENING_AT)
     return (
         f"a surface that stiffens in a press by more than {near:.2g} times while the force error is "
         f"{100.0 * STIFFENING_AT[0]:g} %, or {half:.2g} times half-way up, overshoots by over {100.0 * OVERSHOOT:g} %"
     )
 
 
-def _peak(told: Tuning) -> str:
-    bound = told.peak_bound
+def _peak(tuning: Tuning) -> str:
+    bound = tuning.peak_bound
     if bound is None:
-        return f"{told.peak:.4g} N predicted (no bound)"
-    return f"{told.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
+        return f"{tuning.peak:.4g} N predicted (no bound)"
+    return f"{tuning.peak:.4g} N predicted; at most {bound:.4g} N for K_u >= K, without noise and damping"
 
 
-def answer_of(
-    told: Tuning, inner: dict[str, object] | None, written: Sequence[object], *, verbose: bool
-) -> pages.CommandAnswer:
+def build_answer(
+    tuning: Tuning,
+    inner: dict[str, object] | None = None,
+    written: Sequence[object] = (),
+    *,
+    verbose: bool = False,
+) -> Answer:
     """The answer of `palpate tune`.
 
     Args:
-        told: the tuned loop.
+        tuning: the tuned loop.
         inner: the arm's inner loop, if a log of it was given.
         written: paths of the written files.
         verbose: whether a terminal shows everything.
     """
-    json, slide = told.to_json() | {"inner_loop": inner}, ""
-    if told.gains.slide is not None:
+    json, slide = tuning.to_json() | {"inner_loop": inner}, ""
+    if tuning.gains.slide is not None:
         from palpate.force.sliding.slide_domain import slide_json, slide_sentence
 
-        json |= {"slide": slide_json(told.gains)}
-        slide = f"Slide: {slide_sentence(told.gains)}."
+        json |= {"slide": slide_json(tuning.gains)}
+        slide = f"Slide: {slide_sentence(tuning.gains)}."
 
     def display(console: Console) -> None:
-        if verbose:
-            show_all(told, console)
-        else:
-            show(told, console, written)
-        for line in (*filter(None, [slide]), *(f"written: {path}" for path in written if verbose)):
-            console.print(line, soft_wrap=True)
+        print_hanging([*lines(tuning, written), *([Text(slide)] if slide else [])], console)
 
-    return pages.CommandAnswer(json, show=display)
+    return Answer(
+        json,
+        f"Gains for {tuning.gains.arm.title}, {quantity(tuning.gains.force, 'N')}",
+        sentence=tuning_sentence(tuning),
+        tables=[Table("", ("", "value"), rows(tuning))],
+        notes=[
+            *(f"{code}: {text}" for code, text in tuning.warnings),
+            *([slide] if slide else []),
+            *([f"not covered by a proof: {'; '.join(UNCOVERED)}"] if verbose else []),
+            *(f"written: {path}" for path in written),
+        ],
+        show=None if verbose else display,
+    )
 
 
-def show(told: Tuning, console: Console, written: Sequence[object] = ()) -> None:
-    """Print the answer: the surfaces that the proof covers, the first touch, the margins, what is assumed."""
-    print_hanging(lines(told, written), console)
-
-
-def lines(told: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
+def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
     """The answer, a line each."""
-    gains, at = told.gains, told.margins
+    gains, at = tuning.gains, tuning.margins
     places = f"   written: {', '.join(map(str, written))}" if written else ""
     title = f"Gains for {gains.arm.title}: {quantity(gains.force, 'N')}, surfaces up to {quantity(gains.cap, 'N/m')}."
-    mark = Text("✓ proved stable", "green") if told.proved else Text("✕ nothing could be proved", "red")
+    mark = Text("✓ proved stable", "green") if tuning.proved else Text("✕ nothing could be proved", "red")
     yield Text(printable(f"{title}   "), "bold").append(mark).append(printable(places))
-    slowest = max(step.settling for step in told.steps)
-    bound = "" if told.peak_bound is None else f" (proved below {quantity(told.peak_bound, 'N')})"
+    slowest = _slowest(tuning)
+    bound = "" if tuning.peak_bound is None else f" (proved below {quantity(tuning.peak_bound, 'N')})"
     touch = [
         f"at most {quantity(gains.approach, 'm')}/s",
-        f"peak {quantity(told.peak, 'N')}{bound}",
+        f"peak {quantity(tuning.peak, 'N')}{bound}",
         f"settles in {slowest:.2g} s" if isfinite(slowest) else "does not settle",
-        f"overshoot {100 * told.overshoot:.2g} %",
+        f"overshoot {100 * tuning.overshoot:.2g} %",
     ]
     yield Text(f"First touch: {', '.join(touch)}.")
     delay = f"{1e3 * at.delay:.3g} ms" if isfinite(at.delay) else "any"
     phase = f"{at.phase:.3g}°" if isfinite(at.phase) else "any"
     yield Text(f"Margins on the stiffest surface: gain × {at.gain:.2g}, phase {phase}, delay {delay}.")
-    held = told.surface_stiffness("held")
-    if held is not None:
+    proved = tuning.surface_stiffness("held")
+    if proved is not None:
         theta = f"(theta {1e3 * gains.theta:.2g} ms)"
-        yield Text(f"Proved for surfaces with K + B/theta from {_span(*held)} {theta}.")
-    for name, assumed in (told.known.assumed if told.known else {}).items():
+        yield Text(f"Proved for surfaces with K + B/theta from {_span(*proved)} {theta}.")
+    for name, assumed in (tuning.known.assumed if tuning.known else {}).items():
         value = f"{quantity(assumed.value, assumed.unit)} assumed" if isfinite(assumed.value) else "no bound"
-        why = {"damping": "B is unknown", "stiffness": "K of the surface alone is unknown"}.get(name, name)
-        yield Text(printable(f"! {why}: {value} ({assumed.why})."), "yellow")
-    codes = dict.fromkeys(code for code, _ in told.warnings)
+        reason = {"damping": "B is unknown", "stiffness": "K of the surface alone is unknown"}.get(name, name)
+        yield Text(printable(f"! {reason}: {value} ({assumed.why})."), "yellow")
+    codes = dict.fromkeys(code for code, _ in tuning.warnings)
     if codes:
         yield Text(printable(f"Seen, too: {', '.join(codes)} (--verbose explains each)."), "yellow")
     yield Text(f"Not proved: {len(UNCOVERED)} cases, which --verbose lists.")
+
+
+def line(tuning: Tuning) -> str:
+    """The arm, the force, and whether anything is proved."""
+    proved = "proved" if tuning.proved else "nothing proved"
+    return f"{tuning.gains.arm.title}, {tuning.gains.force:g} N, {proved}"
+
+
+def page(tuning: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
+    """The page of `palpate tune --report`; `command` is what made it."""
+    gains = tuning.gains
+    answer = replace(
+        build_answer(tuning),
+        about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
+        f"{quantity(gains.theta, 's')}.",
+        figures=[
+            {"panels": panels([_stability_chart(tuning)]), "caption": _STABILITY},
+            {"panels": panels([touch_chart(tuning)]), "caption": _touch_caption(tuning)},
+        ],
+        alerts=[{"tone": "warn", "title": code, "text": text} for code, text in tuning.warnings],
+        tables=(),
+        folds=[
+            ("All numbers", "and the proof's own statements", rows(tuning)),
+            ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
+        ],
+        source=("The gains", gains.to_toml()),
+    )
+    return answer_page(answer, room="tune", command=command)
+
+
+def tuning_sentence(tuning: Tuning) -> str:
+    """The proof, the peak of a first touch, and its settling in words."""
+    bound, slowest = tuning.peak_bound, _slowest(tuning)
+    proved = "Proved stable." if tuning.proved else "Nothing is proved."
+    peak = f"The first touch peaks at {quantity(tuning.peak, 'N')}"
+    below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
+    settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
+    return f"{proved} {peak}{below}{settles}."
+
+
+def _slowest(tuning: Tuning) -> float:
+    return max(step.settling for step in tuning.steps)
+
+
+_STABILITY = (
+    "Stiffness of the surface by itself. The dashed line is the stiffest surface that the gains are made for."
+)
+
+
+def _stability_chart(tuning: Tuning) -> Chart:
+    """Every range of stiffness in a row: the known surface, the proofs, the exact limit of stability."""
+    ranges = [] if tuning.known is None else [("this surface", "K", *tuning.known.stiffness)]
+    for name, colour, kind in (
+        ("proved, constant gain", "ok", "held"),
+        ("proved, while the gain adapts", "s2", "adapting"),
+    ):
+        proved = tuning.surface_stiffness(kind)
+        if proved is not None:
+            every = kind == "adapting" and tuning.gains.arm.kind == "position"
+            ranges.append((name, colour, *((0.0, RIGID) if every else proved)))
+    ranges.append(("stable, exact, without damping", "measured", *tuning.exact))
+    cap = tuning.gains.cap
+    ends = [end for *_, low, high in ranges for end in (low, high) if 0.0 < end < RIGID] + [cap]
+    lower, upper = 10.0 ** floor(log10(min(ends))), 10.0 ** ceil(log10(max(ends)) + 0.01)
+    series = []
+    for i, (name, colour, low, high) in enumerate(ranges):
+        x, y = np.array([max(low, lower), min(high, upper)]), np.full(2, float(len(ranges) - i))
+        label = "any" if low <= 0.0 and high >= RIGID else _span(low, high)
+        series.append(Series(x, y, colour, f"{name}: {label}", 6.0))
+    return Chart(
+        "",
+        series,
+        marks=[Mark([(cap, cap)], "ink")],
+        x="stiffness [N/m]",
+        title="Where it is stable",
+        xlim=(lower, upper),
+        ylim=(0.5, len(ranges) + 0.5),
+        log="x",
+        height=1.9,
+    )
 
 
 def _span(low: float, high: float) -> str:
@@ -147,153 +234,16 @@ def _span(low: float, high: float) -> str:
     return f"{quantity(low, 'N/m')} {end}"
 
 
-def show_all(told: Tuning, console: Console) -> None:
-    """Print every figure, warning and case that no proof covers."""
-    from rich.table import Table
-
-    table = Table(box=None, show_header=False, pad_edge=False)
-    for name, value in rows(told):
-        table.add_row(name, value)
-    console.print(table)
-    for code, text in told.warnings:
-        console.print(f"{code}: {text}")
-    console.print("not covered by a proof: " + "; ".join(UNCOVERED))
-
-
-def line(told: Tuning) -> str:
-    """The arm, the force, and whether anything is proved."""
-    proved = "proved" if told.proved else "nothing proved"
-    return printable(f"{told.gains.arm.title}, {told.gains.force:g} N, {proved}")
-
-
-def text(told: Tuning) -> str:
-    """Output of `palpate tune`."""
-    return pages.console_text(lambda console: show(told, console))
-
-
-def html(told: Tuning) -> str:
-    """The same as a table."""
-    table = [("", f"A force loop for {told.gains.arm.title}"), *rows(told)]
-    return pages.as_html("Tuning", table, [text for _, text in told.warnings])
-
-
-def page(told: Tuning, command: str = "palpate.force.tune(...).report(...)") -> str:
-    """The page of `palpate tune --report`; `command` is what made it."""
-    gains = told.gains
-    answer = pages.PageAnswer(
-        title=f"Gains for {gains.arm.title}, {quantity(gains.force, 'N')}",
-        sentence=tuning_sentence(told),
-        about=f"For surfaces up to {quantity(gains.cap, 'N/m')} (K + B/theta), with a lag theta of "
-        f"{quantity(gains.theta, 's')}.",
-        alerts=pages.warning_alerts(text for _, text in told.warnings),
-        cards={"": _cards(told)},
-        lower={"Margins on the stiffest surface": _margins(told)},
-        scale=_scale(told),
-        figures=[{"panels": panels([touch_chart(told)]), "caption": _touch_caption(told)}],
-        folds=[
-            ("All numbers", "and the proof's own statements", rows(told)),
-            ("Not proved", f"{len(UNCOVERED)} cases", [(text,) for text in UNCOVERED]),
-        ],
-        source=("The gains", gains.to_toml()),
-    )
-    return pages.answer_page(answer, room="tune", command=command)
-
-
-def tuning_sentence(told: Tuning) -> str:
-    """Whether it is proved, how high a first touch goes, and how soon it settles."""
-    bound, slowest = told.peak_bound, _slowest(told)
-    proved = "Proved stable." if told.proved else "Nothing is proved."
-    peak = f"The first touch peaks at {quantity(told.peak, 'N')}"
-    below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
-    settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
-    return f"{proved} {peak}{below}{settles}."
-
-
-def _ends(low: float, high: float) -> str:
-    """Both ends in three digits, each with its own unit: a bound is no value with an uncertainty."""
-    return f"{quantity(low, 'N/m')} to {quantity(high, 'N/m')}"
-
-
-def _slowest(told: Tuning) -> float:
-    return max(step.settling for step in told.steps)
-
-
-def _cards(told: Tuning) -> list[pages.Card]:
-    gains, held = told.gains, told.surface_stiffness("held")
-    number, _, unit = _ends(*held).rpartition(" ") if held else ("", "", "")
-    cards = [
-        pages.Card(
-            "Stable, proved", number, unit, why="stiffness of the surface, with constant gain",
-            tone="ok" if held else "fail", verdict="proved" if held else "nothing",
-        ),
-        pages.Card("Approach", plain(1e3 * gains.approach, 3), "mm/s", why="at most, before a force is felt"),
-        pages.Card("Gain", plain(1e3 * gains.gain, 3), "mm/s per N", why="on the stiffest surface"),
-    ]  # fmt: skip
-    known = told.known
-    if known is not None:
-        number, _, unit = quantity_between(*known.stiffness, "N/m").rpartition(" ")
-        why = "given" if known.source == "told" else f"from {known.source}"
-        cards.append(pages.Card("Surface", number, unit, why=why, colour="K"))
-    return cards
-
-
-def _margins(told: Tuning) -> list[pages.Card]:
-    at = told.margins
-    cards = [pages.Card("Gain", f"× {plain(at.gain, 3)}", why="the gain may be so many times as high")]
-    if isfinite(at.phase):
-        cards.append(pages.Card("Phase", f"{at.phase:.0f}°", why="until it rings for ever"))
-    if isfinite(at.delay):
-        cards.append(
-            pages.Card(
-                "Delay", plain(1e3 * at.delay, 3), "ms", why="so much more lag before it rings for ever"
-            )
-        )
-    return cards
-
-
-def _scale(told: Tuning) -> dict[str, object]:
-    """Every bound on one axis: stiffness of the surface itself."""
-    extents = []
-    if told.known is not None:
-        low, high = told.known.stiffness
-        extents.append(
-            pages.Extent("this surface", low, high, "estimate", quantity_between(low, high, "N/m"))
-        )
-        if told.gains.cap > high:
-            upper = quantity(told.gains.cap, "N/m")
-            extents.append(
-                pages.Extent(
-                    "assumed for its damping", high, told.gains.cap, "assumed", f"K + B/theta up to {upper}"
-                )
-            )
-    held, adapting = told.surface_stiffness("held"), told.surface_stiffness("adapting")
-    if held is not None:
-        extents.append(pages.Extent("proved, constant gain", *held, "proved", _ends(*held)))
-    if adapting is not None and told.gains.arm.kind == "position":
-        extents.append(
-            pages.Extent("proved, while the gain adapts", 0.0, inf, "proved", "any constant stiffness")
-        )
-    elif adapting is not None:
-        text = quantity_between(*adapting, "N/m")
-        extents.append(pages.Extent("proved, while the gain adapts", *adapting, "proved", text))
-    low, high = told.exact
-    high = inf if high >= RIGID else high
-    unstable = f"unstable from {quantity(high, 'N/m')}" if isfinite(high) else "never unstable"
-    extents.append(pages.Extent("stable, exact, without damping", low, high, "exact", unstable))
-    caption = "The dashed line is the stiffest surface that the gains are made for; at an arrowhead nothing bounds it."
-    return pages.log_scale("Where it is stable", caption, "N/m", extents, told.gains.cap)
-
-
-def draw(told: Tuning) -> Figure:
+def draw(tuning: Tuning) -> Figure:
     """The chart of the first touch as a figure."""
-    return figure_of([touch_chart(told)])
+    return build_figure([touch_chart(tuning)])
 
 
-def touch_chart(told: Tuning) -> Chart:
+def touch_chart(tuning: Tuning) -> Chart:
     """The force after the touch on the softest and on the stiffest surface, and the proved bound of its peak."""
-    force, bound = told.gains.force, told.peak_bound
-    looks = zip(told.steps, ("softest", "stiffest"), ("measured", "F"), strict=True)
-    longest = max(step.settling if isfinite(step.settling) else 0.0 for step in told.steps)
+    force, bound = tuning.gains.force, tuning.peak_bound
+    looks = zip(tuning.steps, ("softest", "stiffest"), ("measured", "F"), strict=True)
+    longest = max(step.settling if isfinite(step.settling) else 0.0 for step in tuning.steps)
     bands = [
         Band(force, force, label="desired", **KNOWN),
         Band(force * (1.0 - BAND), force * (1.0 + BAND), "measured"),
@@ -302,11 +252,14 @@ def touch_chart(told: Tuning) -> Chart:
     return Chart(
         "force [N]",
         [Series(step.time, force * step.force, colour, name) for step, name, colour in looks],
-        bands, x="time from the touch [s]", xlim=(0.0, max(2.5 * longest, 0.1)),
-        ylim=(0.0, 1.15 * max(bound or 0.0, told.peak)), height=2.9,
-    )  # fmt: skip
+        bands,
+        x="time from the touch [s]",
+        xlim=(0.0, max(2.5 * longest, 0.1)),
+        ylim=(0.0, 1.15 * max(bound or 0.0, tuning.peak)),
+        height=2.9,
+    )
 
 
-def _touch_caption(told: Tuning) -> str:
-    over = 100.0 * float(np.max([told.overshoot, 0.0]))
+def _touch_caption(tuning: Tuning) -> str:
+    over = 100.0 * float(np.max([tuning.overshoot, 0.0]))
     return f"The first touch, its stiffness known: at most {plain(over, 2)} % over. Grey: within 5 % of the force."

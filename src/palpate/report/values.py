@@ -1,23 +1,32 @@
-"""Every public value in one line, and for a notebook: what it is, not the arrays that it holds."""
+"""Values in Python: each public value in one line, and results as text, as a table in a notebook, figure and page."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
 
-from palpate.report.page import as_html, write_figure, write_page
+from palpate.files import check_place, write_text
+from palpate.report import style
+from palpate.report.page import answer_html
+from palpate.report.terminal import answer_text
 from palpate.signals.types import NORMAL
 from palpate.text import in_python, printable
 from palpate.units import plain, quantity, quantity_between
 
-__all__ = ["facts_of", "html", "line", "view_of", "write_figure", "write_page"]
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
 
 Facts = list[tuple[str, str]]
-_LETTERS = {"M": "kg", "B": "N s/m", "K": "N/m", "offset": "N"}
-"""Units of an estimate's parameters by their usual names; others are told without one."""
+"""Names and texts; a text without a name says what the value is."""
+_UNITS = {"M": "kg", "B": "N s/m", "K": "N/m", "offset": "N"}
+"""Units of an estimate's parameters by their usual names; others are printed without one."""
 _VIEWS = {
     "Identification": "identification.answer",
     "Pooled": "many.page",
@@ -25,33 +34,63 @@ _VIEWS = {
     "Tuning": "tuning",
     "Weighed": "payload",
 }
-"""Modules that show a result whole, by the name of its class."""
-_SHORT = 8
-"""Numbers of an array that are shown; of a longer one its shape."""
+"""Modules with `line`, `build_answer`, `draw` and `page` of a result, by the name of its class."""
+_MAX_ITEMS = 8
+"""Numbers of an array that are printed; of a longer one its shape is."""
 
 
 def line(value: Any) -> str:
     """One line: `<Parameter: 5238 ± 50 N/m, identified>`."""
-    told = ", ".join(f"{name} {text}" if name else text for name, text in facts_of(value) if name != "why")
-    return in_python(printable(f"<{type(value).__name__}: {told}>"))
+    view = _view_module(value)
+    if view is not None:
+        text = view.line(value)
+    else:
+        text = ", ".join(f"{name} {fact}" if name else fact for name, fact in _facts(value))
+    return in_python(printable(f"<{type(value).__name__}: {text}>"))
 
 
-def html(value: Any) -> str:
-    """The same as a table, escaped, without a script."""
-    facts = facts_of(value)
-    head = ", ".join(text for name, text in facts if not name)
-    rows = [(name, text) for name, text in facts if name]
-    return in_python(as_html(f"{type(value).__name__}: {head}", [("of it", "value"), *rows] if rows else []))
+def text(result: Any) -> str:
+    """The output of the result's command."""
+    return in_python(answer_text(_view_module(result).build_answer(result)))
 
 
-def view_of(result: Any) -> Any:
-    """The module that shows a result whole, imported when it is first asked for."""
-    name = next(_VIEWS[base.__name__] for base in type(result).__mro__ if base.__name__ in _VIEWS)
-    return import_module(f"palpate.report.{name}")
+def html(result: Any) -> str:
+    """The result's sentence and tables for a notebook, escaped and without a script."""
+    return in_python(answer_html(_view_module(result).build_answer(result)))
 
 
-def facts_of(value: Any) -> Facts:
-    """Facts of a value by name; one without a name says what it is."""
+def plot(result: Any, path: Path | None) -> Figure:
+    """Draw a result; write the figure if a path is given, atomically.
+
+    Raises:
+        InputError: nothing can be drawn, palpate may not write there, or the name has another ending.
+    """
+    if path is not None:
+        check_place(path)
+    figure: Figure = _view_module(result).draw(result)
+    if path is not None:
+        style.save(figure, path)
+    return figure
+
+
+def write_page(result: Any, path: Path) -> Path:
+    """Write a page of a result, atomically; a place that will not do is refused before.
+
+    Raises:
+        InputError: palpate may not write there, or the name has another ending.
+    """
+    check_place(path, ending=".html")
+    write_text(path, _view_module(result).page(result))
+    return path
+
+
+def _view_module(value: Any) -> Any:
+    """The module that shows a result; None for a plain value."""
+    name = next((_VIEWS[base.__name__] for base in type(value).__mro__ if base.__name__ in _VIEWS), None)
+    return name and import_module(f"palpate.report.{name}")
+
+
+def _facts(value: Any) -> Facts:
     known = (_FACTS[base.__name__] for base in type(value).__mro__ if base.__name__ in _FACTS)
     return next(known, _fields)(value)
 
@@ -63,34 +102,35 @@ def _parameter(p: Any) -> Facts:
         number = quantity_between(p.ci95[0], p.ci95[1], p.unit)
     else:
         number = "no number" if p.value is None else quantity(p.value, p.unit)
-    return [("", number), ("", str(p.verdict)), ("why", p.reason)]
+    return [("", number), ("", str(p.verdict))]
 
 
 def _working_point(point: Any) -> Facts:
-    at = f"at {point.force_N:.3g} N, {1e3 * point.depth_m:.3g} mm, {point.frequency_Hz:.2g} Hz"
-    return [*_parameter(point.stiffness)[:2], ("", at)]
+    place = f"at {point.force_N:.3g} N, {1e3 * point.depth_m:.3g} mm, {point.frequency_Hz:.2g} Hz"
+    return [*_parameter(point.stiffness), ("", place)]
 
 
-def _octave(own: Any) -> Facts:
-    storage = quantity(own.storage, "N/m", own.storage_half)
-    return [
-        ("", f"{own.frequency:.3g} Hz"),
-        ("storage", storage),
-        ("loss", quantity(own.loss, "N/m", own.loss_half)),
-    ]
+def _octave(octave: Any) -> Facts:
+    storage = quantity(octave.storage, "N/m", octave.storage_half)
+    loss = quantity(octave.loss, "N/m", octave.loss_half)
+    return [("", f"{octave.frequency:.3g} Hz"), ("storage", storage), ("loss", loss)]
 
 
 def _estimate(estimate: Any) -> Facts:
     halves = NORMAL * np.sqrt(np.clip(np.diag(estimate.covariance), 0.0, None))
     numbers = [
-        (name, quantity(float(value), _LETTERS.get(name, "1"), float(half)))
+        (name, quantity(float(value), _UNITS.get(name, "1"), float(half)))
         for name, value, half in zip(estimate.names, estimate.theta, halves, strict=True)
     ]
-    told = [("", "rejected"), ("why", estimate.rejected)] if estimate.rejected else []
-    return [*numbers, ("samples", f"{estimate.samples:.0f}"), *told]
+    rejected = [("", "rejected")] if estimate.rejected else []
+    return [*numbers, ("samples", f"{estimate.samples:.0f}"), *rejected]
 
 
-def _serial_arm(arm: Any) -> Facts:
+def _estimator(estimator: Any) -> Facts:
+    return _estimate(estimator.estimate())
+
+
+def _arm(arm: Any) -> Facts:
     return [("", arm.title), ("joints", ", ".join(arm.names))]
 
 
@@ -100,12 +140,7 @@ def _planar(robot: Any) -> Facts:
 
 
 def _force_loop(loop: Any) -> Facts:
-    estimate = loop.estimate
-    known = (
-        []
-        if estimate is None
-        else [("stiffness", quantity(estimate.stiffness, "N/m", NORMAL * estimate.stiffness_std))]
-    )
+    known = [] if loop.estimate is None else [("stiffness", quantity(loop.estimate.stiffness, "N/m"))]
     return [("", loop.phase), *known, ("trouble", loop.trouble or "none"), *_gains(loop.gains)]
 
 
@@ -121,47 +156,34 @@ def _gains(gains: Any) -> Facts:
 
 
 def _bench(bench: Any) -> Facts:
+    truth = bench.meta.get("truth", {}).items()
+    surface = ", ".join(f"{name} {quantity(known['value'], known['unit'])}" for name, known in truth)
     return [
         ("controller", type(bench.loop.controller).__name__),
-        (
-            "surface",
-            ", ".join(_truth(bench.meta.get("truth", {}))) or type(bench.loop.plant.surface).__name__,
-        ),
+        ("surface", surface or type(bench.loop.plant.surface).__name__),
     ]
-
-
-def _truth(truth: dict[str, Any]) -> list[str]:
-    return [f"{name} {quantity(known['value'], known['unit'])}" for name, known in truth.items()]
 
 
 def _experiment(experiment: Any) -> Facts:
-    """Its title, and the tables that differ from their defaults, by their kinds."""
-    parts = [
-        (name, text) for name, text in _fields(experiment) if name in {"surface", "controller", "identifier"}
-    ]
-    return [("", experiment.title), *parts]
+    parts = {"surface", "controller", "identifier"}
+    return [("", experiment.title), *(fact for fact in _fields(experiment) if fact[0] in parts)]
 
 
 def _fields(value: Any) -> Facts:
-    """Arguments of a value that differ from their defaults; of a part of an experiment its kind too."""
-    own = (
-        fields(value)
-        if is_dataclass(value)
-        else msgspec.structs.fields(type(value))
-        if _is_struct(value)
-        else ()
-    )
-    shown = [(f.name, getattr(value, f.name)) for f in own if not f.name.startswith("_")]
-    defaults = {f.name: f.default for f in own}
-    told = [
-        (name, _short(part)) for name, part in shown if part is not None and not _same(part, defaults[name])
-    ]
-    tag = value.__struct_config__.tag if _is_struct(value) else None
-    return [("", str(tag)), *told] if tag else told or [("", "all as by default")]
-
-
-def _is_struct(value: Any) -> bool:
-    return isinstance(value, msgspec.Struct)
+    """Fields of a value that differ from their defaults; of a part of an experiment its kind too."""
+    is_struct = isinstance(value, msgspec.Struct)
+    declared: Sequence[Any] = ()
+    if is_struct:
+        declared = msgspec.structs.fields(type(value))
+    elif is_dataclass(value):
+        declared = fields(value)
+    facts = []
+    for attribute in declared:
+        part = getattr(value, attribute.name)
+        if part is not None and not attribute.name.startswith("_") and not _same(part, attribute.default):
+            facts.append((attribute.name, _short(part)))
+    kind = value.__struct_config__.tag if is_struct else None
+    return [("", str(kind)), *facts] if kind else facts or [("", "all as by default")]
 
 
 def _same(part: Any, default: Any) -> bool:
@@ -172,33 +194,29 @@ def _short(part: Any) -> str:
     if isinstance(part, float):
         return plain(part, 5)
     if isinstance(part, np.ndarray):
-        return np.array2string(part, precision=4) if part.size <= _SHORT else f"array {part.shape}"
+        return np.array2string(part, precision=4) if part.size <= _MAX_ITEMS else f"array {part.shape}"
     if isinstance(part, str | int):
         return str(part)
-    if isinstance(part, Sequence):
-        return f"({', '.join(map(_short, part))})" if len(part) <= _SHORT else f"{len(part)} values"
-    if _is_struct(part):
-        return " ".join(f"{name} {text}".strip() for name, text in facts_of(part))
-    return f"{len(part)} values" if isinstance(part, dict) else type(part).__name__
-
-
-def _of_estimator(estimator: Any) -> Facts:
-    return _estimate(estimator.estimate())
+    if isinstance(part, Sequence) and len(part) <= _MAX_ITEMS:
+        return f"({', '.join(map(_short, part))})"
+    if isinstance(part, msgspec.Struct):
+        return " ".join(f"{name} {fact}".strip() for name, fact in _facts(part))
+    return f"{len(part)} values" if isinstance(part, dict | Sequence) else type(part).__name__
 
 
 _FACTS: dict[str, Callable[[Any], Facts]] = {
     "Bench": _bench,
-    "ContactIdentifier": _of_estimator,
+    "ContactIdentifier": _estimator,
     "DynamicStiffness": _octave,
     "Estimate": _estimate,
     "Experiment": _experiment,
     "ForceLoop": _force_loop,
     "Gains": _gains,
-    "NeuralProbe": _of_estimator,
+    "NeuralProbe": _estimator,
     "Parameter": _parameter,
     "Planar3R": _planar,
-    "SerialArm": _serial_arm,
-    "Streaming": _of_estimator,
+    "SerialArm": _arm,
+    "Streaming": _estimator,
     "WorkingPoint": _working_point,
 }
-"""By the name of a class or of one that it derives from: rooms need not be imported to be shown."""
+"""Functions by the name of a class or of a base class, so that no room is imported."""

@@ -15,10 +15,10 @@ from palpate.robots.arm3 import Arm3
 _THESIS = Arm3()
 
 _REACH_TOLERANCE = 1e-9
-"""How far beyond its reach a pose may lie and still be taken for the arm stretched out [m]: rounding."""
+"""Distance beyond reach that counts as rounding of a stretched arm [m]."""
 
 _SINGULAR = 1e-6
-"""The sine of joint 2 under which the inverse Jacobian is refused: about the inverse of its condition."""
+"""Sine of joint 2 below which the inverse Jacobian is refused: about the inverse of its condition."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,8 @@ class Planar3R(Readable):
         Raises:
             InputError: a pose out of reach (it says by how much), or an elbow that is neither +1 nor -1.
         """
-        p, side = _split(pose, "pose"), np.asarray(elbow, dtype=float)
+        p = _split(pose, "pose")
+        side = np.asarray(elbow, dtype=float)
         if not np.all(np.abs(side) == 1.0):
             raise InputError(f"elbow must be +1 or -1, got {elbow!r}")
         self._check_reach(p)
@@ -98,12 +99,12 @@ class Planar3R(Readable):
         """
         angles = _split(q, "q")
         det = np.asarray(np.abs(self.arm.jac_det(angles)))
-        least = _SINGULAR * self.arm.length.x * self.arm.length.y
-        if not np.all(det > least):
+        min_det = _SINGULAR * self.arm.length.x * self.arm.length.y
+        if not np.all(det > min_det):
             worst = np.unravel_index(np.argmin(np.where(np.isnan(det), 0.0, det)), det.shape)
             raise InputError(
                 f"the Jacobian is singular at q{_at(worst)}: |det J| = {det[worst]:.3g} m^2, "
-                f"at least {least:.3g} is needed; bend joint 2 away from 0 and pi"
+                f"at least {min_det:.3g} is needed; bend joint 2 away from 0 and pi"
             )
         return _join(self.arm.jac_inverse(angles))
 
@@ -204,5 +205,5 @@ def _freeze(v: Vec3) -> Array:
 
 
 def _at(index: tuple[Any, ...]) -> str:
-    """Which entry of a batch is meant; nothing for a single one."""
+    """Words for the index within a batch; empty for a single input."""
     return f" (index {tuple(int(i) for i in index)})" if index else ""

@@ -18,7 +18,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 
 _HIGHEST_ORDER = 10
-"""Of a Butterworth filter; sensors and their drivers have one to four."""
+"""Highest order of a Butterworth filter; sensors and their drivers have one to four."""
 _SECTION = re.compile(r"butterworth(\d+):(-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(?:hz)?")
 _FORM = "butterworth3:120 (order and cut-off in Hz), several joined by '+', or none"
 
@@ -50,14 +50,14 @@ class LowPass:
         word = text.strip().lower().replace(" ", "")
         if word == "none":
             return cls()
-        found = [_SECTION.fullmatch(section) for section in re.split(r"\+(?=b)", word)]
-        if not all(found):
+        sections = [_SECTION.fullmatch(section) for section in re.split(r"\+(?=b)", word)]
+        if not all(sections):
             raise InputError(f"a force filter is given as {_FORM}; got {text!r}")
-        return cls(tuple((int(section[1]), float(section[2])) for section in found if section))
+        return cls(tuple((int(section[1]), float(section[2])) for section in sections if section))
 
     @classmethod
     def of_first_order(cls, time: float, count: int = 1) -> "LowPass":
-        """As many equal ones of first order, whose time constants add up to a time [s]."""
+        """Equal low-passes of first order, whose time constants add up to a time [s]."""
         return cls(((1, count / (2 * pi * time)),) * count)
 
     def __str__(self) -> str:
@@ -76,7 +76,7 @@ class LowPass:
 
     @property
     def roll_off(self) -> int:
-        """How many derivatives of a signal come through it without growing with the frequency."""
+        """Number of derivatives of a signal that come through without growing with the frequency."""
         return sum(order for order, _ in self.sections)
 
     @property
@@ -115,7 +115,7 @@ class Taps:
 
     @property
     def after(self) -> int:
-        """How many samples after the instant's own are needed."""
+        """Number of samples that are needed after the instant's own."""
         return self.weights.shape[2] - 1 - self.before
 
 
@@ -129,8 +129,8 @@ def taps(low_pass: LowPass, dt: float, derivatives: int) -> Taps:
     before, after = _reach(gain, span)
     window = np.arange(before, -after - 1, -1) % span
     weights = np.empty((len(places), derivatives, len(window)))
-    for i, place in enumerate(places):
-        shifted = gain * np.exp(1j * omega * place)
+    for i, offset in enumerate(places):
+        shifted = gain * np.exp(1j * omega * offset)
         for d in range(derivatives):
             weights[i, d] = np.fft.irfft(shifted * (1j * omega) ** d, span)[window]
     weights[:, 0] /= weights[:, 0].sum(axis=1, keepdims=True)
@@ -146,7 +146,7 @@ def _span(low_pass: LowPass, dt: float) -> int:
 
 
 def _reach(gain: NDArray[np.complex128], span: int) -> tuple[int, int]:
-    """How many samples before and after an instant have weights that count."""
+    """Number of samples before and after an instant whose weights count."""
     size = np.abs(np.fft.irfft(gain, span))
     counts = np.flatnonzero(size > _NEGLIGIBLE * size.max())
     counts = np.where(counts > span // 2, counts - span, counts)
@@ -175,9 +175,10 @@ def read(signal: Array, instants: Array, weights: Taps) -> Array:
     padded = np.pad(signal - level, count, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, count)
     few = len(windows) // _MANY
-    place = np.round(instants * FRACTIONS).astype(np.int64)
-    whole, part = place // FRACTIONS, place % FRACTIONS
-    first = np.clip(whole - weights.before + count, 0, len(windows) - 1)
+    cell = np.round(instants * FRACTIONS).astype(np.int64)
+    sample = cell // FRACTIONS
+    part = cell % FRACTIONS
+    first = np.clip(sample - weights.before + count, 0, len(windows) - 1)
     out = np.empty((weights.weights.shape[1], len(instants)))
     order = np.argsort(part, kind="stable")
     edges = np.flatnonzero(np.diff(part[order], prepend=-1, append=FRACTIONS))
@@ -193,9 +194,9 @@ def read(signal: Array, instants: Array, weights: Taps) -> Array:
 
 
 def _everywhere(padded: Array, rows: Array) -> Array:
-    """The same weights at every sample, shape (derivatives, windows)."""
+    """Apply one set of weights at every sample, shape (derivatives, windows)."""
     size = 1 << (len(padded) - 1).bit_length()
     spectrum = np.fft.rfft(padded, size)
-    turned = np.conj(np.fft.rfft(rows, size))  # a correlation, not a convolution
+    spectra = np.conj(np.fft.rfft(rows, size))  # a correlation, not a convolution
     count = len(padded) - rows.shape[1] + 1
-    return np.stack([np.fft.irfft(spectrum * row, size)[:count] for row in turned])
+    return np.stack([np.fft.irfft(spectrum * row, size)[:count] for row in spectra])

@@ -1,4 +1,4 @@
-"""Sampled signals: fresh rows, unbroken runs, rounding, quaternions, block means, white noise, detrending and spectra.
+"""Sampled signals: fresh rows, unbroken runs, rounding, block means, white noise, detrending and spectra.
 
 `scipy.signal` has the last ones too, but its import takes longer than the identification of a log; so `scipy.fft`.
 """
@@ -10,10 +10,23 @@ from palpate.arrays import Array, Indices, Mask
 
 GAUSSIAN = 1.4826
 """Standard deviation of Gaussian noise over its median absolute deviation."""
+_OUTLIERS = (0.1, 99.9)
+"""Percentiles beyond which a reading may be an outlier."""
 _LONG_JUMP = 4.0
 """Times the sensor's own resolution from which a step is a jump."""
 _HELD_SHARE = 0.3
 """Pairs of jumps between which a reading may move all the same."""
+
+
+def robust_std(deviations: Array) -> float:
+    """Standard deviation of Gaussian noise from its deviations, shape (n,), by their median size; 0 of none."""
+    return GAUSSIAN * float(np.median(np.abs(deviations))) if len(deviations) else 0.0
+
+
+def outer_range(values: Array) -> tuple[float, float]:
+    """Lowest and highest value, outliers left aside."""
+    low, high = np.percentile(values, _OUTLIERS)
+    return float(low), float(high)
 
 
 def fresh_rows(values: Array) -> Mask | None:
@@ -23,29 +36,30 @@ def fresh_rows(values: Array) -> Mask | None:
     times the sensor's own resolution with exact repetitions right between them.
     """
     step = np.diff(values)
-    moved = step != 0
-    if moved.all() or moved.sum() < 10:
+    changed = step != 0
+    if changed.all() or changed.sum() < 10:
         return None
-    sizes = np.abs(step[moved])
+    sizes = np.abs(step[changed])
     resolution = float(np.percentile(sizes, 2))
     jumps = np.flatnonzero(np.abs(step) > max(_LONG_JUMP * resolution, float(np.median(sizes)) * 0.5))
     if len(jumps) < 10:
         return None
     apart = np.diff(jumps)
     usual = float(np.median(apart))
-    if usual < 2 or not _quiet_between(moved, jumps, usual):
+    if usual < 2 or not _quiet_between(changed, jumps, usual):
         return None
-    fresh = np.r_[True, moved]
+    fresh = np.r_[True, changed]
     return _refill(fresh, round(usual))
 
 
-def _quiet_between(moved: Mask, jumps: Indices, usual: float) -> bool:
-    """Whether nothing at all moves between neighbouring jumps."""
-    total = np.r_[0, np.cumsum(moved)]
+def _quiet_between(changed: Mask, jumps: Indices, usual: float) -> bool:
+    """True if nothing at all moves between neighbouring jumps."""
+    total = np.r_[0, np.cumsum(changed)]
     near = np.flatnonzero(np.diff(jumps) <= 2 * usual)
     if len(near) < 8:
         return False
-    begin, end = jumps[near] + 1, jumps[near + 1]
+    begin = jumps[near] + 1
+    end = jumps[near + 1]
     still = (total[end] - total[begin]) == 0
     return bool(still.mean() > 1 - _HELD_SHARE)
 
@@ -87,17 +101,6 @@ def quantise(u, step):
     return whole(u / step) * step
 
 
-def continuous(quaternions: Array) -> Array:
-    """Quaternions, shape (n, 4), each with the sign that is nearer to the one before.
-
-    q and -q are the same rotation, and drivers change between them at will; what lies between them is none.
-    """
-    together = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
-    signs = np.cumprod(np.r_[1.0, np.where(together < 0, -1.0, 1.0)])
-    steady: Array = quaternions * signs[:, None]
-    return steady
-
-
 _SHORT = 256
 """Taps below which a direct convolution is the faster one."""
 
@@ -117,8 +120,8 @@ def convolve(signal: Array, taps: Array) -> Array:
 
     count = len(signal) + len(taps) - 1
     size = next_fast_len(count, real=True)
-    found: Array = irfft(rfft(signal, size) * rfft(taps, size), size)[:count]
-    return found
+    filtered: Array = irfft(rfft(signal, size) * rfft(taps, size), size)[:count]
+    return filtered
 
 
 def quadrature(values: Array) -> Array:
@@ -130,8 +133,8 @@ def quadrature(values: Array) -> Array:
     lines[0] = 0.0
     if size % 2 == 0:
         lines[-1] = 0.0
-    found: Array = irfft(lines, size)[: len(values)]
-    return found
+    shifted: Array = irfft(lines, size)[: len(values)]
+    return shifted
 
 
 def periodogram(values: Array, taper: float) -> tuple[Array, Array]:

@@ -70,7 +70,7 @@ class Estimate(Compared):
         return np.sqrt(np.diag(self.covariance))
 
     def verdicts(self, tolerance: float = 0.25) -> dict[str, str]:
-        """By parameter, "identified" or "not identifiable", see `verdict`; "rejected" where the estimate is."""
+        """Verdict of each parameter, as of `verdict`; "rejected" for all where the estimate is."""
         if self.rejected:
             return dict.fromkeys(self.names, "rejected")
         rules = {name: passive_verdict if name in self.passive else verdict for name in self.names}
@@ -79,12 +79,12 @@ class Estimate(Compared):
 
 
 def verdict(value: float, std: float, tolerance: float = 0.25) -> str:
-    """Whether a number may be trusted: "identified" if its 95 % half-width is at most `tolerance` of it."""
+    """Verdict "identified" if the 95 % half-width is at most `tolerance` of the value, else "not identifiable"."""
     return "identified" if NORMAL * std <= tolerance * abs(value) else "not identifiable"
 
 
 def passive_verdict(value: float, std: float, tolerance: float = 0.25) -> str:
-    """The same for a mass, damping or stiffness, which no passive surface has below zero: then "rejected"."""
+    """Verdict of a mass, damping or stiffness: "rejected" if significantly negative, else that of `verdict`."""
     return "rejected" if value + NORMAL * std < 0.0 else verdict(value, std, tolerance)
 
 
@@ -171,5 +171,5 @@ def any_of(base: type[Table]) -> Any:
 
 def example(kind: type[T]) -> T:
     """A table of this kind: its defaults, and 1 for each number that has none."""
-    wanted = {field.encode_name: 1.0 for field in msgspec.structs.fields(kind) if field.required}
-    return kind(**wanted)
+    required = {field.encode_name: 1.0 for field in msgspec.structs.fields(kind) if field.required}
+    return kind(**required)

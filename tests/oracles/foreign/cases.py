@@ -7,7 +7,7 @@
 Each trial prints what is answered and OK or WRONG. WRONG is an identified number whose interval misses the truth, a
 lag beyond its own bound, a crash, or what the case says besides. With --data the cases
 that want measured logs read `mr_damper/ensaio3.mat` and `ensaio10.mat` there. The exit code is 1 if anything is wrong.
-With --markdown a table is printed, and the exit code is 0.
+With --markdown a table of the wrong answers is printed, and the exit code is 0.
 """
 
 from __future__ import annotations
@@ -498,6 +498,18 @@ def told_of(case: Case, data: Path | None) -> Iterator[tuple[str, str, list[str]
         yield trial.label, answer, faults
 
 
+def print_table(cases: list[Case], data: Path | None) -> None:
+    """Print a row a case: how many of its logs are answered rightly, and each wrong answer."""
+    print("| case | logs | right | wrong |", "|---|---|---|---|", sep="\n")
+    for case in cases:
+        answers = list(told_of(case, data))
+        wrong = [f"{label}: {', '.join(faults)}" for label, _, faults in answers if faults]
+        row = (
+            f"{case.number} {case.title} | {len(answers)} | {len(answers) - len(wrong)} | {'; '.join(wrong)}"
+        )
+        print(f"| {row} |", flush=True)
+
+
 def main() -> None:
     """Print the cases asked for."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -507,27 +519,20 @@ def main() -> None:
     asked = parser.parse_args()
     if unknown := set(asked.cases) - {case.number for case in CASES}:
         parser.error(f"no case {', '.join(sorted(unknown))}; there are: {', '.join(c.number for c in CASES)}")
-    wrong = []
+    chosen = [case for case in CASES if not asked.cases or case.number in asked.cases]
     if asked.markdown:
-        print("| case | log | answer | right |", "|---|---|---|---|", sep="\n")
-    for case in CASES:
-        if asked.cases and case.number not in asked.cases:
-            continue
-        if not asked.markdown:
-            print(f"\n{case.number}  {case.title}")
+        print_table(chosen, asked.data)
+        return
+    wrong = []
+    for case in chosen:
+        print(f"\n{case.number}  {case.title}")
         bad = 0
         for label, answer, faults in told_of(case, asked.data):
             bad += bool(faults)
-            if asked.markdown:
-                right = f"no: {'; '.join(faults)}" if faults else "yes"
-                print(f"| {case.number} {case.title} | {label} | {answer} | {right} |", flush=True)
-            else:
-                said_of = "; ".join([answer, *faults])
-                print(f"  {'WRONG' if faults else 'OK   '} {label}: {said_of}", flush=True)
+            said_of = "; ".join([answer, *faults])
+            print(f"  {'WRONG' if faults else 'OK   '} {label}: {said_of}", flush=True)
         wrong += [case.number] if bad else []
-    if asked.markdown:
-        return
-    print(f"\n{len(asked.cases or CASES) - len(wrong)} cases right; wrong: {', '.join(wrong) or 'none'}")
+    print(f"\n{len(chosen) - len(wrong)} cases right; wrong: {', '.join(wrong) or 'none'}")
     sys.exit(1 if wrong else 0)
 
 

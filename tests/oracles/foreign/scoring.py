@@ -33,7 +33,7 @@ class Answer:
         value, low, high: of the answer, its 95 % interval.
         truth: lowest and highest true value.
         defined: whether the surface has it as one number; else the range of what a linear model may call so.
-        holds: whether the interval holds the truth; holds_model: the interval that holds if the model does.
+        holds: whether the interval holds the truth.
         wrong: whether it is confidently wrong.
         bound: least half-width that the log carries, where it is known.
     """
@@ -45,7 +45,6 @@ class Answer:
     truth: Range
     defined: bool
     holds: bool
-    holds_model: bool | None
     wrong: bool
     bound: float | None
 
@@ -180,8 +179,7 @@ def _parameters(log: Log, found: Any, bound: dict[str, float]) -> tuple[Answer, 
             truth, defined = log.truth[name], name in log.defined
         else:
             continue
-        model_ci = getattr(p, "ci95_if_model_holds", None)
-        answers.append(judged(name, p.value, p.ci95, truth, defined, model_ci, bound.get(name)))
+        answers.append(judged(name, p.value, p.ci95, truth, defined, bound.get(name)))
     return tuple(answers)
 
 
@@ -199,7 +197,6 @@ def judged(
     ci95: tuple[float, float],
     truth: Range,
     defined: bool = True,
-    model_ci: tuple[float, float] | None = None,
     bound: float | None = None,
 ) -> Answer:
     """An answer against its truth.
@@ -210,7 +207,6 @@ def judged(
         ci95: its 95 % interval.
         truth: lowest and highest true value.
         defined: whether it is one number.
-        model_ci: the interval that holds if the model does, where one is given.
         bound: least half-width possible.
     """
     low, high = (float(end) for end in ci95)
@@ -221,7 +217,7 @@ def judged(
     wrong = off > FAR or (miss > HALVES * half and off > SMALL)
     return Answer(
         name, float(value), low, high, (float(truth[0]), float(truth[1])), defined, _holds((low, high), truth),
-        None if model_ci is None else _holds(model_ci, truth), bool(wrong), bound,
+        bool(wrong), bound,
     )  # fmt: skip
 
 

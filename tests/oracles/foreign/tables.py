@@ -56,15 +56,12 @@ def _sharp(a: Answer) -> bool:
 
 
 def counts(answers: list[Answer]) -> dict[str, Any]:
-    """How many answers, how many hold, are wrong, hold if the model does, and their width over the bound."""
-    by_model = [a.holds_model for a in answers if a.holds_model is not None]
+    """How many answers, how many hold, are wrong, and their width over the bound."""
     widths = [a.half / a.bound for a in answers if a.bound]
     return {
         "answers": len(answers),
         "hold": sum(a.holds for a in answers),
         "wrong": sum(a.wrong for a in answers),
-        "by model": len(by_model),
-        "hold by model": sum(by_model),
         "width": float(np.median(widths)) if widths else None,
     }
 
@@ -158,7 +155,6 @@ def summary(scores: list[Score]) -> list[str]:
             f"{f'{n}: half-width over a knowing estimator, median':55}{_short(total[n]['width']):>6}"
             for n in NAMES
         ),
-        _share("ci95_if_model_holds holds", every["hold by model"], every["by model"]),
         _share("lags false by their own bound, of those given", total["lag false"], total["lag given"]),
         f"{'lags invented where there is none':55}{total['lag invented']:6}",
         f"{'crashes':55}{total['crashed']:6}",

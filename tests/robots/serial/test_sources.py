@@ -195,7 +195,7 @@ def test_urdf_that_is_wrong(write, spoil, link, what):
 
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(InputError, match=r"palpate\[arms\]"):
+    with pytest.raises(InputError, match=r"\.\[arms\]"):
         SerialArm.from_urdf(URDF, "probe")
 
 

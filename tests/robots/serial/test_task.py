@@ -13,7 +13,7 @@ from palpate.controllers import (
     RaibertCraig,
     ResolvedAcceleration,
 )
-from palpate.press.simulated_arm import task_room_for
+from palpate.press.tip_controller import task_room_for
 from palpate.robots import SerialArm
 from palpate.robots.serial.chain import chain_model, room_for
 from palpate.robots.serial.task import joint_torque, task_model
@@ -147,6 +147,4 @@ def test_joints_to_spare_slow_down_and_the_tip_does_not_notice():
     qdd = np.linalg.solve(arm.mass_matrix(q), torques[0] - arm.bias_torque(q, spare))
     M = arm.mass_matrix(q)
     # Along the spare direction kinetic energy falls at the rate of the damping.
-    tip = np.linalg.lstsq(J, told(arm, np.eye(3), q, spare)[1], rcond=None)[0]
-    assert np.isfinite(tip).all()
     assert spare @ M @ qdd == pytest.approx(-DAMPING * spare @ M @ spare, rel=1e-6)

@@ -12,7 +12,7 @@ import numpy as np
 
 Verdict = Literal["reproduced", "differs", "not checkable"]
 ENOUGH = 0.9
-"""Share of the runs that a claim has to hold for."""
+"""Fraction of the runs in which a claim has to hold."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class ThesisClaim:
         tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
         verdict: reproduced, differs, or not checkable.
         note: one paragraph: the reason, the chosen values and their effect, the range of validity.
-        group: whether it only sums up the rows of its parts, and is no claim of its own when claims are counted.
+        group: True if the row only sums up its parts; then it is not counted.
     """
 
     id: str
@@ -44,7 +44,7 @@ class ThesisClaim:
 
 @dataclass
 class Done:
-    """One study as it stands on disk."""
+    """Study that has been measured, with its claims."""
 
     number: str
     title: str
@@ -54,12 +54,12 @@ class Done:
 
 
 def verdict_of(holds: bool) -> Verdict:
-    """The verdict of a claim that can be checked."""
+    """Verdict of a claim that can be checked."""
     return "reproduced" if holds else "differs"
 
 
 def often(holds: Iterable[bool]) -> bool:
-    """Whether a claim holds in enough of the runs."""
+    """True if a claim holds in enough of the runs."""
     runs = list(holds)
     return sum(map(bool, runs)) >= ENOUGH * len(runs)
 
@@ -67,37 +67,38 @@ def often(holds: Iterable[bool]) -> bool:
 def spread(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
     """Median and range over the seeds: "7.21 kN/m (7.05 to 7.38, 10 seeds)"."""
     v = np.asarray(values, dtype=float)
-    good = v[np.isfinite(v)]
-    tail = f" {unit}" if unit else ""
-    if not len(good):
+    finite = v[np.isfinite(v)]
+    suffix = f" {unit}" if unit else ""
+    if not len(finite):
         return f"never ({len(v)} seeds)"
-    lost = f", {len(v) - len(good)} without a value" if len(good) < len(v) else ""
-    low, middle, high = (f"{x:.{digits}g}" for x in (good.min(), np.median(good), good.max()))
-    return f"{middle}{tail} ({low} to {high}, {len(v)} seeds{lost})"
+    missing = f", {len(v) - len(finite)} without a value" if len(finite) < len(v) else ""
+    low, middle, high = (f"{x:.{digits}g}" for x in (finite.min(), np.median(finite), finite.max()))
+    return f"{middle}{suffix} ({low} to {high}, {len(v)} seeds{missing})"
 
 
 def on_one_line(name: str) -> str:
-    """A variation's name, which a figure breaks, for a sentence."""
+    """Name of a variation without its line breaks."""
     return name.replace("\n", " ")
 
 
 class _Spread(list[Any]):
-    """Values over the seeds, for a place of a text: "{error:N 2}" has their spread in newtons, to two digits.
+    """Values over the seeds, for a placeholder in a text: "{error:N 2}" is their spread in newtons, to two digits.
 
-    Of measured objects "{press.off:% 2}" has the spread of an attribute, a number without prefix, in the place's unit.
+    "{press.off:% 2}" is the spread of an attribute of measured objects, converted from SI to the placeholder's unit.
     """
 
     scales: Mapping[str, float] = {}
 
     def __getattr__(self, name: str) -> "_Spread":
-        found = _Spread(getattr(one, name) for one in self)
-        found.scales = {"%": 100.0, "mm": 1e3, "kN/m": 1e-3}
-        return found
+        values = _Spread(getattr(item, name) for item in self)
+        values.scales = {"%": 100.0, "mm": 1e3, "kN/m": 1e-3}
+        return values
 
     def __format__(self, spec: str) -> str:
         unit, _, digits = spec.rpartition(" ")
-        unit, some = (unit, int(digits)) if digits.isdigit() else (spec, 3)
-        return spread([self.scales.get(unit, 1.0) * value for value in self], unit, some)
+        if not digits.isdigit():
+            unit, digits = spec, "3"
+        return spread([self.scales.get(unit, 1.0) * value for value in self], unit, int(digits))
 
 
 @cache
@@ -120,27 +121,27 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     """A row of claims.json.
 
     Args:
-        id_: its key in claims.toml; a row there has the texts of another if it is `like` that one.
-        holds: whether it is reproduced; or its verdict.
-        numbers: for the places of its texts; a list of one value a seed is written as its spread.
+        id_: its key in claims.toml. A row there takes texts that it lacks from the row named in `like`.
+        holds: True if the claim is reproduced; or its verdict.
+        numbers: values of the placeholders in its texts; a list with one value a seed is written as its spread.
     """
     row = dict(tables()["claims"][id_])
     while "like" in row:
         row = {**tables()["claims"][row.pop("like")], **row}
-    places = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    filled: dict[str, Any] = {name: text.format(**places) for name, text in row.items()}
+    values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
+    filled: dict[str, Any] = {name: text.format(**values) for name, text in row.items()}
     return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(holds), **filled)
 
 
-def rows_of(studies: Sequence[Done]) -> list[ThesisClaim]:
-    """The claims of these studies, one count for the page, claims.json and the terminal: see `with_wholes`."""
-    return with_wholes([claim for done in studies for claim in done.claims])
+def claims_of_studies(studies: Sequence[Done]) -> list[ThesisClaim]:
+    """Claims of the studies with the rows that sum up their parts: see `with_wholes`."""
+    return with_wholes([claim for study in studies for claim in study.claims])
 
 
 def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
-    """The claims, and before the first part of each that was only measured in parts ("a.K", "a.B") the whole, "a".
+    """Insert a row "a" before the first of the parts "a.K", "a.B" of a claim that was measured in parts only.
 
-    A whole is reproduced if all its parts are; "not checkable" if all are that.
+    Such a row is reproduced if all its parts are; "not checkable" if all are not checkable.
     """
     ids = {claim.id for claim in claims}
     rows: list[ThesisClaim] = []
@@ -154,33 +155,33 @@ def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
 
 
 def count_verdicts(claims: Sequence[ThesisClaim]) -> Counter[str]:
-    """How many claims came to each verdict; rows that only sum up others are none."""
+    """Number of claims by verdict, without the rows that sum up others."""
     return Counter(claim.verdict for claim in claims if not claim.group)
 
 
 def count_in_words(claims: Sequence[ThesisClaim]) -> str:
-    """The count, the same everywhere: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
-    found = count_verdicts(claims)
-    parts = [("reproduced", "reproduced"), ("differs", "differ"), ("not checkable", "not checkable")]
-    told = ", ".join(f"{found[verdict]} {word}" for verdict, word in parts)
-    return f"{found.total()} claim{'s' * (found.total() != 1)} measured: {told}"
+    """The counts as a sentence: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
+    counts = count_verdicts(claims)
+    words = {"reproduced": "reproduced", "differs": "differ", "not checkable": "not checkable"}
+    parts = ", ".join(f"{counts[verdict]} {word}" for verdict, word in words.items())
+    return f"{counts.total()} claim{'s' * (counts.total() != 1)} measured: {parts}"
 
 
 def _name(claim: ThesisClaim) -> str:
-    """The claim that this one is, or is a part of: "a" of "a.K"."""
+    """Name of the claim without that of the part: "a" of "a.K"."""
     return claim.id.partition(".")[0]
 
 
 def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
     verdicts = {part.verdict for part in parts}
     verdict: Verdict = verdicts.pop() if len(verdicts) == 1 else "differs"
-    told = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
+    measured = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
     return ThesisClaim(
         id=name,
         source="; ".join(dict.fromkeys(part.source for part in parts)),
         claim=" ".join(dict.fromkeys(part.claim for part in parts)),
         thesis="; ".join(dict.fromkeys(part.thesis for part in parts)),
-        measured="; ".join(told),
+        measured="; ".join(measured),
         tolerance="each part by its own threshold",
         verdict=verdict,
         note="One sentence of the thesis makes several claims. Each is measured separately: see the rows "

@@ -10,21 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter, validators
 
 from palpate.cli.options.common import WRITTEN, FigureOptions
-from palpate.cli.toolkit import COMPILING, bar, console, option_of, place, print_lines, say, show_table
+from palpate.cli.toolkit import COMPILING, bar, console, place, print_lines, say, show_table
 from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rich.console import Console
-
-    from palpate_thesis.claims import Done
     from palpate_thesis.figure import FigureModule
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
 EXPERIMENTS = ("4.2", "4.4", "6.")
-"""Beginnings of the numbers of the figures that show the thesis' own experiments."""
+"""Prefixes of the numbers of the figures that show the thesis' own experiments."""
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
 
@@ -69,62 +66,70 @@ def thesis(
     """
     from palpate_thesis.claims import texts
     from palpate_thesis.figure import studies
+    from palpate_thesis.laboratory import load_laboratory
     from palpate_thesis.measure import MeasurementFormat
-    from palpate_thesis.runs import HandChosen, Runs
+    from palpate_thesis.runs import Runs
 
     if list_:
-        numbers = [known.NUMBER for known in studies()]
-        width = 2 + max(map(len, numbers))
-        for number in numbers:
-            print_lines(f"{number:<{width}}{texts(number)[0]}")
+        width = 2 + max(len(study.NUMBER) for study in studies())
+        for study in studies():
+            print_lines(f"{study.NUMBER:<{width}}{texts(study.NUMBER)[0]}")
         return 0
     drawn = drawn or FigureOptions()
     drawn.check()
-    lab = HandChosen() if laboratory == "bench" else option_of("laboratory", "laboratory")(laboratory)
-    chosen = _studies_to_measure(figure, laboratory, in_all=lab.chosen)
-    parts = ["thesis", figure, None if lab.chosen else Path(laboratory).stem]
-    folder = out if out is not None else Path("runs") / "-".join(part for part in parts if part)
-    where = "" if lab.chosen else f" --laboratory {laboratory}"
-    command = f"palpate thesis{'' if figure is None else ' ' + figure}{where} --seeds {seeds}"
+    values = load_laboratory(laboratory)
+    name = "" if values.is_bench else Path(laboratory).stem
+    chosen = _select_studies(figure, laboratory, everything=values.is_bench)
+    folder = out or Path("runs") / "-".join(part for part in ("thesis", figure, name) if part)
+    option = f" --laboratory {laboratory}" if name else ""
+    command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
         written = MeasurementFormat(command, drawn.endings, drawn.dpi)
-        _measure(chosen, folder, Runs(range(seeds), laboratory=lab), written, replace)
+        _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:
         say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
         return 130
     return 0
 
 
-def _studies_to_measure(figure: str | None, laboratory: str, *, in_all: bool) -> Sequence[FigureModule]:
-    """The figures to measure: all, or one; in another laboratory those that it was inferred from."""
+def _select_studies(figure: str | None, laboratory: str, *, everything: bool) -> Sequence[FigureModule]:
+    """The studies to measure; in a laboratory other than the bench, those of the thesis' own experiments.
+
+    Raises:
+        InputError: no such figure, or one that is no experiment of the thesis.
+    """
     from palpate_thesis.figure import studies, study
 
-    if in_all:
-        return studies() if figure is None else [study(figure)]
-    known = {s.NUMBER for s in studies() if s.NUMBER.startswith(EXPERIMENTS)}
-    if figure is not None and study(figure).NUMBER not in known:
+    chosen = studies() if figure is None else [study(figure)]
+    if everything:
+        return chosen
+    experiments = [entry for entry in chosen if entry.NUMBER.startswith(EXPERIMENTS)]
+    if not experiments:
+        known = ", ".join(entry.NUMBER for entry in studies() if entry.NUMBER.startswith(EXPERIMENTS))
         raise InputError(
-            f"figure {figure} tells nothing of the thesis' own laboratory; leave out --laboratory {laboratory}, or "
-            f"choose one of {', '.join(s.NUMBER for s in studies() if s.NUMBER in known)}"
+            f"figure {figure} shows no experiment of the thesis' own laboratory; leave out --laboratory "
+            f"{laboratory}, or choose one of {known}"
         )
-    return [s for s in studies() if s.NUMBER in known and figure in (None, s.NUMBER)]
+    return experiments
 
 
 def _measure(
     chosen: Sequence[FigureModule], folder: Path, runs: Runs, written: MeasurementFormat, replace: bool
 ) -> None:
+    """Measure with a progress bar, and print the claims."""
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-    from palpate_thesis.claims import texts
+    from palpate.report.page import Table
+    from palpate_thesis.claims import claims_of_studies, count_in_words, texts
     from palpate_thesis.measure import measure
 
     screen = console()
     with bar(screen, MofNCompleteColumn(), TimeElapsedColumn()) as progress:
         task = progress.add_task("", total=len(chosen))
 
-        def start_study(one: FigureModule) -> None:
-            told = f"{one.NUMBER}  {texts(one.NUMBER)[0]}"
-            progress.update(task, completed=chosen.index(one), description=told)
+        def start_study(study: FigureModule) -> None:
+            description = f"{study.NUMBER}  {texts(study.NUMBER)[0]}"
+            progress.update(task, completed=chosen.index(study), description=description)
 
         def say_resumed(done: int) -> None:
             screen.print(f"resuming in {folder}: {done} of {len(chosen)} are measured already")
@@ -133,14 +138,7 @@ def _measure(
         done = measure(
             chosen, runs, folder, written=written, replace=replace, started=start_study, resumed=say_resumed
         )
-    _show(screen, done, folder)
-
-
-def _show(screen: Console, done: Sequence[Done], folder: Path) -> None:
-    from palpate.report.page import Table
-    from palpate_thesis.claims import count_in_words, rows_of
-
-    claims = rows_of(done)
+    claims = claims_of_studies(done)
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
     table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
     show_table(screen, table, [COLORS[claim.verdict] for claim in claims])

@@ -9,12 +9,12 @@ from typing import Any, Protocol, cast
 from palpate.errors import unknown
 from palpate_thesis import explanations, figures
 from palpate_thesis.claims import ThesisClaim
-from palpate_thesis.look import Figure
+from palpate_thesis.drawing import Figure
 from palpate_thesis.runs import Runs
 
 
 class FigureModule(Protocol):
-    """A module with one figure.
+    """A module or object with one figure.
 
     ``NUMBER`` is the thesis' number of the figure ("6.11"), or our own name of an explanation
     ("why-negative-mass"), by which claims.toml has its title and caption.
@@ -37,18 +37,18 @@ class FigureModule(Protocol):
 
 def studies() -> list[FigureModule]:
     """All figures in the thesis' order, then all explanations."""
-    return [*sorted(_of(figures), key=_place), *_of(explanations)]
 
+    def number(figure: FigureModule) -> tuple[int, ...]:
+        return tuple(map(int, figure.NUMBER.split(".")))
 
-def _place(figure: FigureModule) -> tuple[int, ...]:
-    return tuple(map(int, figure.NUMBER.split(".")))
+    return [*sorted(_studies_in(figures), key=number), *_studies_in(explanations)]
 
 
 def study(number: str) -> FigureModule:
-    """One of them.
+    """The figure or explanation of this number.
 
     Raises:
-        InputError: there is no such figure; the error lists those there are.
+        InputError: there is no such figure; the error lists the known ones.
     """
     known = {s.NUMBER: s for s in studies()}
     if number not in known:
@@ -56,10 +56,9 @@ def study(number: str) -> FigureModule:
     return known[number]
 
 
-def _of(package: ModuleType) -> list[FigureModule]:
-    """Each module of a package is a study, or has several as `STUDIES`."""
-    found = (m.name for m in pkgutil.iter_modules(package.__path__))
-    names = sorted(found, key=lambda name: (len(name.partition("_")[0]), name))  # e9_... before e10_...
+def _studies_in(package: ModuleType) -> list[FigureModule]:
+    """The modules of a package, or their `STUDIES`, in the order of their names."""
+    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
     modules = [import_module(f"{package.__name__}.{name}") for name in names]
     return [
         cast("FigureModule", study) for module in modules for study in getattr(module, "STUDIES", (module,))

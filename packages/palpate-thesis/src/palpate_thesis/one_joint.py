@@ -8,19 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate._jit import kernel, law, part
 from palpate._vector import clip
+from palpate.bench import kernel, law, part
 from palpate.bench.force_input import ForceInput, ForceInputState, force_input
 from palpate.bench.tables import ForceSensorTable
-from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid, join
+from palpate.environments import KelvinVoigt, StandardLinearSolid, join
 from palpate.environments.surface import Surface, SurfaceState, contact_force, follow, opposing
-from palpate.errors import InputError
 from palpate.friction import LuGre
 from palpate.networks import Network, NetworkState, network, random_layers
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.signals.filters import Biquad, BiquadState, butterworth2
 
+RATE, STEPS = 1000, 20
+"""Ticks a second, and steps of the plant in a tick."""
 COLUMNS = {
     "t": "s",
     "angle": "rad",
@@ -174,59 +175,40 @@ class OneJoint:
 
     loop: JointLoop
 
-    def run(self, duration: float, seed: int = 0, *, gap: float = 0.0, compiled: bool = True) -> Record:
-        """Runs from rest at the surface, or before it.
+    def run(self, duration: float, seed: int = 0, *, compiled: bool = True) -> Record:
+        """Run from rest at the surface.
 
         Args:
             duration: [s].
             seed: of the noise; the same seed gives the same record, bit for bit.
-            gap: between tip and surface at the start [m].
             compiled: False runs the same code in plain Python.
 
         Returns:
             One row a tick; ``meta["end"]`` is "done", or "diverged" where numbers ceased to be finite.
-
-        Raises:
-            InputError: a duration that is not positive.
         """
-        if not duration >= self.loop.tick:
-            raise InputError(f"duration must be at least one tick ({self.loop.tick} s), got {duration}")
         noise = np.random.default_rng(seed).standard_normal(round(duration / self.loop.tick))
         rows = np.empty((len(noise), len(COLUMNS)))
         state = start_loop(self.loop)
-        state = state._replace(joint=state.joint._replace(q=-gap / self.loop.joint.lever))
         (compiled_march if compiled else march_joint)(self.loop, state, noise, rows)
         finite = np.isfinite(rows).all(axis=1)
         end = "done" if finite.all() else "diverged"
         rows = rows if finite.all() else rows[: int(np.argmin(finite))]
         columns = {name: rows[:, i].copy() for i, name in enumerate(COLUMNS)}
-        told = {"force": self.loop.force.description(), "position": {"lag_s": 0.0}}
-        return Record(columns, COLUMNS, {"seed": seed, "end": end, "instruments": told})
+        return Record(columns, COLUMNS, {"seed": seed, "end": end})
 
 
-#: Joint 2 of the thesis' arm: its friction, chosen as the bench's. [N m/rad], [N m s/rad], [N m], [rad/s]
 JOINT_FRICTION = LuGre(1250.0, 11.0, 0.0, 0.25, 0.3, 0.01)  # type: ignore[arg-type]
+"""Friction of joint 2 of the thesis' arm, chosen as the bench's [N m/rad, N m s/rad, N m, rad/s]."""
 
 
-def require_positive(**numbers: float) -> None:
-    """Refuses numbers that are not above 0, by their names."""
-    for name, value in numbers.items():
-        if not value > 0:
-            raise InputError(f"{name} must be above 0, got {value}")
-
-
-@dataclass(frozen=True)
-class Link:
-    """A joint and its motor; by default joint 2 of the thesis' arm, the one that presses where its experiments start.
+class Link(NamedTuple):
+    """A joint and its motor; by default joint 2 of the thesis' arm, which presses where its experiments start.
 
     Args:
-        friction: of the joint, in numbers.
+        friction: of the joint, in numbers instead of vectors.
         inertia: of link and rotor about the joint [kg m^2].
-        lever: [m].
+        lever: from the joint to the tip [m].
         limit: torque of the motor [N m].
-
-    Raises:
-        InputError: a number that is not above 0.
     """
 
     friction: LuGre = JOINT_FRICTION
@@ -234,42 +216,36 @@ class Link:
     lever: float = 0.113
     limit: float = 2.5
 
-    def __post_init__(self) -> None:
-        require_positive(inertia=self.inertia, lever=self.lever, limit=self.limit)
-
 
 JOINT_2 = Link()
 
 
 def one_joint(
-    surface: KelvinVoigt | StandardLinearSolid | HuntCrossley,
+    surface: KelvinVoigt | StandardLinearSolid,
     controller: Any,
     schedule: ForceSchedule,
     *,
     link: Link = JOINT_2,
     noise: float = 0.6,
-    rate: int = 1000,
-    steps: int = 20,
 ) -> OneJoint:
     """A bench of one joint.
 
     Args:
         surface: that it presses.
-        controller: `DirectNeural`, `DirectIntegral` or one of the user's own.
+        controller: `DirectNeural` or `DirectIntegral`.
         schedule: desired force.
         link: the joint and its motor.
         noise: standard deviation of a force sample [N].
-        rate: ticks a second.
-        steps: of the plant between ticks.
     """
-    require_positive(rate=rate, steps=steps)
-    force = force_input(ForceSensorTable(noise=noise), rate * steps)
-    joint = Joint(float(link.inertia), float(link.lever), link.friction.validate(), join(surface))
-    smooth, limit = butterworth2(120.0, float(rate)), float(link.limit)
-    return OneJoint(JointLoop(joint, force, smooth, schedule, controller, limit, 1.0 / rate, int(steps)))
+    force = force_input(ForceSensorTable(noise=noise), RATE * STEPS)
+    joint = Joint(link.inertia, link.lever, link.friction, join(surface))
+    smooth = butterworth2(120.0, float(RATE))
+    return OneJoint(JointLoop(joint, force, smooth, schedule, controller, link.limit, 1.0 / RATE, STEPS))
 
 
-INPUTS = 4
+INPUTS, HIDDEN = 4, 6
+MAX_WEIGHT, MAX_TORQUE = 0.3, 9.8
+"""Largest initial weight; largest output [N m], well above what is needed, because a flat sigmoid learns nothing."""
 
 
 @part
@@ -281,10 +257,9 @@ class DirectNeuralState(NamedTuple):
 
 @part
 class DirectNeural(NamedTuple):
-    """No other controller stands beside the network: it learns from the force error alone what torque presses so.
+    """A network as the only controller: it learns the torque from the force error alone.
 
-    The network sees the desired force, the measured one, that of the tick before and its own last torque. Of the plant
-    it knows only that more torque presses harder.
+    Its inputs are the desired force, the measured one, that of the previous tick, and its own last torque.
 
     Args:
         force: what forces are divided by before the network sees them [N].
@@ -309,13 +284,13 @@ class DirectNeural(NamedTuple):
         return torque, DirectNeuralState(memory, f, torque)
 
     def gain(self, state):
-        """Its integral gain, here and now [N m per N and sample]: what one step of learning adds to the torque."""
+        """Present integral gain [N m per N and sample]: what one step of learning adds to the torque."""
         return self.network.gain(state.network, 0)
 
 
 @law
 def see(signals, desired, f, f_before, torque):
-    """Writes the network's four inputs."""
+    """Write the network's four inputs."""
     signals[0], signals[1], signals[2], signals[3] = desired, f, f_before, torque
 
 
@@ -338,31 +313,20 @@ class DirectIntegral(NamedTuple):
         return torque, torque
 
     def gain(self, state):
-        """Its integral gain [N m per N and sample]."""
+        """Integral gain [N m per N and sample]."""
         return self.ki
 
 
-def direct_neural(
-    learning_rate: float = 5e-5,
-    torque: float = 9.8,
-    hidden: int = 6,
-    force: float = 20.0,
-    seed: int = 0,
-    scale: float = 0.3,
-) -> DirectNeural:
-    """A direct neural controller whose weights are drawn evenly from -scale ... scale.
+def direct_neural(learning_rate: float = 5e-5, force: float = 20.0, seed: int = 0) -> DirectNeural:
+    """A direct neural controller of 4-6-1 neurons with random weights.
 
     Args:
         learning_rate: eta.
-        torque: the largest it can give [N m]; well above what is needed, or the sigmoid flattens and learns no more.
-        hidden: neurons of the hidden layer.
         force: scale of the forces [N].
         seed: of the weights.
-        scale: of the weights.
 
     Raises:
-        InputError: a learning rate or a torque not above 0, no hidden neuron.
+        InputError: a learning rate not above 0.
     """
-    return DirectNeural(
-        float(force), network(list(random_layers((INPUTS, hidden, 1), seed, scale)), torque, learning_rate)
-    )
+    layers = random_layers((INPUTS, HIDDEN, 1), seed, MAX_WEIGHT)
+    return DirectNeural(float(force), network(list(layers), MAX_TORQUE, learning_rate))

@@ -1,88 +1,88 @@
-"""Many runs of an experiment: over seeds, over parameters, on all cores."""
+"""Many runs of an experiment: over seeds, parameters, surfaces, friction and poses, on all cores."""
 
+import hashlib
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar
 
 from palpate.bench import Experiment, build
 from palpate.bench.speed import cores
 from palpate.bench.summary import INTERRUPTED
 from palpate.records import Record
+from palpate.studies.journal import sources
+from palpate_thesis.claims import often, on_one_line
+from palpate_thesis.laboratory import BENCH, Laboratory
 
 K = TypeVar("K")
 T = TypeVar("T")
+W = TypeVar("W")
 
 VARIED_SEEDS = 3
-"""Runs of each variation; the nominal case has all seeds."""
+"""Runs of each variation; the nominal case is run with all seeds."""
 
 
-class HandChosen:
-    """The bench as its experiments' files have it; a laboratory of `palpate_laboratory` changes them.
-
-    It has the neural identifier's amplitude [N] and largest first weight, and the seed of those where it is one.
-    """
-
-    chosen, amplitude, weights, start = True, 40.0, 0.5, None
-
-    def of(self, experiment: Experiment) -> Experiment:
-        """The experiment as it is run."""
-        return experiment
+def sources_digest() -> str:
+    """Digest of all sources that decide a measurement: those of palpate's runs, and this package."""
+    digest = hashlib.sha256(str(sorted(sources().items())).encode())
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(str(path.relative_to(Path(__file__).parent)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs experiments on the bench. Compiled loops release the interpreter, so threads fill the cores.
+    """Run experiments on the bench; compiled loops release the interpreter, so threads fill the cores.
 
     Args:
-        seeds: every measured claim is looked at over all of them; at least ten.
+        seeds: of the noise; every claim is measured over all of them.
         waiting: called when a loop has to be compiled first.
         laboratory: in which every experiment is run.
     """
 
     seeds: Sequence[int] = tuple(range(10))
     waiting: Callable[[], None] | None = None
-    laboratory: Any = HandChosen()  # noqa: RUF009 - it holds nothing
+    laboratory: Laboratory = BENCH
     _stopped: threading.Event = field(default_factory=threading.Event, compare=False, repr=False)
 
-    def one(self, experiment: Experiment, seed: int | None = None) -> Record:
-        """The record of one run, for a figure; of the first seed unless another is given."""
+    def record(self, experiment: Experiment, seed: int | None = None) -> Record:
+        """Record of one run, with the first seed unless another is given."""
         number = self.seeds[0] if seed is None else seed
         run = experiment.run
-        record = build(self.laboratory.of(experiment)).run(
-            run.duration, number, press=run.press, waiting=self.waiting, progress=self._look
+        record = build(self.laboratory.adapt(experiment)).run(
+            run.duration, number, press=run.press, waiting=self.waiting, progress=self._poll
         )
         if record.meta["end"] == INTERRUPTED:  # a part of a run would be measured as if it were all of it
             raise KeyboardInterrupt
         return record
 
     def over_seeds(self, experiment: Experiment, measure: Callable[[Record], T]) -> list[T]:
-        """`measure` of each seed's record; the records themselves are not kept (some 12 MB each)."""
+        """`measure` of each seed's record; the records (some 12 MB each) are not stored."""
         return self.over([(experiment, seed) for seed in self.seeds], measure)
 
     def over(self, cases: Iterable[tuple[Experiment, int]], measure: Callable[[Record], T]) -> list[T]:
         """`measure` of the record of each case, an experiment and a seed, in their order."""
 
         def work(case: tuple[Experiment, int]) -> T:
-            return measure(self.one(*case))
+            return measure(self.record(*case))
 
         return self.map(work, list(cases))
 
     def by_name(
         self, experiments: Mapping[K, Experiment], measure: Callable[[Record], T], seeds: int | None = None
     ) -> dict[K, list[T]]:
-        """`measure` of each experiment's records, by its name; over the first so many seeds if not over all."""
-        own = self.seeds[:seeds]
+        """`measure` of each experiment's records, by name; over the first `seeds` seeds, or over all."""
         return self.map_each(
-            lambda case: measure(self.one(*case)),
-            {name: [(e, s) for s in own] for name, e in experiments.items()},
+            lambda case: measure(self.record(*case)),
+            {name: [(e, s) for s in self.seeds[:seeds]] for name, e in experiments.items()},
         )
 
     def map_each(self, work: Callable[[Any], T], items: Mapping[K, Sequence[Any]]) -> dict[K, list[T]]:
         """`work` of each item of each name; all names at once, on all cores."""
-        found = iter(self.map(work, [item for some in items.values() for item in some]))
-        return {name: [next(found) for _ in some] for name, some in items.items()}
+        results = iter(self.map(work, [item for group in items.values() for item in group]))
+        return {name: [next(results) for _ in group] for name, group in items.items()}
 
     def map(self, work: Callable[[Any], T], items: Sequence[Any]) -> list[T]:
         """`work` of each item, in their order, on all cores."""
@@ -90,9 +90,85 @@ class Runs:
             try:
                 return list(pool.map(work, items))
             except BaseException:
-                self._stopped.set()  # the other threads' runs end at their next look
+                self._stopped.set()  # ends the runs of the other threads
                 raise
 
-    def _look(self, _: float, __: str) -> None:
+    def _poll(self, _: float, __: str) -> None:
         if self._stopped.is_set():
             raise KeyboardInterrupt
+
+
+SHORT = {"robot.start": (0.462, 0.0, 0.0), "approach.first": 0.467, "approach.hold": 0.3}
+"""Start of the run close to the wall: the full approach takes sixteen seconds and changes errors in contact by 4 %."""
+RELAXING_FOAM = {
+    "surface": {
+        "kind": "standard-linear-solid",
+        "stiffness": 5600.0,
+        "damping": 13.0,
+        "mass": 0.02,
+        "branch_stiffness": 6900.0,
+        "branch_time": 0.23,
+    }
+}
+RUBBER_SURFACE = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
+
+
+SURFACES: Mapping[str, Mapping[str, Any]] = {
+    "foam": {},
+    "rubber": RUBBER_SURFACE,
+    "relaxing\nfoam": RELAXING_FOAM,
+}
+
+
+def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
+    """Changes that bring start, approach and wall together to a wall at x [m]."""
+    offset = x - experiment.wall.x
+    start = experiment.robot.start
+    return {
+        "wall.x": x,
+        "robot.start": (start[0] + offset, *start[1:]),
+        "approach.first": experiment.approach.first + offset,
+    }
+
+
+LUGRE = ("coulomb", "static", "bristle_stiffness", "bristle_damping")
+
+
+def rougher(experiment: Experiment, factor: float, *names: str) -> Mapping[str, Any]:
+    """Changes that multiply parameters of the joints' friction: those of these names, or all."""
+    f = experiment.friction
+    return {f"friction.{n}": tuple(factor * v for v in getattr(f, n)) for n in names or LUGRE}
+
+
+def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
+    """Variations of every force-control figure: half and double friction, the wall nearer and farther."""
+    return {
+        "friction\nhalf": rougher(experiment, 0.5),
+        "friction\ndouble": rougher(experiment, 2.0),
+        "wall at\n0.40 m": move_wall(experiment, 0.40),
+        "wall at\n0.49 m": move_wall(experiment, 0.49),
+    }
+
+
+def by_condition(
+    runs: Runs, worlds: Mapping[str, W], work: Callable[[W, int], T], full: Collection[str]
+) -> dict[str, list[T]]:
+    """`work` of each world and seed, by the world's name: over all seeds in the worlds of `full`, a few in others."""
+    cases = {
+        name: [(world, seed) for seed in runs.seeds[: None if name in full else VARIED_SEEDS]]
+        for name, world in worlds.items()
+    }
+    return runs.map_each(lambda case: work(*case), cases)
+
+
+def stops_holding(results: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> str:
+    """Sentence with the variations under which a conclusion holds, and those under which it does not."""
+    good, bad = [], []
+    for name, runs in results.items():
+        if often(map(holds, runs)):
+            good.append(on_one_line(name))
+        else:
+            bad.append(f"{on_one_line(name)} ({sum(map(holds, runs))} of {len(runs)} runs)")
+    parts = [f"holds with: {', '.join(good)}"] if good else []
+    parts += [f"does not with: {', '.join(bad)}"] if bad else ["and under every variation tried"]
+    return f"It {'; it '.join(parts) if bad else ', '.join(parts)}."

@@ -63,9 +63,6 @@ else:
     SerialArm = shipped_names("robots/serial/arms")
 
 
-# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
-
-
 @options("Known names", 2)
 class KnownOptions:
     """List or print, without a run."""
@@ -95,7 +92,7 @@ def print_names(files: "TomlFiles", title: Callable[[str], str]) -> None:
         print_lines(f"{name:<{width}}{title(name)}")
 
 
-def source_of(files: "TomlFiles", name: str | None, verb: str, printed: bool) -> str | None:
+def read_source(files: "TomlFiles", name: str | None, verb: str, printed: bool) -> str | None:
     """The text of the named file; None if it was only printed.
 
     Raises:
@@ -110,12 +107,6 @@ def source_of(files: "TomlFiles", name: str | None, verb: str, printed: bool) ->
         return source
     sys.stdout.write(printable(source))
     return None
-
-
-# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
-
-
-# No annotations from the future: cyclopts looks at those of a base class in the module of whoever inherits them.
 
 
 WRITTEN = Group("Output", sort_key=6)
@@ -166,8 +157,8 @@ class FileOptions(JsonOption):
 
 
 @options(WRITTEN)
-class PictureOptions(ReportOption, JsonOption):
-    """A figure, a page, an answer for programs."""
+class FigureFile(JsonOption):
+    """A figure, and an answer for programs."""
 
     figure: Path | None = None
     no_figure: Annotated[bool, FLAG] = False
@@ -190,7 +181,7 @@ DRAWN = Group("Figures", sort_key=4)
 
 @options(DRAWN)
 class FigureOptions:
-    """How figures are written."""
+    """Formats and resolution of figures."""
 
     figures: Annotated[
         tuple[str, ...], Parameter(negative=(), show_default=", ".join, consume_multiple=True)
@@ -201,7 +192,7 @@ class FigureOptions:
 
     @property
     def endings(self) -> tuple[str, ...]:
-        """Of the figures' files."""
+        """Endings of the figures' files."""
         return tuple(f".{kind.lower().lstrip('.')}" for kind in self.figures)
 
     def check(self) -> None:

@@ -33,13 +33,13 @@ class LoopArmOptions:
         """The arm, and notes on the identification of its inner loop."""
         from palpate.force import load_arm
 
-        one = load_arm(self.arm)
+        arm = load_arm(self.arm)
         if self.loop_from is None:
             if self.push is not None:
                 raise InputError("--push names a column of the log of --loop-from; give that log")
-            return one, None
-        found = inner_loop(self.loop_from, columns, self.push)
-        return found.of(one, self.loop_from.name), found
+            return arm, None
+        inner = inner_loop(self.loop_from, columns, self.push)
+        return inner.of(arm, self.loop_from.name), inner
 
 
 @options("The surface", 2)
@@ -52,8 +52,6 @@ class SurfaceOptions:
     "Largest possible stiffness, N/m."
     damping_max: values.Damping | None = None
     "Largest possible damping, N s/m; if not given, the upper end of the interval that the log gives."
-    surface_speed: Annotated[float | None, SIGNED] = None
-    "Speed of a moving surface, m/s."
 
 
 @options("The press", 3)
@@ -95,13 +93,15 @@ class SlideLimits:
 
         from palpate.force.slide_table import Slide
 
-        v, most = self.speed.si, gains.arm.limits.speed
+        v, max_speed = self.speed.si, gains.arm.limits.speed
         if not 0.0 < self.mu_max <= 2.0:
             raise InputError(
                 f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {self.mu_max:g}"
             )
-        if not 0.0 < v <= most:
-            raise InputError(f"--speed must be above 0 and at most the arm's {most:g} m/s, got {v:g} m/s")
+        if not 0.0 < v <= max_speed:
+            raise InputError(
+                f"--speed must be above 0 and at most the arm's {max_speed:g} m/s, got {v:g} m/s"
+            )
         if not 1e-3 <= radius < 1e4:
             raise InputError(f"--radius must be from 1 mm to 10 km, got {radius:g} m")
         if not 0.1 <= self.tilt <= 25.0:
@@ -156,10 +156,17 @@ class ColumnOptions:
     "For a log of a press: the file of palpate payload, whose mass is subtracted from M."
 
     @property
-    def of_press(self) -> dict[str, Any]:
+    def press_roles(self) -> dict[str, Any]:
         """The columns and the payload, as for `palpate.identify_log`."""
-        own = {"time": self.time, "rate": self.rate, "position": self.position, "force": self.force_column}
-        return {name: value for name, value in {**own, "payload": self.payload}.items() if value is not None}
+        columns = {
+            "time": self.time,
+            "rate": self.rate,
+            "position": self.position,
+            "force": self.force_column,
+        }
+        return {
+            name: value for name, value in {**columns, "payload": self.payload}.items() if value is not None
+        }
 
 
 @options(WRITTEN)
@@ -193,8 +200,8 @@ def inner_loop(log: Path, columns: ColumnOptions, push: str | None = None) -> In
         if ":" not in names[role]:
             names[role] += ":m"
     names["force"] = push if push is None or ":" in push else f"{push}:N"
-    given = {role: name for role, name in names.items() if name is not None}
-    record = read_log(log, rate=columns.rate, **given)
+    columns_given = {role: name for role, name in names.items() if name is not None}
+    record = read_log(log, rate=columns.rate, **columns_given)
     force = None if push is None else record["force"]
     return identify_inner_loop(
         record["time"], record["command"], record["position"], where=str(log), force=force

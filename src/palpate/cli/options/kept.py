@@ -8,18 +8,30 @@ from cyclopts import App
 
 from palpate.cli.options.values import options_given
 from palpate.errors import InputError, unknown
-from palpate.files import MADE, read_text, read_toml, write_text
+from palpate.files import MADE, as_toml, read_text, read_toml, write_text
 
-_SAID = {"--options": "options", "--preset": "preset"}
-_NEVER = {
-    "options", "preset", "save-options", "figure", "no-figure", "report", "json", "out", "replace",
-    "wire", "yes", "dry-run", "record", "recover",
-}  # fmt: skip
+_FILE_OPTIONS = {"--options": "options", "--preset": "preset"}
+_CALL_OPTIONS = {
+    "options",
+    "preset",
+    "save-options",
+    "figure",
+    "no-figure",
+    "report",
+    "json",
+    "out",
+    "replace",
+    "wire",
+    "yes",
+    "dry-run",
+    "record",
+    "recover",
+}
 """Options of a single call rather than of a cell, above all those that move an arm."""
-_ASKS_HELP = {"--help", "-h"}
+_HELP_WORDS = {"--help", "-h"}
 """Words that ask for a page of help, which no file of options changes."""
-_TYPED = {"press": {"force", "position", "seconds"}}
-"""By command, what is of a call there, though the same word is of the cell elsewhere."""
+_CALL_OPTIONS_BY_COMMAND = {"press": {"force", "position", "seconds"}}
+"""Options of a single call by command, which are options of the cell in other commands."""
 _PATHS = {"payload", "robot-stiffness-from", "gains", "certificate"}
 """Options that name a file: beside the options' own file, unless the path is absolute."""
 _KNOWN_BY = ("identify", "press")
@@ -28,8 +40,9 @@ _KNOWN_BY = ("identify", "press")
 
 def save_options(path: Path, parts: Iterable[Any], command: str) -> None:
     """Write options that are of a cell, rather than of a single call of the command."""
-    once = _NEVER | _TYPED.get(command, set())
-    write_text(path, _toml({name: value for name, value in options_given(parts).items() if name not in once}))
+    once = _CALL_OPTIONS | _CALL_OPTIONS_BY_COMMAND.get(command, set())
+    table = {name: _plain(value) for name, value in options_given(parts).items() if name not in once}
+    write_text(path, f"{MADE} --save-options; --options takes it.\n{as_toml(table).rstrip()}\n")
 
 
 def expand(argv: Sequence[str], app: App) -> list[str]:
@@ -39,23 +52,23 @@ def expand(argv: Sequence[str], app: App) -> list[str]:
         InputError: no such file or preset, an unknown option, an invalid value.
     """
     words = list(argv)
-    given = {name: _value_of(words, flag) for flag, name in _SAID.items()}
-    nothing = given["options"] is None and given["preset"] is None
-    if not words or nothing or words[0] not in _commands(app) or _ASKS_HELP & set(words):
+    given = {name: _flag_value(words, flag) for flag, name in _FILE_OPTIONS.items()}
+    is_plain = given["options"] is None and given["preset"] is None
+    if not words or is_plain or words[0] not in _commands(app) or _HELP_WORDS & set(words):
         return words
     flags = _flags(app, words[0])
     if "options" not in flags:
         return words
     known = set(flags).union(*(_flags(app, name) for name in _KNOWN_BY))
-    kept: dict[str, Any] = {}
+    saved: dict[str, Any] = {}
     if given["preset"] is not None:
-        kept |= _preset(given["preset"], known)
+        saved |= _preset(given["preset"], known)
     if given["options"] is not None:
-        kept |= _file(Path(given["options"]), known)
+        saved |= _file(Path(given["options"]), known)
     typed = {word.partition("=")[0] for word in words if word.startswith("--")}
-    own = set(flags) - _TYPED.get(words[0], set())
-    kept = {key: value for key, value in kept.items() if key in own and not typed & set(flags[key])}
-    return [*words, *(word for key, value in kept.items() for word in _write(key, value))]
+    allowed = set(flags) - _CALL_OPTIONS_BY_COMMAND.get(words[0], set())
+    saved = {key: value for key, value in saved.items() if key in allowed and not typed & set(flags[key])}
+    return [*words, *(word for key, value in saved.items() for word in _write(key, value))]
 
 
 def _commands(app: App) -> list[str]:
@@ -66,14 +79,14 @@ def _flags(app: App, command: str) -> dict[str, tuple[str, ...]]:
     """The options of a command: by plain name, all names that they go by."""
     arguments = app[command].assemble_argument_collection()
     return {
-        name.removeprefix("--"): tuple(one.names)
-        for one in arguments
-        for name in one.names
+        name.removeprefix("--"): tuple(argument.names)
+        for argument in arguments
+        for name in argument.names
         if name.startswith("--") and not name.startswith("--no-")
     }
 
 
-def _value_of(words: Sequence[str], flag: str) -> str | None:
+def _flag_value(words: Sequence[str], flag: str) -> str | None:
     """The value of a flag; None if it is absent, or has none."""
     for i, word in enumerate(words):
         if word.startswith(f"{flag}="):
@@ -91,23 +104,23 @@ def _preset(name: str, known: set[str]) -> dict[str, Any]:
 
 def _file(path: Path, known: set[str]) -> dict[str, Any]:
     table = read_toml(read_text(path, "options"), str(path))
-    kept = _check(table, str(path), known)
+    saved = _check(table, str(path), known)
     if "preset" in table:
-        kept = _preset(str(table["preset"]), known) | kept
-    for key in _PATHS & set(kept):
-        kept[key] = str(path.parent / str(kept[key]))
-    return kept
+        saved = _preset(str(table["preset"]), known) | saved
+    for key in _PATHS & set(saved):
+        saved[key] = str(path.parent / str(saved[key]))
+    return saved
 
 
 def _check(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, Any]:
-    kept = {}
+    checked = {}
     for key, value in table.items():
         name = key.replace("_", "-")
         if name == "preset":
             continue
-        if name in _NEVER or name not in known:
+        if name in _CALL_OPTIONS or name not in known:
             try:
-                raise unknown("option", name, known - _NEVER)
+                raise unknown("option", name, known - _CALL_OPTIONS)
             except InputError as error:
                 raise InputError(f"{where}: {error}") from None
         plain = isinstance(value, str | bool | int | float)
@@ -115,25 +128,17 @@ def _check(table: Mapping[str, Any], where: str, known: set[str]) -> dict[str, A
             isinstance(value, list) and all(isinstance(v, str | int | float) for v in value)
         ):
             raise InputError(f"{where}: {key} must be a text, a number, true or false, got {value!r}")
-        kept[name] = value
-    return kept
+        checked[name] = value
+    return checked
 
 
 def _write(key: str, value: Any) -> list[str]:
     if isinstance(value, bool):
         return [f"--{key}"] if value else []
     if isinstance(value, list):
-        return [f"--{key}={one}" for one in value]
+        return [f"--{key}={item}" for item in value]
     return [f"--{key}={value}"]
 
 
-def _toml(table: Mapping[str, Any]) -> str:
-    import msgspec
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, Path):
-            return str(value.absolute())
-        return list(value) if isinstance(value, tuple) else value
-
-    lines = [f"{key} = {msgspec.json.encode(plain(value)).decode()}" for key, value in table.items()]
-    return "\n".join([f"{MADE} --save-options; --options takes it.", *lines]) + "\n"
+def _plain(value: Any) -> Any:
+    return str(value.absolute()) if isinstance(value, Path) else value

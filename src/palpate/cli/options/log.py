@@ -14,7 +14,7 @@ from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts look
 
 if TYPE_CHECKING:
     from palpate.contact_frame.arm import ArmDynamics
-    from palpate.contact_frame.load import Payload
+    from palpate.contact_frame.payload import Payload
     from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.identification.indenter import Indenter
 
@@ -61,11 +61,11 @@ class FrameOptions:
             return None
         return -1 if self.force_sign in {"reaction", "-1"} else 1
 
-    def frame(self, hung: Payload | None = None) -> ContactFrame | None:
+    def frame(self) -> ContactFrame | None:
         """The contact frame; None if not given."""
         from palpate.contact_frame.signals_in_base import ContactFrame
 
-        if self == FrameOptions() and hung is None:
+        if self == FrameOptions():
             return None
         sides: dict[int | None, Literal["action", "reaction"] | None] = {
             None: None,
@@ -85,7 +85,6 @@ class FrameOptions:
             normal_frame="tool" if axes == "tool" else "base",
             gravity_compensated=self.gravity_compensated,
             free=values.si(self.free),
-            payload=hung,
         )
 
 
@@ -109,7 +108,7 @@ class ArmOptions:
 
     def weighed_tool(self) -> Payload | None:
         """The payload on the sensor, if it was weighed."""
-        from palpate.contact_frame.load import load_payload
+        from palpate.contact_frame.payload import load_payload
 
         return None if self.payload is None else load_payload(self.payload)
 
@@ -188,7 +187,7 @@ class ModelOptions:
     def keywords(self) -> dict[str, Any]:
         """The keywords of `palpate.identify`."""
         known: dict[str, Any] = {}
-        lag = values.lag_of(self.lag)
+        lag = values.parse_lag(self.lag)
         if lag is not None:
             known |= {"lag": lag[0], "lag_std": lag[1]}
         if self.force_filter is not None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
 from math import isfinite, isnan
+from pathlib import Path
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -45,9 +46,9 @@ _LARGEST = {
     "time": 1e9,
     "velocity": 1e6,
 }
-"""In SI: no robot has more, and no calculation with its fourth power overflows."""
+"""Largest values in SI: no robot has more, and their fourth power does not overflow."""
 _SMALLEST = 1e-15
-"""In SI, but for 0: the step of no sensor is finer."""
+"""Smallest value in SI besides 0: no sensor resolves less."""
 
 
 def quantity(option: str, text: str, kind: str) -> float:
@@ -84,10 +85,10 @@ def spread(option: str, text: str, kind: str) -> tuple[float, float]:
 
 
 def _in_range(option: str, number: float, factor: float, kind: str) -> float:
-    value, most = number * factor, _LARGEST[kind]
-    if not (value == 0 or _SMALLEST <= abs(value) <= most):
+    value, largest = number * factor, _LARGEST[kind]
+    if not (value == 0 or _SMALLEST <= abs(value) <= largest):
         raise InputError(
-            f"{option} must be 0, or between {_SMALLEST:g} and {most:g} in SI units, got {value:g};"
+            f"{option} must be 0, or between {_SMALLEST:g} and {largest:g} in SI units, got {value:g};"
             f" no robot has such a {kind}"
         )
     return value
@@ -101,13 +102,13 @@ def shares(option: str, text: str, names: tuple[str, ...]) -> dict[str, float]:
     """
     if "=" not in text:
         return dict.fromkeys(names, _share(option, text))
-    found = {}
+    fractions = {}
     for part in text.split(","):
         name, _, share = part.partition("=")
         if name.strip() not in names:
             raise unknown(f"parameter in {option}", name.strip(), names)
-        found[name.strip()] = _share(option, share)
-    return found
+        fractions[name.strip()] = _share(option, share)
+    return fractions
 
 
 def _share(option: str, text: str) -> float:
@@ -141,7 +142,7 @@ SIGNED = Parameter(allow_leading_hyphen=True)
 """A value that may begin with a minus: it is a number below zero, not another option."""
 
 
-def value_of(kind: Any, tokens: Sequence[Token]) -> Any:
+def convert_value(kind: Any, tokens: Sequence[Token]) -> Any:
     """The value of any option or argument: a number must be one, and not beyond what the machine counts."""
     try:
         value = convert(kind, tokens)
@@ -163,7 +164,7 @@ WHOLE = Parameter(converter=_whole_number)
 """A seed; the conversion of cyclopts would silently round 1.5."""
 
 
-def lag_of(text: str | None) -> tuple[float, float] | None:
+def parse_lag(text: str | None) -> tuple[float, float] | None:
     """`VALUE`, `VALUE:STD`, either with a unit of time behind it, as two numbers in s.
 
     Raises:
@@ -179,13 +180,13 @@ def lag_of(text: str | None) -> tuple[float, float] | None:
                 f"{symbol!r} of --lag is a unit of {unit(symbol).quantity}; it needs one of time"
             )
         text, factor = plain, unit(symbol).factor
-    found = with_std("lag", text)
-    if found is not None and factor == 1.0 and not symbol.isalpha() and abs(found[0]) >= _LONGEST_LAG:
+    lag = with_std("lag", text)
+    if lag is not None and factor == 1.0 and not symbol.isalpha() and abs(lag[0]) >= _LONGEST_LAG:
         raise InputError(
-            f"--lag {text} is {found[0]:g} s, and no sensor is so late: is {text} ms meant? Then say --lag {text}:ms,"
+            f"--lag {text} is {lag[0]:g} s, and no sensor is so late: is {text} ms meant? Then say --lag {text}:ms,"
             f" if not --lag {text}:s"
         )
-    return None if found is None else (factor * found[0], factor * found[1])
+    return None if lag is None else (factor * lag[0], factor * lag[1])
 
 
 def with_std(option: str, text: str | None, example: str = "0.0076:0.0002") -> tuple[float, float] | None:
@@ -193,13 +194,13 @@ def with_std(option: str, text: str | None, example: str = "0.0076:0.0002") -> t
     if text is None:
         return None
     value, _, std = text.partition(":")
-    found = _numbers([value, std or "0"])
-    if found is None:
+    numbers = _numbers([value, std or "0"])
+    if numbers is None:
         plain = example.partition(":")[0]
         raise InputError(f"--{option} needs VALUE or VALUE:STD, as {plain} or {example}, got {text!r}")
-    if found[1] < 0:
-        raise InputError(f"the std of --{option} must be 0 or more, got {found[1]:g}")
-    return found[0], found[1]
+    if numbers[1] < 0:
+        raise InputError(f"the std of --{option} must be 0 or more, got {numbers[1]:g}")
+    return numbers[0], numbers[1]
 
 
 def vector(option: str, text: str, quantity: str) -> tuple[float, float, float]:
@@ -211,21 +212,23 @@ def vector(option: str, text: str, quantity: str) -> tuple[float, float, float]:
         quantity: of the unit; `number` for a direction.
     """
     plain, _, symbol = text.partition(":")
-    found = _numbers(plain.split(","))
-    if found is None or len(found) != 3:
+    numbers = _numbers(plain.split(","))
+    if numbers is None or len(numbers) != 3:
         raise InputError(f"{option} needs three numbers, as {_EXAMPLES[quantity]}, got {text!r}")
-    own = unit(symbol) if symbol else unit(_DEFAULTS[quantity])
-    if own.quantity != quantity:
-        raise InputError(f"{symbol!r} of {option} is a unit of {own.quantity}; it needs one of {quantity}")
-    return found[0] * own.factor, found[1] * own.factor, found[2] * own.factor
+    given_unit = unit(symbol) if symbol else unit(_DEFAULTS[quantity])
+    if given_unit.quantity != quantity:
+        raise InputError(
+            f"{symbol!r} of {option} is a unit of {given_unit.quantity}; it needs one of {quantity}"
+        )
+    return numbers[0] * given_unit.factor, numbers[1] * given_unit.factor, numbers[2] * given_unit.factor
 
 
 def span(option: str, text: str) -> tuple[float, float]:
     """`BEGIN,END` as two numbers."""
-    found = _numbers(text.split(","))
-    if found is None or len(found) != 2:
+    ends = _numbers(text.split(","))
+    if ends is None or len(ends) != 2:
         raise InputError(f"{option} needs BEGIN,END in seconds, as 0,2.5, got {text!r}")
-    return found[0], found[1]
+    return ends[0], ends[1]
 
 
 _LONGEST_LAG = 1.0
@@ -237,10 +240,10 @@ _EXAMPLES = {"length": "0,0,0.12 or 0,0,120:mm", "angle": "0,0,45 (degrees)", "n
 def _numbers(words: list[str]) -> list[float] | None:
     """Finite numbers; None if one is none."""
     try:
-        found = [float(word) for word in words]
+        numbers = [float(word) for word in words]
     except ValueError:
         return None
-    return found if all(isfinite(value) for value in found) else None
+    return numbers if all(isfinite(value) for value in numbers) else None
 
 
 T = TypeVar("T")
@@ -338,13 +341,27 @@ Direction = Annotated[Triple, typed_option(partial(vector, quantity="number"))]
 Point = Annotated[Triple, typed_option(partial(vector, quantity="length"))]
 
 
+def changed_fields(part: Any) -> dict[str, Any]:
+    """Fields of a dataclass that differ from their defaults."""
+    values = {field.name: (getattr(part, field.name), field.default) for field in fields(part)}
+    return {name: value for name, (value, default) in values.items() if value != default}
+
+
+def plain_value(value: Any) -> Any:
+    """The value of an option as JSON has it: a path is a text, a tuple a list."""
+    if isinstance(value, Mapping):
+        return {name: plain_value(inner) for name, inner in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain_value(inner) for inner in value]
+    return str(value) if isinstance(value, Path | str) else value
+
+
 def options_given(parts: Iterable[Any]) -> dict[str, Any]:
     """Options that differ from their defaults, by name."""
     return {
-        _name(part, field.name): str(value) if isinstance(value, str) else value
+        _name(part, name): str(value) if isinstance(value, str) else value
         for part in parts
-        for field in fields(part)
-        if (value := getattr(part, field.name)) != field.default
+        for name, value in changed_fields(part).items()
     }
 
 
@@ -354,12 +371,16 @@ def only(part: Any, of: str) -> None:
     Raises:
         InputError: one was given; it is named.
     """
-    for given in options_given((part,)):
-        raise InputError(f"--{given} is for {of}, or leave out --{given}")
+    for name in options_given((part,)):
+        raise InputError(f"--{name} is for {of}, or leave out --{name}")
 
 
 def _name(part: Any, field: str) -> str:
     """The first name of an option on the command line."""
     hint = get_type_hints(type(part), include_extras=True)[field]
-    said = [name for one in getattr(hint, "__metadata__", ()) for name in getattr(one, "name", None) or ()]
-    return said[0].removeprefix("--") if said else field.replace("_", "-")
+    names = [
+        name
+        for metadata in getattr(hint, "__metadata__", ())
+        for name in getattr(metadata, "name", None) or ()
+    ]
+    return names[0].removeprefix("--") if names else field.replace("_", "-")

@@ -30,26 +30,26 @@ def directions(
     """
     if path not in PATHS:
         raise unknown("path", path, PATHS)
-    way = speed / rate * np.arange(round(seconds * rate))
+    distance = speed / rate * np.arange(round(seconds * rate))
     if path == "circle":
-        angle = heading + way / extent
+        angle = heading + distance / extent
     elif path == "raster":  # a pass, a tenth of it aside, and the pass back
-        turn = way % (2.2 * extent)
+        turn = distance % (2.2 * extent)
         angle = heading + np.pi * ((turn >= 1.1 * extent) & (turn < 2.1 * extent))
-        aside = ((turn >= extent) & (turn < 1.1 * extent)) | (turn >= 2.1 * extent)
-        angle = np.where(aside, heading + 0.5 * np.pi, angle)
+        sideways = ((turn >= extent) & (turn < 1.1 * extent)) | (turn >= 2.1 * extent)
+        angle = np.where(sideways, heading + 0.5 * np.pi, angle)
     else:
-        angle = heading + np.pi * (np.floor(way / extent) % 2.0) * (path == "back")
+        angle = heading + np.pi * (np.floor(distance / extent) % 2.0) * (path == "back")
     return np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)
 
 
 def duration(path: str, seconds: float, speed: float, extent: float) -> float:
-    """Of a slide [s]: a line ends at its length; arguments as of `directions`."""
+    """Duration of a slide [s]: a line ends at its length; arguments as of `directions`."""
     return min(seconds, extent / speed) if path == "line" else seconds
 
 
 def check_directions(ways: Array, gains: Gains, into: ArrayLike) -> None:
-    """Refuses a path that the true normal may point along, as far as the given one may be wrong.
+    """Refuse a path that the true normal may point along, as far as the given one may be wrong.
 
     Args:
         ways: unit vectors along the path, shape (n, 3).

@@ -13,7 +13,7 @@ from palpate.force.sliding.touches import slope_of_touches
 
 LIMITS = {"lag": 0.02, "turning": 0.01, "sticking": 0.08, "tilt": 0.07}
 """Largest terms of the domain; measured by benchmarks/force/sliding.py."""
-UNSURE, AHEAD = 5e-3, 0.01
+LAG_ERROR, CURVATURE_AGE = 5e-3, 0.01
 """Lag that is not known, and age of the curvature where it is used [s]."""
 
 
@@ -31,14 +31,16 @@ def slide_terms(gains: Gains, stiffness: float, friction: float, radius: float) 
         the path on which the contact sticks over the radius (`sticking`); the change of the normal force before it
         slips (`tilt`).
     """
-    slide, F = numbers_of(gains), gains.force
-    seen, v = gains.arm.seen(stiffness), slide.speed
-    share = seen * gains.theta * v / (gains.alpha * F)
+    slide = numbers_of(gains)
+    F = gains.force
+    series = gains.arm.seen(stiffness)
+    v = slide.speed
+    cost = series * gains.theta * v / (gains.alpha * F)
     return {
-        "lag": share * v * UNSURE / radius,
-        "turning": share * (v * (gains.theta + AHEAD) / radius) ** 2,
-        "sticking": friction * F / (slide.ratio * seen * radius),
-        "tilt": friction * _slope(gains, seen) / slide.ratio,
+        "lag": cost * v * LAG_ERROR / radius,
+        "turning": cost * (v * (gains.theta + CURVATURE_AGE) / radius) ** 2,
+        "sticking": friction * F / (slide.ratio * series * radius),
+        "tilt": friction * _slope(gains, series) / slide.ratio,
     }
 
 
@@ -52,7 +54,7 @@ def _slope(gains: Gains, stiffness: float) -> float:
 
 
 def obeys(terms: dict[str, float]) -> bool:
-    """Whether a surface with these terms is in the domain."""
+    """True if a surface with these terms is in the domain."""
     return all(terms[name] < limit for name, limit in LIMITS.items())
 
 
@@ -72,8 +74,10 @@ def edge_speed(gains: Gains, stiffness: float) -> float:
 
 def slide_domain(gains: Gains) -> tuple[float, float] | None:
     """Stiffnesses between which a slide with friction mu_max on the smallest radius is in the domain [N/m]."""
-    slide, points = numbers_of(gains), 400
-    low, high = 100.0, gains.cap
+    slide = numbers_of(gains)
+    points = 400
+    low = 100.0
+    high = gains.cap
     ladder = [low * (high / low) ** (i / points) for i in range(points + 1)] if high > low else []
     inside = [K for K in ladder if obeys(slide_terms(gains, K, slide.mu_max, slide.radius))]
     return (inside[0], inside[-1]) if inside else None
@@ -92,7 +96,8 @@ def numbers_of(gains: Gains) -> Slide:
 
 def slide_json(gains: Gains) -> dict[str, Any]:
     """Numbers and domain as plain values."""
-    slide, domain = numbers_of(gains), slide_domain(gains)
+    slide = numbers_of(gains)
+    domain = slide_domain(gains)
     return {
         "speed_m_s": slide.speed, "mu_max": slide.mu_max, "slope_std_rad": slide.slope, "radius_m": slide.radius,
         "floor_of_force": (1.0 + slide.mu_max**2) ** 0.5, "domain": {"stiffness": list(domain) if domain else None},
@@ -102,7 +107,8 @@ def slide_json(gains: Gains) -> dict[str, Any]:
 
 def slide_sentence(gains: Gains) -> str:
     """The domain in a sentence."""
-    slide, domain = numbers_of(gains), slide_domain(gains)
+    slide = numbers_of(gains)
+    domain = slide_domain(gains)
     least = (
         f"at {1e3 * slide.speed:.3g} mm/s, on radii from {1e3 * slide.radius:.3g} mm, with friction up to "
     )

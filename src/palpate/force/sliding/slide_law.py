@@ -15,7 +15,6 @@ The command of a servo that yields leads its tip, along n as in a press, along t
 
 from palpate._jit import law
 from palpate._vector import ZERO3, Vec3, sqrt
-from palpate.force.flat import guard_in, put_guard, put_state, state_in
 from palpate.force.guard import (
     BLIND,
     FAR,
@@ -26,7 +25,11 @@ from palpate.force.guard import (
     SATURATED,
     SCALES,
     STALE,
+    guard_in,
+    put_guard,
+    put_state,
     safe_step,
+    state_in,
 )
 from palpate.force.law import gain, lead_speed
 from palpate.force.sliding.slide_state import (

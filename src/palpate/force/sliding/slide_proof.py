@@ -16,20 +16,20 @@ import msgspec
 from palpate.force.cells import Box
 from palpate.force.certificate import Certificate
 from palpate.force.claims import Claim, ProvedCell, held_claim
-from palpate.force.cover import Cell, Search
+from palpate.force.cover import Search
 from palpate.force.gains import Gains
 
-MISALIGNED = radians(10.0)
+MAX_MISALIGNMENT = radians(10.0)
 """Angle between the estimated and the true normal up to which a slide is proved [rad]."""
 WIDTHS = 2.2, 1.6, 1.25, 1.1
 """Logarithmic widths of a cell that are tried, in units of that of m."""
 
 
-ROUNDED = 1e-9
+ROUNDING = 1e-9
 """Relative width by which a statement is less than what floating point shows."""
 
 
-def gain_factors(friction: float, angle: float = MISALIGNED) -> tuple[float, float]:
+def gain_factors(friction: float, angle: float = MAX_MISALIGNMENT) -> tuple[float, float]:
     """Least and largest m, for angles and friction up to these."""
     most = min(angle, 0.5 * atan(friction))  # where cos phi (cos phi + mu sin phi) is largest
     return cos(angle) * (cos(angle) - friction * sin(angle)), cos(most) * (cos(most) + friction * sin(most))
@@ -47,19 +47,19 @@ def sliding_claim(gains: Gains, low: float, high: float) -> Claim | None:
     least, most = gain_factors(gains.slide.mu_max)
     claim = held_claim(gains, low, high, 0.0)
     prover = claim.prover(gains)
-    search, cells, top = Search(prover), list[Cell](), high
+    search = Search(prover)
+    cells = list[ProvedCell]()
+    top = high
     while not cells or cells[-1].box.low > low:
         boxes = (Box(max(top / (most / least) ** width, low), top, 0.0, 0.0) for width in WIDTHS)
-        found = next((found for found, _ in map(search.cover, boxes) if len(found) == 1), None)
-        if found is None:
+        proved = next((proved for proved, _ in map(search.cover, boxes) if len(proved) == 1), None)
+        if proved is None:
             return None
-        cells += found
-        top = found[0].box.low * most / least * (1.0 + 4.0 * ROUNDED)
-    own = tuple(
-        ProvedCell(c.box.low, c.box.high, 0.0, 0.0, tuple(tuple(map(float, row)) for row in c.L))
-        for c in cells
+        cells += proved
+        top = proved[0].box.low * most / least * (1.0 + 4.0 * ROUNDING)
+    return msgspec.structs.replace(
+        claim, cells=tuple(cells), state=prover.loop.state, units=prover.loop.units
     )
-    return msgspec.structs.replace(claim, cells=own, state=prover.loop.state, units=prover.loop.units)
 
 
 def slide_proof(certificate: Certificate) -> dict[str, Any] | None:
@@ -77,7 +77,7 @@ def slide_proof(certificate: Certificate) -> dict[str, Any] | None:
     cells = [
         c for claim in certificate.claims if claim.kind != "adapting" for c in claim.cells if c.least == 0.0
     ]
-    ends = sorted((c.low / least * (1.0 + ROUNDED), c.high / most * (1.0 - ROUNDED)) for c in cells)
+    ends = sorted((c.low / least * (1.0 + ROUNDING), c.high / most * (1.0 - ROUNDING)) for c in cells)
     shares = [
         (most / claim.shares[1], least / claim.shares[0])
         for claim in certificate.claims
@@ -85,35 +85,17 @@ def slide_proof(certificate: Certificate) -> dict[str, Any] | None:
     ]
     return {
         "gain_factor": [least, most], "angle_deg": 10.0, "friction": slide.mu_max,
-        "felt_stiffness": widest([one for one in ends if one[0] < one[1]]),
+        "felt_stiffness": widest([interval for interval in ends if interval[0] < interval[1]]),
         "bound_share": [list(share) for share in shares],
     }  # fmt: skip
 
 
-def slide_proof_sentence(proof: dict[str, Any]) -> str:
-    """Surfaces on which a slide is proved, and what may change, in a sentence."""
-    low, high = proof["gain_factor"]
-    said = (
-        f"the normal off by up to {proof['angle_deg']:g} degrees and friction up to {proof['friction']:g}, both "
-        f"changing from tick to tick ({low:.3g} to {high:.3g} of the gain)"
-    )
-    if proof["felt_stiffness"] is None:
-        return f"no surface is proved with {said}"
-    a, b = proof["felt_stiffness"]
-    shares = [f"{one[0]:.3g} to {one[1]:.3g}" for one in proof["bound_share"]]
-    more = f"; with K_u of {' or '.join(shares)} times K, too" if shares else ""
-    return (
-        f"proved stable in a slide, {said}: every surface without damping whose K, as the measured position shows it, "
-        f"is {a:.4g} to {b:.4g} N/m, with the gain of the cap{more}"
-    )
-
-
 def widest(ends: list[tuple[float, float]]) -> list[float] | None:
     """The interval of the largest ratio without a gap that intervals cover, given in order of their lower ends."""
-    found: list[list[float]] = []
+    joined: list[list[float]] = []
     for low, high in ends:
-        if found and low <= found[-1][1]:
-            found[-1][1] = max(found[-1][1], high)
+        if joined and low <= joined[-1][1]:
+            joined[-1][1] = max(joined[-1][1], high)
         else:
-            found.append([low, high])
-    return max(found, key=lambda one: one[1] / one[0], default=None)
+            joined.append([low, high])
+    return max(joined, key=lambda interval: interval[1] / interval[0], default=None)

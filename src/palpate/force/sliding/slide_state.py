@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 from palpate._jit import law, part
 from palpate._vector import ZERO3, Vec3, sqrt
-from palpate.force.flat import GUARD, STATE, put_guard, put_state
-from palpate.force.guard import FINE, QUIET, TROUBLES
+from palpate.force.guard import FINE, GUARD, QUIET, STATE, TROUBLES, put_guard, put_state
 from palpate.force.law import Cautious
 from palpate.force.sliding.tangent_filter import FILTER
 

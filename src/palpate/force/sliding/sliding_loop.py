@@ -4,33 +4,33 @@ from __future__ import annotations
 
 from math import sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from palpate._jit import kernel, law, part, reader
+from palpate._jit.typed_edge import cast_array, cast_number, machine_code
 from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
-from palpate.force.flat import flatten
+from palpate.force.force_loop import PressingLoop, check_speed
 from palpate.force.gains import Gains, load_gains
-from palpate.force.guard import LEAST
+from palpate.force.guard import flatten
 from palpate.force.sliding import slide_state as places
 from palpate.force.sliding.slide_domain import lead_of, numbers_of
 from palpate.force.sliding.slide_law import slide_step
 from palpate.force.sliding.slide_state import SIZE, SLIDING_TROUBLES, Sliding, put_vector, vector_at
 from palpate.force.sliding.tangent_filter import BASE, G1, G2, MU, STATES, STIFF, variance
-from palpate.records import Readable
 
 CHI2_95 = sqrt(5.991)
 """Deviations within which two jointly normal numbers lie with 95 %."""
 Z_95 = 1.96
 """Deviations within which a normal number lies with 95 %."""
 DOWN = (0.0, 0.0, -1.0)
-ENCODER = 2e-6
+ENCODER_STD = 2e-6
 """Standard deviation of a measured position from tick to tick [m]: encoders of many arms resolve a micrometre."""
-UNSURE_LAG = 2e-4
+LAG_STD = 2e-4
 """Standard deviation of the lag between force and position [s]: a tenth of a sensor's period."""
 numbers_in = reader(Sliding)
 
@@ -46,8 +46,8 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         InputError: gains without that table, a direction without length.
     """
     slide = numbers_of(gains)
-    n = np.asarray(into, dtype=np.float64)
-    if n.shape != (3,) or not np.isfinite(n).all() or not np.linalg.norm(n) > 0.0:
+    n = three("the direction into the surface", into)
+    if not np.isfinite(n).all() or not np.linalg.norm(n) > 0.0:
         raise InputError(
             f"the direction into the surface needs three numbers that are not all 0, got {into!r}"
         )
@@ -56,7 +56,7 @@ def sliding(gains: Gains, into: ArrayLike = DOWN) -> Sliding:
         press=gains.cautious(), into=Vec3(*(n / np.linalg.norm(n)).tolist()), slope=slide.slope, mu_max=slide.mu_max,
         ratio=slide.ratio, turning=slide.radius**-3, curvature=1.0 / slide.radius, speed=slide.speed,
         acceleration=slide.acceleration, lead=lead_of(gains), late=min(0.5 * arm.rate / arm.sensor.sampling, 1.0),
-        encoder=ENCODER, doubt=UNSURE_LAG, step=slide.step, spacing=slide.touches,
+        encoder=ENCODER_STD, doubt=LAG_STD, step=slide.step, spacing=slide.touches,
     )  # fmt: skip
 
 
@@ -100,9 +100,12 @@ def slide_estimate(s):
     normal = vector_at(s, places.NORMAL)
     if s[places.PHASE] != places.SLIDE:
         return SlideEstimate(normal, CHI2_95 * s[places.SLOPE], 0.0, 0.0, 0.0, 0.0)
-    a, b, c = variance(s, G1, G1), variance(s, G1, G2), variance(s, G2, G2)
+    a = variance(s, G1, G1)
+    b = variance(s, G1, G2)
+    c = variance(s, G2, G2)
     larger = 0.5 * (a + c + sqrt((a - c) ** 2 + 4.0 * b * b))
-    friction, stiff = sqrt(max(variance(s, MU, MU), 0.0)), sqrt(max(variance(s, STIFF, STIFF), 0.0))
+    friction = sqrt(max(variance(s, MU, MU), 0.0))
+    stiff = sqrt(max(variance(s, STIFF, STIFF), 0.0))
     cone = CHI2_95 * sqrt(max(larger, 0.0)) / s[STIFF]
     return SlideEstimate(normal, cone, s[MU], friction, s[BASE] * s[STIFF], s[BASE] * stiff)
 
@@ -118,9 +121,9 @@ class Uncertain(float):
     std: float
 
     def __new__(cls, value: float, std: float) -> Uncertain:
-        one = super().__new__(cls, value)
-        one.std = std
-        return one
+        number = super().__new__(cls, value)
+        number.std = std
+        return number
 
     @property
     def ci95(self) -> tuple[float, float]:
@@ -128,7 +131,7 @@ class Uncertain(float):
         return max(float(self) - Z_95 * self.std, 0.0), float(self) + Z_95 * self.std
 
 
-class SlidingLoop(Readable):
+class SlidingLoop(PressingLoop):
     """Holds a force along an unknown curved surface while the tip moves; from free motion on.
 
     In the user's own loop, once a tick::
@@ -153,14 +156,16 @@ class SlidingLoop(Readable):
         self.gains = gains
         self.law = sliding(gains, into)
         self._desired = gains.force
-        self._numbers, self._state, self._work = flatten(self.law), np.zeros(SIZE), np.zeros(STATES)
+        self._numbers = flatten(self.law)
+        self._state = np.zeros(SIZE)
+        self._work = np.zeros(STATES)
         self._velocity = np.zeros(3)
         self.reset()
-        _slide(self._numbers, self._state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
+        self._bind()
 
     @classmethod
     def load(cls, path: str | Path, into: ArrayLike = DOWN) -> SlidingLoop:
-        """From the file that `palpate tune --slide` wrote.
+        """Load a loop from the file that `palpate tune --slide` wrote.
 
         Raises:
             InputError: a file that is none, gains without numbers for a slide.
@@ -168,27 +173,18 @@ class SlidingLoop(Readable):
         return cls(load_gains(Path(path)), into)
 
     def reset(self) -> None:
-        """In free motion, knowing nothing."""
+        """Return to free motion and forget the surface."""
         self.law.start(self._state)
 
-    @property
-    def desired(self) -> float:
-        """Desired force F_d [N]."""
-        return self._desired
-
-    @desired.setter
-    def desired(self, force: float) -> None:
-        least, most = LEAST * self.gains.arm.sensor.noise, self.gains.force_limit
-        if not least <= float(force) < most:
-            raise InputError(
-                f"the desired force must be from {least:g} N to below {most:g} N, got {force:g} N"
-            )
-        self._desired = float(force)
-
     def limit_speed(self, speed: float) -> None:
-        """Lets no command be faster than this [m/s], where that is below the arm's own limit."""
+        """Limit the speed of the command [m/s], where that is below the arm's own limit.
+
+        Raises:
+            InputError: it is below the approach, or no finite number.
+        """
         press = self.law.press
-        self.law = self.law._replace(press=press._replace(speed=min(press.speed, speed)))
+        limit = check_speed(speed, self.gains)
+        self.law = self.law._replace(press=press._replace(speed=min(press.speed, limit)))
         self._numbers = flatten(self.law)
 
     def update(
@@ -202,16 +198,30 @@ class SlidingLoop(Readable):
             direction: in which to slide, shape (3,): a unit vector, or a shorter one for a slower slide. Its part along
                 the normal counts for nothing.
             missed: ticks that were lost since the last call.
+
+        Raises:
+            InputError: an argument of another shape, or of what is no number; the state is unchanged.
         """
-        _slide.compiled(
+        self._one(
             self._numbers, self._state, self._work, self._desired, three("force", force),
-            three("position", position), three("direction", direction), missed, self._velocity,
+            three("position", position), three("direction", direction), cast_number("missed", missed), self._velocity,
         )  # fmt: skip
         return self._velocity.copy()
 
+    def _bind(self) -> None:
+        example = (self._numbers, self._state.copy(), self._work, 1.0, *np.zeros((3, 3)), 0.0, self._velocity)
+        self._one = machine_code(_slide, *example)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_one"}
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        self.__dict__.update(known)
+        self._bind()
+
     @property
     def sliding(self) -> bool:
-        """Whether the force was held and the tip slides."""
+        """True if the force was held and the tip slides."""
         return bool(self._state[places.PHASE] == places.SLIDE)
 
     @property
@@ -257,10 +267,5 @@ class SlidingLoop(Readable):
 
 
 def three(name: str, values: ArrayLike) -> Array:
-    """Three numbers of a vector, or a refusal by its name."""
-    given = np.ascontiguousarray(values, dtype=np.float64)
-    if given.shape != (3,):
-        raise InputError(
-            f"{name} needs three numbers, in the base's axes, got an array of shape {given.shape}"
-        )
-    return given
+    """Three numbers of a vector in the base's axes, or a refusal by its name."""
+    return cast_array(name, values, (3,))

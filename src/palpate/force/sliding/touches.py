@@ -2,8 +2,7 @@
 
 from palpate._jit import law
 from palpate._vector import ZERO3, sqrt
-from palpate.force.flat import state_in
-from palpate.force.guard import FINE, UNTARED
+from palpate.force.guard import FINE, UNTARED, state_in
 from palpate.force.sliding.slide_state import (
     ALL,
     LAW,

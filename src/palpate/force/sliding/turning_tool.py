@@ -10,12 +10,12 @@ from palpate.errors import InputError
 from palpate.force.sliding.slide_state import HALT
 from palpate.force.sliding.sliding_loop import SlidingLoop, three
 
-SLOWER = 10.0
+HALF_TIME_CONSTANT = 10.0
 """Half the time constant of the turning, in theta: below 10 it moves the normal that the force loop learns."""
-SMOOTH = 0.25
+SMOOTHING = 0.25
 """Time constant of the turning's low-pass over that time: a normal that jumps would shake an elastic arm."""
-FASTEST = 0.5
-"""Of the turning [rad/s]."""
+MAX_RATE = 0.5
+"""Largest rate of the turning [rad/s]."""
 
 
 class TurningTool:
@@ -76,26 +76,28 @@ class TurningTool:
         """
         R = _rotation(rotation)
         arm = R @ self._centre
-        rest = self._weight - R @ self._bias
+        payload = self._weight - R @ self._bias
         velocity = self.loop.update(
-            three("force", force) - rest, three("position", position) + arm, direction, missed
+            three("force", force) - payload, three("position", position) + arm, direction, missed
         )
         if not self.loop.sliding or self.loop.state[HALT] > 0.0:
             self._rate, self._turning = np.zeros((2, 3))
             return np.concatenate([velocity, self._rate])
         tick = self.loop.gains.arm.tick
-        T, error = SLOWER * self.loop.gains.theta, np.cross(R @ self._axis, self.loop.normal)
+        T = HALF_TIME_CONSTANT * self.loop.gains.theta
+        error = np.cross(R @ self._axis, self.loop.normal)
         self._rate = _within(self._rate + tick / (4.0 * T * T) * error)
-        self._turning += tick / (SMOOTH * T) * (_within(self._rate + error / T) - self._turning)
+        self._turning += tick / (SMOOTHING * T) * (_within(self._rate + error / T) - self._turning)
         turning = self._turning
         added = np.cross(arm, turning)
-        share = _share_within(velocity, added, self.loop.law.press.speed)
-        return np.concatenate([velocity + share * added, share * turning])
+        fraction = _share_within(velocity, added, self.loop.law.press.speed)
+        return np.concatenate([velocity + fraction * added, fraction * turning])
 
 
 def _share_within(velocity: Array, added: Array, most: float) -> float:
     """Largest share of what is added to a velocity with which its size stays within the most [m/s]."""
-    square, both = float(added @ added), float(velocity @ added)
+    square = float(added @ added)
+    both = float(velocity @ added)
     room = max(most * most - float(velocity @ velocity), 0.0)
     if 2.0 * both + square <= room:
         return 1.0
@@ -103,7 +105,7 @@ def _share_within(velocity: Array, added: Array, most: float) -> float:
 
 
 def _within(turning: Array) -> Array:
-    return turning / max(float(np.linalg.norm(turning)) / FASTEST, 1.0)
+    return turning / max(float(np.linalg.norm(turning)) / MAX_RATE, 1.0)
 
 
 def _rotation(values: ArrayLike) -> Array:

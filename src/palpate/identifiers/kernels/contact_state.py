@@ -31,6 +31,10 @@ _FEWEST = 8.0
 """Samples that make a level."""
 _FOURTH = 70.0
 """Sum of the squares of a fourth difference's weights."""
+_THIRD = 10.0
+"""Sum of the squares of the weights of a third difference over two samples on each side."""
+_EVIDENT = 32.0
+"""Variances of the noise beyond which a reading is an outlier: of white noise, once in sixty million samples."""
 
 SAMPLE = 6
 """A sample on its way: instant [ticks], force [N], a, v, x, and the number of its contact, 0 for none."""
@@ -122,6 +126,36 @@ def hear_noise(contact, force):
         contact[p],
         force,
     )
+
+
+@law
+def is_outlier(contact, queue, capacity, read, apart):
+    """True if the readings around one agree without it, and not with it: no force is one sample long.
+
+    Beside what two neighbours on each side make of it, a reading alone has six times its error in their fourth
+    difference. The third difference of the four is theirs alone: a step, a ramp and a touch stand in it as well, and
+    are believed from their first sample on. Compared is the variance that each would have as noise.
+
+    Args:
+        contact: of which the noise is known.
+        queue: samples on their way.
+        capacity: of the queue.
+        read: number of the sample.
+        apart: time over which its neighbours are four even steps [ticks].
+    """
+    if contact[HEARD] < _SETTLED or read < 2.0:
+        return False
+    a = int((read - 2.0) % capacity) * SAMPLE
+    b = int((read - 1.0) % capacity) * SAMPLE
+    c = int(read % capacity) * SAMPLE
+    d = int((read + 1.0) % capacity) * SAMPLE
+    e = int((read + 2.0) % capacity) * SAMPLE
+    if not 0.0 < queue[e] - queue[a] < apart:
+        return False
+    third = queue[e + 1] - 2.0 * queue[d + 1] + 2.0 * queue[b + 1] - queue[a + 1]
+    fourth = queue[a + 1] - 4.0 * queue[b + 1] + 6.0 * queue[c + 1] - 4.0 * queue[d + 1] + queue[e + 1]
+    noise = max(contact[POWER], contact[QUANTUM] ** 2 / 12.0, third * third / _THIRD, 1e-300)
+    return fourth * fourth / _FOURTH > _EVIDENT * noise
 
 
 @law

@@ -22,6 +22,7 @@ from palpate.identifiers.kernels.contact_state import (
     find_contact,
     follow_saturation,
     hear_noise,
+    is_outlier,
     learn_in_contact,
     pending,
 )
@@ -230,6 +231,10 @@ def _narrow(clock, row, period):
     clock[LOW], clock[HIGH] = low, high
 
 
+AHEAD = 2.0
+"""Samples after one, by which it is judged whether it is an outlier."""
+_EVEN = 6.0
+"""Periods within which five samples lie that are not apart by a gap."""
 ROOM, GAP, QUEUE, PERIOD, LATE, BEFORE, AFTER, SETTLING, HOLD, TOUCH, AVERAGED, DT = range(12)
 """Rows kept of the position; ticks of a gap that is filled; samples on their way at most; rows between two samples, 0
 where each row has one; lag beyond the low-pass [rows]; taps; rows until the low-pass has forgotten; rows that a
@@ -258,7 +263,12 @@ def take_tick(state, weights, x, force, out):
     row = track.numbers[ROW]
     _begin(state, own, row, force)
     queue = state[AT_RING + 2 * room :]
-    while own[READ] < own[TAIL] and _regress(state, weights, track, queue, own):
+    period = max(state[PERIOD], 1.0)
+    while own[READ] < own[TAIL] and not _awaits(state, queue, own, row, period):
+        if not _regress(state, weights, track, queue, own):
+            break
+        if is_outlier(state[AT_CONTACT:AT_SUMS], queue, state[QUEUE], own[READ], _EVEN * period):
+            _leave_out(state, queue, own)
         own[READ] += 1.0
         _in_contact(state, queue, own)
     taken, contact, most = 0, state[AT_CONTACT:AT_SUMS], state[QUEUE] - 2.0
@@ -273,6 +283,22 @@ def take_tick(state, weights, x, force, out):
             _release(state, track, queue, k, out, taken)
             taken += 1
     return taken
+
+
+@law
+def _awaits(state, queue, own, row, period):
+    """True while the samples after the next one, by which it is judged, are still to come."""
+    sampled = queue[int(own[READ] % state[QUEUE]) * SAMPLE]
+    return own[TAIL] - own[READ] <= AHEAD and row - sampled <= (AHEAD + 0.5) * period
+
+
+@law
+def _leave_out(state, queue, own):
+    """Makes the next sample one without a regressor, its force the mean of its neighbours'."""
+    before = int((own[READ] - 1.0) % state[QUEUE]) * SAMPLE
+    k = int(own[READ] % state[QUEUE]) * SAMPLE
+    after = int((own[READ] + 1.0) % state[QUEUE]) * SAMPLE
+    queue[k + 1], queue[k + 2] = 0.5 * (queue[before + 1] + queue[after + 1]), NAN
 
 
 @law

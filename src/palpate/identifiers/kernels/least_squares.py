@@ -2,8 +2,8 @@
 
 P = S S^T is never formed, so it can lose neither its symmetry nor its sign, and S has half the digits of P to carry.
 All that happens to P is a stretch of S along one direction u: a sample shrinks it (Potter's form of the update, 1963;
-Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. II), forgetting and drift stretch it, the
-bound shrinks it back.
+Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. II), forgetting stretches it, the bound
+shrinks it back.
 
 Each sample changes the error of theta by a known rule, error <- (I - gain phi^T) error + gain noise, and the gain is
 all that forgetting has a say in. So the error's covariance is followed beside the estimate: the rest of the initial
@@ -56,13 +56,6 @@ def measure(theta, S, phi, y, r):
     gain = (1.0 / a) * k
     e = y - phi @ theta  # (5.10)
     return theta + e * gain, S - outer((1.0 / (a + sqrt(a * r))) * k, f), gain, e, a
-
-
-@law
-def drift_axis(S, axis, step):
-    """S after the parameter along a unit vector went one step of a random walk, of standard deviation `step`."""
-    u = solve(S, step * axis)
-    return stretch(S, u, sqrt(1.0 + u @ u))
 
 
 @law
@@ -169,17 +162,6 @@ def propagate_root(W, phi, gain):
 
 
 @law
-def propagate_covariance(C, phi, gain, variance):
-    """The covariance of an error after a sample: (I - gain phi^T) C (I - gain phi^T)^T + variance gain gain^T.
-
-    In halves, which keeps it symmetric to the last bit.
-    """
-    w = C @ phi
-    h = w + (-0.5 * (variance + phi @ w)) * gain
-    return C - (outer(gain, h) + outer(h, gain))
-
-
-@law
 def unsure(theta, root, identity):
     """The doubt before the first sample, from a root of the initial covariance."""
     return ErrorCovariance(
@@ -279,19 +261,6 @@ def limit_root(S, floor, even, size):
 
 _SIZE = Three()
 _ONES = Vec3(1.0, 1.0, 1.0)
-
-
-@law
-def rls(theta, P, phi, y, forgetting):  # (5.7)-(5.10), with the matrix inversion lemma for (5.9)
-    """One sample on the covariance itself, as the thesis has it: new estimate, new P, innovation scaled to the noise.
-
-    A yardstick, not what the estimators run on: P is lowered by an outer product, which keeps it symmetric to the
-    last bit, but a vague start costs it twice the digits that it costs a root.
-    """
-    Pphi = P @ phi
-    e = y - phi @ theta  # (5.10)
-    d = 1.0 / (forgetting + phi @ Pphi)
-    return theta + Pphi * (d * e), (P - d * outer(Pphi, Pphi)) / forgetting, e * (forgetting * d) ** 0.5
 
 
 @law

@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate._jit import law
 from palpate.arrays import Array
+from palpate.signals.position_noise import PositionNoise
 
 A, V, X, FORCE, FAST, SLOW, SQUARE, CROSS, RUB = range(9)
 """Columns of a row: then two relaxations of the position, x^2, x v, and the direction of the velocity."""
@@ -207,8 +208,6 @@ def _join(sums):
 
 _GRID = 120
 """Frequencies on each side of a multiple of the sampling rate, evenly spaced in their logarithm."""
-_JUMPS_LEFT = 0.5
-"""Share of the jumps' power towards low frequencies: an error never leaves its count, so each jump is undone later."""
 
 
 @dataclass(frozen=True)
@@ -246,22 +245,9 @@ class LineNoise:
         middle = 4.0 / (ROWS * 2.0 ** np.arange(LEVELS) * period)
         return cls(np.asarray(middle, np.float64), position, force, weights, tick, 1 / period)
 
-    def positions(self, noise: OctavePositionNoise) -> Array:
+    def positions(self, noise: PositionNoise) -> Array:
         """Products of what noise of the position makes of a, v and x in a line of each octave, (levels, 3, 3)."""
-        return noise.power(self.frequency * self.tick)[:, None, None] * self.position
-
-    def in_samples(self, noise: OctavePositionNoise) -> Array:
-        """Products of what noise of the position makes of a, v, x and 1 in one sample, shape (4, 4).
-
-        Jumps have no power of their own in the position, but a position that wanders has its acceleration against it:
-        E[e e''] = -E[e'^2].
-        """
-        found, steps = np.zeros((4, 4)), np.cumsum(self.weights, axis=1)
-        steps[2] = 0.0
-        jumps = steps @ steps.T
-        jumps[0, 2] = jumps[2, 0] = -jumps[1, 1]
-        found[:3, :3] = noise.white * self.weights @ self.weights.T + _JUMPS_LEFT * noise.jump * jumps
-        return found
+        return noise.power(self.frequency, self.tick)[:, None, None] * self.position
 
 
 def _grid(sampling: float, highest: float) -> tuple[Array, Array]:
@@ -285,40 +271,3 @@ def _response(turns: Array, level: int) -> Array:
         turns = np.mod(2 * turns, 1.0)
     phases = np.exp(-2j * np.pi * np.outer(turns, np.arange(ROWS)))
     return np.asarray(gain * np.mean(np.abs(phases @ TRANSFORM) ** 2, axis=1))
-
-
-@dataclass(frozen=True)
-class OctavePositionNoise:
-    """Noise of the position: white, and jumps, which are white increments, as slow motion through an encoder has them.
-
-    Args:
-        white: variance of a reading [m^2].
-        jump: variance of an increment [m^2].
-        count: of the encoder [m]; 0 where single counts are not seen.
-    """
-
-    white: float
-    jump: float
-    count: float
-
-    @classmethod
-    def of(cls, power: float, product: float, count: float) -> OctavePositionNoise:
-        """From the mean square of the position's sixth differences, the mean product of neighbours, and the count."""
-        # Sums of products of the binomial weights of sixth differences of both kinds, at no distance and at one.
-        white, jump = np.linalg.solve([[924.0, 252.0], [-792.0, -210.0]], [power, product])
-        if white < 0:
-            white, jump = 0.0, power / 252.0
-        elif jump < 0:
-            white, jump = power / 924.0, 0.0
-        return cls(float(white), float(jump), count)
-
-    def power(self, turns: Array) -> Array:
-        """Power at frequencies in turns a tick, over that of white noise of variance 1.
-
-        An encoder's error never leaves its count: below the rate jump/count^2 of its steps its power is even, and its
-        whole variance is count^2/12.
-        """
-        jumps = _JUMPS_LEFT * self.jump / (4 * np.sin(np.pi * np.minimum(turns, 0.5)) ** 2)
-        if self.count > 0 and self.jump > 0:
-            jumps = np.minimum(jumps, self.count**4 / (24 * self.jump))
-        return np.asarray(self.white + jumps)

@@ -17,16 +17,18 @@ from palpate.errors import InputError
 if TYPE_CHECKING:
     import polars
 
-LOOK = 4_000_000
-"""Bytes at the beginning of a file that are looked at."""
-_LINES, _LETTERS, _FEWEST = 1000, 500_000, 4
-"""Of these, no more lines are parted, or no more letters, but always a header, its units and two rows."""
+HEAD_BYTES = 4_000_000
+"""Bytes at the beginning of a file from which the layout is found."""
+_MAX_HEAD_LINES = 1000
+_MAX_HEAD_LETTERS = 500_000
+_MIN_HEAD_LINES = 4
+"""Maximum lines and letters that are split to find the layout, and minimum lines: a header, its units and two rows."""
 COMMENTS = ("#", "%", "//", ";")
 """Beginnings of a comment line; a semicolon only if it is not the delimiter."""
 NO_READING = {"", "nan", "na", "n/a", "null", "none", "missing", "-", "--", "#n/a"}
 """Words that stand for no reading, in lower case."""
 
-_NO_TEXT = {
+_OTHER_FORMATS = {
     b"\x1f\x8b": "is compressed by gzip; unpack it first",
     b"BZh": "is compressed by bzip2; unpack it first",
     b"\x28\xb5\x2f\xfd": "is compressed by zstd; unpack it first",
@@ -66,8 +68,8 @@ class TextLine:
 
 
 @dataclass(frozen=True)
-class Parting:
-    """Delimiter of the cells and format of the numbers.
+class Dialect:
+    """Delimiter of the cells and format of the numbers of a text log.
 
     Args:
         delimiter: one character; a space stands for any run of white space.
@@ -90,11 +92,11 @@ class Parting:
 
     def kinds(self, rows: Sequence[Sequence[str]]) -> list[list[int]]:
         """The kind of each cell, without doubt: a comma parts thousands if it does so in a cell with a point."""
-        found = [[self.kind(cell) for cell in row] for row in rows]
-        if not any(2 in row for row in found):
-            return found
+        grid = [[self.kind(cell) for cell in row] for row in rows]
+        if not any(2 in row for row in grid):
+            return grid
         sure = any(_THOUSANDS.fullmatch(cell) and "." in cell for row in rows for cell in row)
-        return [[(1 if sure else -1) if kind == 2 else kind for kind in row] for row in found]
+        return [[(1 if sure else -1) if kind == 2 else kind for kind in row] for row in grid]
 
     def header(self, text: str) -> list[str]:
         """The cells of a line of names; a unit in brackets belongs to the name before it."""
@@ -121,18 +123,20 @@ def first_lines(path: Path) -> tuple[list[TextLine], bool]:
         InputError: the file is not text, or has a line so long that it is no table.
     """
     with path.open("rb") as file:
-        begin = file.read(LOOK)
-        more = bool(file.read(1))
-    for magic, what in _NO_TEXT.items():
+        begin = file.read(HEAD_BYTES)
+        continues = bool(file.read(1))
+    for magic, what in _OTHER_FORMATS.items():
         if begin.startswith(magic):
             raise InputError(f"{path} {what}")
-    begin = begin if more else begin.rstrip(b"\x00")  # a disk that lost power leaves zeros at the end
+    begin = begin if continues else begin.rstrip(b"\x00")  # a disk that lost power leaves zeros at the end
     if b"\x00" in begin:
         raise InputError(f"{path} is not text (it holds zero bytes); give a CSV or a Parquet file")
-    if more:
+    if continues:
         begin, newline, _ = begin.rpartition(b"\n")
         if not newline:
-            raise InputError(f"the first line of {path} has over {LOOK:,} bytes; a table has a line a row")
+            raise InputError(
+                f"the first line of {path} has over {HEAD_BYTES:,} bytes; a table has a line a row"
+            )
     return lines_of(path, _decode(begin)), b"\r" in begin and b"\n" not in begin
 
 
@@ -143,14 +147,14 @@ def lines_of(path: Path, text: str) -> list[TextLine]:
         InputError: a line is so long that it is no row of a table.
     """
     lines: list[TextLine] = []
-    seen = 0
-    for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_LINES], 1):
-        seen += len(raw)
-        if seen > _LETTERS and len(lines) >= _FEWEST:
+    letters = 0
+    for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_MAX_HEAD_LINES], 1):
+        letters += len(raw)
+        if letters > _MAX_HEAD_LETTERS and len(lines) >= _MIN_HEAD_LINES:
             break
-        if len(raw) > _LETTERS:
+        if len(raw) > _MAX_HEAD_LETTERS:
             raise InputError(
-                f"line {number} of {path} has over {_LETTERS:,} letters; a table has a line a row"
+                f"line {number} of {path} has over {_MAX_HEAD_LETTERS:,} letters; a table has a line a row"
             )
         stripped = raw.strip("\r\n\ufeff")
         mark = next((mark for mark in COMMENTS if stripped.lstrip().startswith(mark)), None)

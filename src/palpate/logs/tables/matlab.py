@@ -16,8 +16,10 @@ from palpate.files.confined import read_confined
 from palpate.files.reading import ReadingBudget
 from palpate.logs.tables.sheet import Cells, Sheet, as_counts
 
-_HEADER, _COMPRESSED, _PIECE = 128, 15, 1 << 20
-_MOST = 64
+_HEADER = 128
+_COMPRESSED = 15
+_PIECE = 1 << 20
+_MAX_COLUMNS = 64
 """Columns of one variable; what has more is an image, say."""
 _EXPORTS = {
     "table": "s = table2struct({0}, 'ToScalar', true); save('log.mat', '-struct', 's', '-v7')",
@@ -26,7 +28,7 @@ _EXPORTS = {
     "datetime": "{0} = posixtime({0}); save('log.mat', '{0}', '-v7')",
     "duration": "{0} = seconds({0}); save('log.mat', '{0}', '-v7')",
 }
-"""How MATLAB itself turns an object of a class into plain arrays."""
+"""Commands by which MATLAB turns an object of a class into plain arrays."""
 
 
 def read_matlab(path: Path, budget: ReadingBudget) -> Sheet:
@@ -44,13 +46,14 @@ def read_matlab(path: Path, budget: ReadingBudget) -> Sheet:
     """
     arrays, also = read_confined(__name__, path, "a MATLAB file", budget)
     objects = {name: f"a MATLAB {kind}, which {_export(name, kind)}" for name, kind in also["objects"]}
-    left_out, names = also["images"] | objects, list(arrays)
+    left_out = also["images"] | objects
+    names = list(arrays)
     if not names:
-        told = next((f": {name} is {what}" for name, what in left_out.items()), "")
-        raise InputError(f"{path} holds no array of numbers with a value for each sample{told}")
+        example = next((f": {name} is {what}" for name, what in left_out.items()), "")
+        raise InputError(f"{path} holds no array of numbers with a value for each sample{example}")
     return Sheet(
         path, names, lambda places, missing: ([_cells(arrays[names[i]], missing) for i in places], []),
-        lambda place: as_counts(arrays[names[place]]), left_out=left_out,
+        lambda index: as_counts(arrays[names[index]]), left_out=left_out,
     )  # fmt: skip
 
 
@@ -66,8 +69,8 @@ def _cells(values: AnyArray, missing: Sequence[str]) -> Cells:
 
 
 def _export(name: str, kind: str) -> str:
-    way = _EXPORTS.get(kind, "s = struct({0}); save('log.mat', '-struct', 's', '-v7')")
-    return f"only MATLAB itself reads; export it there with: {way.format(name)}"
+    command = _EXPORTS.get(kind, "s = struct({0}); save('log.mat', '-struct', 's', '-v7')")
+    return f"only MATLAB itself reads; export it there with: {command.format(name)}"
 
 
 def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyArray], dict[str, Any]]:
@@ -89,21 +92,23 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyA
     if objects:  # SciPy keeps one of them only, as none of them has its name where other variables have it
         with path.open("rb") as file:
             parts = [loadmat(part) for _, part in matlab.varmats_from_mat(file)]
-        found = (value for part in parts for value in part.values() if isinstance(value, matlab.MatlabOpaque))
-        objects = [_class(value) for value in found]
+        opaque = (
+            value for part in parts for value in part.values() if isinstance(value, matlab.MatlabOpaque)
+        )
+        objects = [_class(value) for value in opaque]
     arrays = dict(_arrays(variables))
-    images = {name: _size(value) for name, value in arrays.items() if _width(value) > _MOST}
+    images = {name: _size(value) for name, value in arrays.items() if _width(value) > _MAX_COLUMNS}
     columns = {
-        own: column
+        title: column
         for name, value in arrays.items()
-        if 0 < _width(value) <= _MOST
-        for own, column in _columns(name, value)
+        if 0 < _width(value) <= _MAX_COLUMNS
+        for title, column in _columns(name, value)
     }
     return columns, {"objects": objects, "images": images}
 
 
 def _unpacked_sizes(path: Path) -> Iterator[int]:
-    """How much the compressed variables of a file of v7 unpack to, as it grows [bytes]."""
+    """Unpacked size so far of the compressed variables of a file of v7 [bytes]."""
     total = 0
     with path.open("rb") as file:
         order = {b"IM": "<", b"MI": ">"}.get(file.read(_HEADER)[-2:])
@@ -130,9 +135,9 @@ def _class(value: AnyArray) -> tuple[str, str]:
 
 
 def _arrays(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, AnyArray]]:
-    for own, value in variables.items():
-        name = f"{prefix}{own}"
-        if own.startswith("__"):
+    for key, value in variables.items():
+        name = f"{prefix}{key}"
+        if key.startswith("__"):
             continue
         if isinstance(value, Mapping):
             yield from _arrays(value, f"{name}.")
@@ -141,7 +146,7 @@ def _arrays(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[st
 
 
 def _width(value: AnyArray) -> int:
-    """How many columns an array makes: none if it holds less than two values."""
+    """Number of columns of an array: 0 if it holds less than two values."""
     return value.size // max(value.shape) if value.size > 1 else 0
 
 
@@ -152,5 +157,5 @@ def _size(value: AnyArray) -> str:
 def _columns(name: str, value: AnyArray) -> Iterator[tuple[str, AnyArray]]:
     """The columns along the longest side; the first of those that are equally long."""
     rows = np.moveaxis(value, int(np.argmax(value.shape)), -1)
-    for place in product(*map(range, rows.shape[:-1])):
-        yield ".".join(map(str, (name, *place))), rows[place]
+    for index in product(*map(range, rows.shape[:-1])):
+        yield ".".join(map(str, (name, *index))), rows[index]

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
 
 _BYTES = 8
-_KEPT = 8
+_CACHED_HEADS = 8
 """Heads that are kept: several questions are asked about one log."""
-_AT_ONCE = 16 * 10**6
+_MAX_SMALL_RECORD = 16 * 10**6
 """A record of palpate's own up to this size [bytes] is read with its head: a second process would take longer."""
 
 
@@ -73,18 +73,18 @@ def read_parquet(path: Path, budget: ReadingBudget) -> Sheet:
     """
     about = stored_about(path, budget.limits)
     stated = {name: Stated(symbol) for name, symbol in about.units.items()} if about else {}
-    found = head(path, budget.limits)
-    lists = dict.fromkeys(found.lists, "a column of lists; give a column of numbers")
+    schema = head(path, budget.limits)
+    lists = dict.fromkeys(schema.lists, "a column of lists; give a column of numbers")
     return Sheet(
-        path, found.names, lambda places, missing: (_read(path, budget, places, missing), []),
-        lambda place: _read_counts(path, budget, place), stated, left_out=lists,
+        path, schema.names, lambda places, missing: (_read(path, budget, places, missing), []),
+        lambda index: _read_counts(path, budget, index), stated, left_out=lists,
     )  # fmt: skip
 
 
 def _read(path: Path, budget: ReadingBudget, places: Sequence[int], missing: Sequence[str]) -> list[Cells]:
-    own = _open(path, budget.limits)[1]
-    if own is not None and np.isfinite(own[list(places)]).all():
-        return [Cells(own[i]) for i in places]
+    matrix = _open(path, budget.limits)[1]
+    if matrix is not None and np.isfinite(matrix[list(places)]).all():
+        return [Cells(matrix[i]) for i in places]
     columns, also = _query(path, budget, places, missing)
     wrong = {i: (f"row {row + 1}", text) for i, row, text in also["wrong"]}
     cells = []
@@ -94,9 +94,9 @@ def _read(path: Path, budget: ReadingBudget, places: Sequence[int], missing: Seq
     return cells
 
 
-def _read_counts(path: Path, budget: ReadingBudget, place: int) -> Counts | None:
-    found = _query(path, budget, [place], exact=True)[0]
-    return as_counts(found["counts"]) if found else None
+def _read_counts(path: Path, budget: ReadingBudget, index: int) -> Counts | None:
+    answer = _query(path, budget, [index], exact=True)[0]
+    return as_counts(answer["counts"]) if answer else None
 
 
 def read_columns(path: Path, budget: ReadingBudget) -> dict[str, Array]:
@@ -105,9 +105,9 @@ def read_columns(path: Path, budget: ReadingBudget) -> dict[str, Array]:
     Raises:
         InputError: it cannot be read.
     """
-    found, own = _open(path, budget.limits)
-    numbers = own if own is not None else _query(path, budget, range(len(found.names)))[0]["numbers"]
-    return {name: np.array(column) for name, column in zip(found.names, numbers, strict=True)}
+    schema, matrix = _open(path, budget.limits)
+    numbers = matrix if matrix is not None else _query(path, budget, range(len(schema.names)))[0]["numbers"]
+    return {name: np.array(column) for name, column in zip(schema.names, numbers, strict=True)}
 
 
 def _query(
@@ -158,7 +158,7 @@ def _open(path: Path, limits: ReadingLimits | None) -> tuple[ParquetHead, Array 
     )
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHED_HEADS)
 def _head(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> tuple[ParquetHead, Array | None]:
     arrays, also = read_confined(__name__, path, "Parquet", ReadingBudget(path, limits))
     return msgspec.convert(also, ParquetHead), arrays.get("numbers")
@@ -175,20 +175,20 @@ def unpack(path: Path, size: int, question: Any) -> tuple[dict[str, AnyArray], A
         lists = [name for name, dtype in schema.items() if isinstance(dtype, polars.List | polars.Array)]
         about = polars.read_parquet_metadata(path).get(SIGNATURE)
         count = rows.select(polars.len()).collect().item()
-        whole = {}
+        matrix = {}
         if about is not None and set(schema.dtypes()) == {polars.Float64}:
-            few = _BYTES * count * len(leaves) <= min(_AT_ONCE, size)
-            whole = {"numbers": rows.collect().to_numpy().T} if few else {}
-        return whole, (count, [name for name, _ in leaves], lists, about)
+            few = _BYTES * count * len(leaves) <= min(_MAX_SMALL_RECORD, size)
+            matrix = {"numbers": rows.collect().to_numpy().T} if few else {}
+        return matrix, (count, [name for name, _ in leaves], lists, about)
     places = question["places"]
     frame = rows.select(leaves[i][1].alias(str(i)) for i in sorted(set(places))).collect(engine="streaming")
     if question["exact"]:
         return _counts(frame[str(places[0])]), None
     cells = [frame[str(i)] for i in places]
-    numbers = np.array([_numbers(own) for own in cells], float).reshape(len(cells), len(frame))
+    numbers = np.array([_numbers(cell) for cell in cells], float).reshape(len(cells), len(frame))
     words = NO_READING | {word.lower() for word in question["missing"]}
-    wrong = [(i, *found) for i, own in enumerate(cells) if (found := _wrong(own, numbers[i], words))]
-    clocks = [i for i, own in enumerate(cells) if own.dtype.is_temporal()]
+    wrong = [(i, *fault) for i, cell in enumerate(cells) if (fault := _wrong(cell, numbers[i], words))]
+    clocks = [i for i, cell in enumerate(cells) if cell.dtype.is_temporal()]
     return {"numbers": numbers}, {"wrong": wrong, "clocks": clocks}
 
 
@@ -229,11 +229,12 @@ def _leaves(schema: Mapping[str, Any]) -> Iterator[tuple[str, polars.Expr]]:
             yield name, polars.col(name)
 
 
-def _fields(prefix: str, own: polars.Expr, struct: polars.Struct) -> Iterator[tuple[str, polars.Expr]]:
+def _fields(prefix: str, expression: polars.Expr, struct: polars.Struct) -> Iterator[tuple[str, polars.Expr]]:
     import polars
 
     for field in struct.fields:
-        name, value = f"{prefix}.{field.name}", own.struct.field(field.name)
+        name = f"{prefix}.{field.name}"
+        value = expression.struct.field(field.name)
         if isinstance(field.dtype, polars.Struct):
             yield from _fields(name, value, field.dtype)
         elif not isinstance(field.dtype, polars.List | polars.Array):
@@ -280,7 +281,8 @@ def read_record(path: str | Path, limits: ReadingLimits | None = None) -> Record
     Raises:
         InputError: the file is missing, is no Parquet file, or was not written by palpate.
     """
-    path, limits = Path(path), limits or ReadingLimits()
+    path = Path(path)
+    limits = limits or ReadingLimits()
     about = stored_about(path, limits)
     if about is None:
         raise InputError(f"{path} carries no units of palpate; read it with read_log and name its columns")

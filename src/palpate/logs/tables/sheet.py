@@ -15,7 +15,7 @@ from palpate.text import shorten
 LONGEST = 200
 """Letters of a name; what is longer is text, and is shown by its beginning and its end."""
 
-_QUOTED = 60
+_MAX_QUOTED = 60
 """Letters of a cell that an error quotes."""
 
 
@@ -93,7 +93,7 @@ class Sheet:
 
     def __post_init__(self) -> None:
         self.names = [shorten(name, LONGEST) for name in self.names]
-        self.stated = {shorten(name, LONGEST): own for name, own in self.stated.items()}
+        self.stated = {shorten(name, LONGEST): statement for name, statement in self.stated.items()}
 
     def resolve(self, name: str) -> int:
         """The place of a column given by its name, or else by its number from 0.
@@ -101,10 +101,10 @@ class Sheet:
         Raises:
             InputError: there is no such column (those there are, are listed), or there are two.
         """
-        owner = next((own for own in (name, name.partition(".")[0]) if own in self.left_out), None)
+        owner = next((title for title in (name, name.partition(".")[0]) if title in self.left_out), None)
         if name not in self.names and owner is not None:
             raise InputError(f"{self.path}: {owner!r} is {self.left_out[owner]}")
-        places = [i for i, own in enumerate(self.names) if own == name]
+        places = [i for i, title in enumerate(self.names) if title == name]
         if len(places) > 1:
             numbers = ", ".join(map(str, places))
             raise InputError(
@@ -128,15 +128,16 @@ class Sheet:
         Raises:
             InputError: a cell that is not a finite number; its row and its text are named.
         """
-        titles = {self.tables[place] for place in places} if self.tables else set()
+        titles = {self.tables[index] for index in places} if self.tables else set()
         if len(titles) > 1:
             listed = ", ".join(sorted(titles))
             raise InputError(f"{self.path}: the columns of a log must be on one sheet, got {listed}")
         cells, self.notes = self.read(places, missing)
-        columns = {self.names[place]: own for place, own in zip(places, cells, strict=True)}
+        columns = {self.names[index]: own for index, own in zip(places, cells, strict=True)}
         for name, own in columns.items():
             if own.wrong:
-                where, text = own.wrong[0], shorten(own.wrong[1], _QUOTED)
+                where = own.wrong[0]
+                text = shorten(own.wrong[1], _MAX_QUOTED)
                 raise InputError(
                     f"{self.path}: column {name!r}, {where} holds {text!r}, which is no finite number; mend it,"
                     f" or say --missing {shlex.quote(text)} if it means that there is no reading"
@@ -147,23 +148,25 @@ class Sheet:
             raise InputError(f"{self.path}: the columns of a log must have one length, got {listed}")
         self._note_clocks(places, cells)
         none = [float(word) for word in missing if is_finite(word)]
-        found = [own.numbers.copy() for own in cells]
-        for column in found if none else []:
+        arrays = [own.numbers.copy() for own in cells]
+        for column in arrays if none else []:
             column[np.isin(column, none)] = np.nan
-        return found
+        return arrays
 
     def glance(self, places: Sequence[int]) -> list[Array]:
-        """The same, whatever their length; NaN too where something else than a number or a date stands."""
+        """The columns, whatever their length; NaN where a cell is no number and no date."""
         cells, self.notes = self.read(places, ())
         self._note_clocks(places, cells)
-        return [own.numbers for own in cells]
+        return [column.numbers for column in cells]
 
     def _note_clocks(self, places: Sequence[int], cells: Sequence[Cells]) -> None:
-        self.clocks |= {self.names[place] for place, own in zip(places, cells, strict=True) if own.clock}
+        self.clocks |= {
+            self.names[index] for index, column in zip(places, cells, strict=True) if column.clock
+        }
 
 
 def is_finite(word: str) -> bool:
-    """Whether a word is a finite number."""
+    """True if a word is a finite number."""
     try:
         return bool(np.isfinite(float(word)))
     except ValueError:
@@ -196,7 +199,7 @@ def read_frame(table: Any) -> Sheet:
         Path(f"the {type(table).__name__}"),
         [str(name) for name, _ in columns],
         lambda places, _: ([_cells(columns[i][1]) for i in places], []),
-        lambda place: as_counts(columns[place][1]),
+        lambda index: as_counts(columns[index][1]),
         clocks={str(name) for name, cells in columns if cells.dtype.kind == "M"},
     )
 
@@ -218,13 +221,13 @@ def own_columns(frame: Sheet, rate: float | None) -> dict[str, str]:
     Raises:
         InputError: it does not.
     """
-    wanted = ("time", "position", "force") if rate is None else ("position", "force")
-    if not set(wanted) <= set(frame.names):
+    roles = ("time", "position", "force") if rate is None else ("position", "force")
+    if not set(roles) <= set(frame.names):
         raise InputError(
             f"{frame.path} has the columns {', '.join(frame.names[:12])}; say which are which, as in "
             'read_log(table, time="t", position="depth_mm:mm", force="load:N")'
         )
-    return {name: name for name in wanted}
+    return {name: name for name in roles}
 
 
 def _columns(table: Any) -> dict[Any, AnyArray]:
@@ -249,7 +252,7 @@ def _columns(table: Any) -> dict[Any, AnyArray]:
     return columns
 
 
-_USUAL = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0, -3.697314e28)
+_SENTINELS = (-1.0, -9.0, -99.0, -999.0, -9999.0, -32768.0, 999.0, 9999.0, 65535.0, 99999.0, -3.697314e28)
 """Values that drivers return for "no reading", as a scale's -1 between two readings. NDI's trackers write the last for
 a marker that they do not see."""
 
@@ -260,29 +263,30 @@ def find_sentinel(values: Array) -> float | None:
     It must be one of those that drivers use, occur again and again, lie on one side of all other
     values, and be left and returned to in jumps: a force of -1 on its way from 0 to -2 is a force.
     """
-    for value in _USUAL:
+    for value in _SENTINELS:
         here = values == value
         if not 2 <= np.count_nonzero(here) < len(values) - 2:
             continue
-        others = values[~here & np.isfinite(values)]
-        if len(others) > 1 and _outside(value, others) and _jumps(values, here, value):
+        remaining = values[~here & np.isfinite(values)]
+        if len(remaining) > 1 and _is_outside(value, remaining) and _is_left_in_jumps(values, here, value):
             return value
     return None
 
 
-def _outside(value: float, others: Array) -> bool:
-    """Whether the value lies where no reading does; a small negative one needs readings that are never negative."""
-    low, high = float(others.min()), float(others.max())
+def _is_outside(value: float, readings: Array) -> bool:
+    """True if the value lies where no reading does; a small negative one needs readings that are never negative."""
+    low = float(readings.min())
+    high = float(readings.max())
     if value < 0:
         return low >= 0 if value > -10 else value < low - (high - low)
     return value > high + (high - low)
 
 
-def _jumps(values: Array, here: Mask, value: float) -> bool:
-    """Whether the typical reading beside this value is far from it, measured by their steps where they change."""
-    beside = values[1:][here[:-1] & ~here[1:]]
-    if not len(beside):
+def _is_left_in_jumps(values: Array, here: Mask, value: float) -> bool:
+    """True if the typical reading beside this value is far from it, measured by their steps where they change."""
+    next_values = values[1:][here[:-1] & ~here[1:]]
+    if not len(next_values):
         return False
     steps = np.abs(np.diff(values[~here]))
     typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    return float(np.median(np.abs(beside - value))) > 3 * typical
+    return float(np.median(np.abs(next_values - value))) > 3 * typical

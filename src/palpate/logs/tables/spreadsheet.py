@@ -11,13 +11,13 @@ from zipfile import ZipFile
 import numpy as np
 
 from palpate.arrays import AnyArray
-from palpate.errors import InputError, unknown
+from palpate.errors import InputError, how_to_install, unknown
 from palpate.files.confined import read_confined
 from palpate.files.reading import LimitError, ReadingBudget, ReadingLimits
 from palpate.logs.tables.sheet import Cells, Sheet
 from palpate.logs.tables.text import read_text_sheet
 
-_KEPT = 2
+_CACHED_BOOKS = 2
 """Books whose cells are kept: several questions are asked about one."""
 
 
@@ -41,8 +41,8 @@ def read_book(path: Path, budget: ReadingBudget) -> Sheet:
 
 def _join_sheets(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str]) -> Sheet:
     """The columns of all sheets as one table; a name that only one sheet has is enough."""
-    owners = [(title, place) for title, sheet in sheets.items() for place in range(len(sheet.names))]
-    plain = [sheets[title].names[place] for title, place in owners]
+    owners = [(title, index) for title, sheet in sheets.items() for index in range(len(sheet.names))]
+    plain = [sheets[title].names[index] for title, index in owners]
     names = [
         name if len(sheets) == 1 else f"{owner[0]}.{name}" for name, owner in zip(plain, owners, strict=True)
     ]
@@ -51,10 +51,10 @@ def _join_sheets(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str])
         cells: dict[int, Cells] = {}
         notes: list[dict[str, Any]] = []
         for title in dict.fromkeys(owners[i][0] for i in places):
-            own = [i for i in places if owners[i][0] == title]
-            found, more = sheets[title].read([owners[i][1] for i in own], missing)
-            cells |= dict(zip(own, found, strict=True))
-            notes += more
+            columns = [i for i in places if owners[i][0] == title]
+            sheet_cells, sheet_notes = sheets[title].read([owners[i][1] for i in columns], missing)
+            cells |= dict(zip(columns, sheet_cells, strict=True))
+            notes += sheet_notes
         return [cells[i] for i in places], notes
 
     rates = {sheet.rate for sheet in sheets.values()}
@@ -62,9 +62,9 @@ def _join_sheets(path: Path, sheets: dict[str, Sheet], left_out: dict[str, str])
         path,
         names,
         read,
-        lambda place: sheets[owners[place][0]].counts(owners[place][1]),
-        {name: sheets[o].stated[own] for name, own, (o, _) in zip(names, plain, owners, strict=True)
-         if own in sheets[o].stated},
+        lambda index: sheets[owners[index][0]].counts(owners[index][1]),
+        {name: sheets[o].stated[plain_name] for name, plain_name, (o, _) in zip(names, plain, owners, strict=True)
+         if plain_name in sheets[o].stated},
         rates.pop() if len(rates) == 1 else None,
         left_out,
         shorter={name: i for i, name in enumerate(plain) if plain.count(name) == 1},
@@ -112,7 +112,7 @@ def equal_sheets(path: Path, limits: ReadingLimits, names: Sequence[str] = ()) -
     return [path / title for title, sheet in sheets.items() if tuple(sheet.names) == usual]
 
 
-@lru_cache(maxsize=_KEPT)
+@lru_cache(maxsize=_CACHED_BOOKS)
 def _contents(path: Path, state: tuple[int, ...], limits: ReadingLimits) -> dict[str, str]:
     """The sheets' text by title; `state` tells a changed file from the one that is kept."""
     arrays, _ = read_confined(__name__, path, "a spreadsheet", ReadingBudget(path, limits))
@@ -125,7 +125,7 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyA
         from python_calamine import CalamineWorkbook
     except ImportError:
         raise InputError(
-            "spreadsheets need the library python-calamine; install it with: pip install 'palpate[spreadsheets]'"
+            f"spreadsheets need the library python-calamine: {how_to_install('palpate[spreadsheets]')}"
         ) from None
     with ZipFile(path) as packed:
         if sum(part.file_size for part in packed.infolist()) > size:

@@ -15,17 +15,16 @@ from palpate.arrays import Counts
 from palpate.errors import InputError
 from palpate.files.reading import ReadingBudget
 from palpate.logs.tables import lines
-from palpate.logs.tables.layout import Layout, find_layout, read_preamble
+from palpate.logs.tables.layout import LABVIEW_HEADER_END, Layout, find_layout, read_preamble
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
 
-_NEVER = "\x1f"
-"""Stands in no log of text, so that polars takes each line for one cell."""
-_CELL = "\x1e"
-"""Likewise; parts cells whose quotes were taken off."""
-_MANY = 32
-"""Columns from which on a line is parted as a whole."""
-_BYTES, _PIECE = 8, 1 << 20
-_LABVIEW = "***End_of_Header***"
+_NO_DELIMITER = "\x1f"
+"""Delimiter that no text holds, so that polars takes each line for one cell."""
+_CELL_MARK = "\x1e"
+"""Delimiter, likewise, of cells without their quotes."""
+_MIN_WIDE_COLUMNS = 32
+"""Columns from which on each line is split as a whole."""
+_BYTES, _PIECE_BYTES = 8, 1 << 20
 
 
 def read_text_sheet(
@@ -46,12 +45,13 @@ def read_text_sheet(
         budget.take(path.stat().st_size)
         head, bare_returns = lines.first_lines(path)
     else:
-        head, bare_returns = lines.lines_of(path, content), False
+        head = lines.lines_of(path, content)
+        bare_returns = False
     layout = find_layout(path, head, budget, delimiter)
     names = list(layout.names)
     preamble = read_preamble(layout.above, names)
     units = {name: Stated(symbol, "the row of units") for name, symbol in layout.units.items()}
-    if content is None and not layout.quoted and layout.parting.delimiter != " ":
+    if content is None and not layout.quoted and layout.dialect.delimiter != " ":
         layout = replace(layout, quoted=_holds_quotes(path, layout.first_row))
     rows = _TextRows(path, layout, budget, bare_returns, content)
     return Sheet(
@@ -61,11 +61,11 @@ def read_text_sheet(
 
 
 def _holds_quotes(path: Path, first_row: int) -> bool:
-    """Whether a quote stands below the header: the rows that are looked at need not have one."""
+    """True if a quote stands below the header: the rows that are looked at need not have one."""
     with path.open("rb") as file:
         for _ in range(first_row - 1):
             file.readline()
-        return any(b'"' in piece for piece in iter(lambda: file.read(_PIECE), b""))
+        return any(b'"' in piece for piece in iter(lambda: file.read(_PIECE_BYTES), b""))
 
 
 def _doubts(name: str, layout: Layout) -> str:
@@ -76,8 +76,10 @@ def _doubts(name: str, layout: Layout) -> str:
             f" (only one column was found, separated by {layout.delimiter_name}; is the"
             " delimiter right, and does the table begin in the first line?)"
         )
-    whole = next((own for own in layout.names if own.startswith(f"{name}:")), None)
-    return f"{text} (a name that holds a colon is given with its unit: {whole}:UNIT)" if whole else text
+    candidate = next((column for column in layout.names if column.startswith(f"{name}:")), None)
+    return (
+        f"{text} (a name that holds a colon is given with its unit: {candidate}:UNIT)" if candidate else text
+    )
 
 
 @dataclass
@@ -94,41 +96,41 @@ class _TextRows:
         """Columns of the whole rows; a note says once which lines are none."""
         frame = self._frame(places)
         notes = self._note_skipped(frame)
-        whole = frame.filter("whole")
-        return [self._column(whole, place, missing) for place in places], notes
+        rows = frame.filter("whole")
+        return [self._column(rows, index, missing) for index in places], notes
 
-    def _column(self, whole: polars.DataFrame, place: int, missing: Sequence[str]) -> Cells:
-        first = self._first[place].strip() if place < len(self._first) else ""
+    def _column(self, rows: polars.DataFrame, index: int, missing: Sequence[str]) -> Cells:
+        first = self._first[index].strip() if index < len(self._first) else ""
         if first and not is_finite(first) and lines.seconds_of_text(first) is not None:
-            return self._clock(place)
-        numbers = whole.get_column(str(place)).to_numpy().astype(float, copy=True)
+            return self._clock(index)
+        numbers = rows.get_column(str(index)).to_numpy().astype(float, copy=True)
         absent = ~np.isfinite(numbers)
-        wrong = self._wrong(place, missing) if absent.any() else None
+        wrong = self._wrong(index, missing) if absent.any() else None
         numbers[absent] = np.nan
         return Cells(numbers, wrong)
 
-    def _clock(self, place: int) -> Cells:
+    def _clock(self, index: int) -> Cells:
         """A column of dates and times."""
-        frame = self._cells(place)
-        cells = frame.get_column(str(place)).to_list()
+        frame = self._cells(index)
+        cells = frame.get_column(str(index)).to_list()
         seconds = [lines.seconds_of_text(text) for text in cells]
         self.budget.take(0)
         row = seconds.index(None) if None in seconds else None
         wrong = None if row is None else (_place(row, frame["line"][row]), str(cells[row]))
         return Cells(np.array(seconds, float), wrong, clock=True)
 
-    def _wrong(self, place: int, missing: Sequence[str]) -> tuple[str, str] | None:
+    def _wrong(self, index: int, missing: Sequence[str]) -> tuple[str, str] | None:
         """The first cell that holds something, and yet no finite number."""
-        cell = polars.col(str(place))
+        cell = polars.col(str(index))
         words = [*lines.NO_READING, *(word.lower() for word in missing)]
         finite = self._number(cell).is_finite().fill_null(False)
         wrong = cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~finite
-        rows = self._cells(place).with_row_index("row").filter(wrong).head(1)
+        rows = self._cells(index).with_row_index("row").filter(wrong).head(1)
         return next(((_place(row, line), str(text)) for row, line, text in rows.rows()), None)
 
-    def counts(self, place: int) -> Counts | None:
+    def counts(self, index: int) -> Counts | None:
         """A column of whole numbers, exact; None if it holds others."""
-        counts = self._cells(place).get_column(str(place)).cast(polars.Int64, strict=False)
+        counts = self._cells(index).get_column(str(index)).cast(polars.Int64, strict=False)
         return None if counts.null_count() else counts.to_numpy()
 
     def _note_skipped(self, frame: polars.DataFrame) -> list[dict[str, Any]]:
@@ -137,7 +139,8 @@ class _TextRows:
             raise InputError(f"{self.path} holds a header and no rows; give a log with a row for each sample")
         if not len(lost):
             return []
-        first, cells = lost[0], len(self.layout.names)
+        first = lost[0]
+        cells = len(self.layout.names)
         text = f"{len(lost)} lines are no rows of {cells} cells and are left out (the first is line {first})"
         if len(lost) == 1 and first == frame["line"][-1]:
             text = f"the last line ({first}) is cut short and is left out"
@@ -147,7 +150,7 @@ class _TextRows:
         """Line, whether it is whole, and the numbers at some places, by place."""
         count = int(self._collect(self._rows.select(polars.len())).item())
         self.budget.check(_BYTES * count * len(places))
-        if len(places) > _MANY:
+        if len(places) > _MIN_WIDE_COLUMNS:
             return self._wide_frame(places)
         numbers = [self._number(_cell(i)).alias(str(i)) for i in set(places)]
         return self._collect(
@@ -155,7 +158,7 @@ class _TextRows:
         )
 
     def _wide_frame(self, places: Sequence[int]) -> polars.DataFrame:
-        """The same for many places, which polars would else look for one after the other in every line."""
+        """Read many columns, splitting each line once and not once for each column."""
         lists = self._collect(self._rows.with_columns(polars.col("text").str.split(self._delimiter)))
         cells = lists.get_column("text").list
         names = dict.fromkeys(map(str, places))
@@ -164,10 +167,10 @@ class _TextRows:
         )
         return lists.select("line", "whole").hstack(frame.select(self._number(polars.col(i)) for i in names))
 
-    def _cells(self, place: int) -> polars.DataFrame:
+    def _cells(self, index: int) -> polars.DataFrame:
         """One column's cells as text, of the whole rows, and their lines."""
-        rows = self._rows.with_columns(self._cells_up_to(place)).filter("whole")
-        return self._collect(rows.select("line", _cell(place).alias(str(place))))
+        rows = self._rows.with_columns(self._cells_up_to(index)).filter("whole")
+        return self._collect(rows.select("line", _cell(index).alias(str(index))))
 
     @cached_property
     def _first(self) -> list[str]:
@@ -186,22 +189,23 @@ class _TextRows:
     @cached_property
     def _rows(self) -> polars.LazyFrame:
         """The lines from the first row on that are no comments, and whether they are whole."""
-        line, cell = polars.col("text"), self._delimiter
+        line = polars.col("text")
+        cell = self._delimiter
         text = line.str.strip_chars()
-        marks = [mark for mark in lines.COMMENTS if mark != self.layout.parting.delimiter]
+        marks = [mark for mark in lines.COMMENTS if mark != self.layout.dialect.delimiter]
         comment = polars.any_horizontal(text.str.starts_with(mark) for mark in marks)
         if cell == " ":
             line = text.str.replace_all(r"\s+", " ")
         count = line.str.count_matches(cell, literal=True) + 1
         bare = line.str.strip_chars_end(cell + " \t").str.count_matches(cell, literal=True) + 1
         cells = len(self.layout.names)
-        whole = (count >= cells) & (bare <= cells) & ~line.str.contains("\x00", literal=True)
+        complete = (count >= cells) & (bare <= cells) & ~line.str.contains("\x00", literal=True)
         if self.layout.header:
-            whole &= text != self.layout.header.strip()
+            complete &= text != self.layout.header.strip()
         if any(
-            above.strip() == _LABVIEW for above in self.layout.above
+            above.strip() == LABVIEW_HEADER_END for above in self.layout.above
         ):  # each block has a header of its own
-            whole &= text.str.contains(r"^[+\-.,]?\d") | line.str.starts_with(cell)
+            complete &= text.str.contains(r"^[+\-.,]?\d") | line.str.starts_with(cell)
         return (
             self._lines()
             .filter(
@@ -209,7 +213,7 @@ class _TextRows:
                 & (text.str.strip_chars(cell + " \t") != "")
                 & ~comment
             )
-            .select("line", whole.alias("whole"), line.alias("text"))
+            .select("line", complete.alias("whole"), line.alias("text"))
         )
 
     def _cells_up_to(self, last: int) -> polars.Expr:
@@ -218,7 +222,7 @@ class _TextRows:
 
     def _number(self, cell: polars.Expr) -> polars.Expr:
         """Numbers of cells; points or commas that part thousands are left out."""
-        comma = self.layout.parting.decimal_comma
+        comma = self.layout.dialect.decimal_comma
         if self._delimiter != ",":
             pattern, mark = (lines.POINTED_THOUSANDS, ".") if comma else (lines.THOUSANDS, ",")
             parted = cell.str.contains(f"^(?:{pattern})$")
@@ -229,13 +233,13 @@ class _TextRows:
 
     @property
     def _delimiter(self) -> str:
-        return _CELL if self.layout.quoted else self.layout.parting.delimiter
+        return _CELL_MARK if self.layout.quoted else self.layout.dialect.delimiter
 
     def _lines(self) -> polars.LazyFrame:
         """The log's lines by number, each as one text."""
         return polars.scan_csv(
             self._source,
-            separator=_NEVER,
+            separator=_NO_DELIMITER,
             quote_char=None,
             has_header=False,
             schema={"text": polars.String},
@@ -263,30 +267,31 @@ class _TextRows:
     def _remove_quotes(self) -> bytes:
         """The text without the quotes around its cells."""
         if self.content is not None:
-            return self._parted_lines(self.content.splitlines())
+            return self._join_unquoted(self.content.splitlines())
         with self.path.open(encoding="utf-8-sig", errors="replace") as file:
-            return self._parted_lines(file)
+            return self._join_unquoted(file)
 
-    def _parted_lines(self, texts: Iterable[str]) -> bytes:
+    def _join_unquoted(self, texts: Iterable[str]) -> bytes:
         out = io.BytesIO()
         for line in texts:
             out.write(
-                _CELL.join(_cells(line.rstrip("\r\n"), self.layout.parting)).encode(errors="replace") + b"\n"
+                _CELL_MARK.join(_cells(line.rstrip("\r\n"), self.layout.dialect)).encode(errors="replace")
+                + b"\n"
             )
             self.budget.take(0)
         return out.getvalue()
 
 
-def _cell(place: int) -> polars.Expr:
-    return polars.col("cells").struct.field(f"field_{place}").str.strip_chars()
+def _cell(index: int) -> polars.Expr:
+    return polars.col("cells").struct.field(f"field_{index}").str.strip_chars()
 
 
 def _place(row: int, line: int) -> str:
     return f"row {row + 1} (line {line})"
 
 
-def _cells(line: str, parting: lines.Parting) -> list[str]:
+def _cells(line: str, dialect: lines.Dialect) -> list[str]:
     try:
-        return next(csv.reader([line], delimiter=parting.delimiter), [])
+        return next(csv.reader([line], delimiter=dialect.delimiter), [])
     except csv.Error:
         return [line]

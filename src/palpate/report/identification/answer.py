@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,12 @@ from palpate.errors import InputError
 from palpate.identification.causes import Cause, Code, cause_of
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
-from palpate.report.identification import details, figure, words
 from palpate.report.identification import page as pages
-from palpate.report.page import CommandAnswer, as_html, console_text
+from palpate.report.identification import words
+from palpate.report.identification.page import facts, parameter_table
+from palpate.report.identification.uncertainty_budget import budget_notes, budget_tables
+from palpate.report.page import Answer
+from palpate.report.terminal import show_table
 from palpate.signals.types import NORMAL
 from palpate.text import print_hanging, printable
 from palpate.units import NONE, plain, quantity, with_half
@@ -23,8 +27,10 @@ from palpate.units import NONE, plain, quantity, with_half
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = 14
-"""Lines of an answer, which a reader sees at once."""
+_PYTHON = words.Source("a record", command="palpate.identify(...).report(...)")
+"""Source of an identification that was made in Python."""
+MAX_LINES = 14
+"""Lines of an answer at most, to fit on a small terminal."""
 _BOUND = Text("! lower bound", style="yellow")
 _BOUND_OF_SURFACE = Text("! lower bound of the surface", style="yellow")
 _IN_DOUBT = Text("? in doubt, see above", style="yellow")
@@ -68,139 +74,154 @@ _SHOWN_OTHERWISE = {
     Code.LAG_DAMPING_CONFOUNDED,
     Code.LOW_EXCITATION,
     Code.SERIES_COMPLIANCE,
-    Code.UNIT_GUESS,
     Code.NO_CONTACT,
 }
 
 
 def show(
-    found: Identification, name: str, console: Console, notes: Sequence[str] = (), end: str = ""
+    result: Identification, name: str, console: Console, notes: Sequence[str] = (), end: str = ""
 ) -> None:
     """Print the answer in at most fourteen lines; the warnings that ask for a correction first.
 
     Args:
-        found: what to print.
+        result: what to print.
         name: of the log.
         console: where to; lines are wrapped at its width, but in a pipe or a file.
         notes: how the log was read, a sentence each.
         end: the last line.
     """
-    printed = [*lines(found, name, notes), *([Text(printable(end))] if end else [])]
-    if len(printed) > MOST:
+    printed = [*lines(result, name, notes), *([Text(printable(end))] if end else [])]
+    if len(printed) > MAX_LINES:
         printed = [line for line in printed if line.plain]
     print_hanging(printed, console)
 
 
-def answer_of(
-    found: Identification,
-    source: words.Source,
-    places: Sequence[str],
-    more: str,
+def build_answer(
+    result: Identification,
+    source: words.Source = _PYTHON,
+    evidence_options: str = "",
     *,
-    verbose: bool,
-    budget: bool,
-) -> CommandAnswer:
+    verbose: bool = False,
+    budget: bool = False,
+) -> Answer:
     """The answer of `palpate identify` for one log.
 
     Args:
-        found: what the log gives.
+        result: what the log gives.
         source: the log.
-        places: of the written files.
-        more: options by which all evidence is shown.
+        evidence_options: options by which all evidence is shown.
         verbose: whether all evidence is printed.
         budget: whether the uncertainty budgets are.
     """
+    budgets = budget_tables(result) if budget else []
+    budget_remarks = budget_notes(result) if budget else []
 
     def display(console: Console) -> None:
-        if not verbose:
-            show(found, source.title, console, source.notes, "   ".join([*places, f"all evidence: {more}"]))
-        else:
-            details.show(found, source.title, console)
-            for line in (*source.notes, *places):
-                console.print(line, soft_wrap=True)
-        if budget:
-            details.show_budgets(found, console)
+        show(
+            result,
+            source.title,
+            console,
+            source.notes,
+            evidence_options and f"all evidence: {evidence_options}",
+        )
+        for table in budgets:
+            show_table(console, table)
+        for remark in budget_remarks:
+            console.print(Text(remark), soft_wrap=True)
 
     file = {"file": source.file, "sha256": source.sha256}
-    return CommandAnswer({"files": [file], **words.as_json(found, source)}, show=display)
+    return Answer(
+        {"files": [file], **words.as_json(result, source)},
+        sentence="\n".join([words.sentence(result), *(facts(result, source.title) if verbose else [])]),
+        tables=[parameter_table(result), *budgets],
+        notes=[*words.reasons(result), *source.notes, *budget_remarks],
+        show=None if verbose else display,
+    )
 
 
-def lines(found: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
+def lines(result: Identification, name: str, notes: Sequence[str] = ()) -> Iterator[Text]:
     """The lines, with their styles."""
-    for text in words.unit_warnings(found):
+    for text in words.unit_warnings(result):
         yield Text(printable(f"! {text}"), style="bold yellow")
-    point = found.working_point
-    if found.slide is not None:
-        yield Text(printable(f"{name}: {found.slide.sentence}"), style="bold")
-        yield from (Text(printable(fact)) for fact in found.slide.facts)
-        yield from _rows(found)
-    elif not found.contacts or point is None:
-        title = f"{name} shows no stiffness: no stretch in contact is long enough"
-        if not found.contacts:
-            title = words.no_contact_in(name, found)
-        yield Text(printable(f"{title}."), style="bold")
-        if found.contacts:
-            yield Text("Log longer, or press deeper.")
-        elif title.startswith(words.UNTOUCHED.partition("in")[0]):
-            yield Text(words.ADVICE[Code.NO_CONTACT])
+    point = result.working_point
+    if result.slide is not None:
+        yield Text(printable(f"{name}: {result.slide.sentence}"), style="bold")
+        yield from (Text(printable(fact)) for fact in result.slide.facts)
+        yield from _rows(result)
+    elif not result.contacts or point is None:
+        yield from _without_point(result, name)
     else:
-        modulus = found.parameters.get("E")
+        modulus = result.parameters.get("E")
         if modulus is not None:
-            mark = _IN_DOUBT if words.unit_warnings(found) else _mark(modulus)
+            mark = _IN_DOUBT if words.unit_warnings(result) else _mark(modulus)
             yield from _head(modulus, "Young's modulus", name, f"{_sentence(modulus.reason)}.", mark)
             name = ""
-        yield from _stiffness(found, name)
+        yield from _stiffness(result, name)
         yield Text("")
-        yield from _rows(found)
-        yield from _reasons(found)
+        yield from _rows(result)
+        yield from _reasons(result)
         yield Text("")
-        yield Text(printable(_contact(found)))
-        if point.source == "press" and found.press is not None and len(found.press.tangent) > 1:
-            yield Text(printable(" ".join(words.press_facts(found))))
-        if found.lag is not None and found.lag.kind == "prior" and found.n:
-            yield Text(_assumed_lag(found))
-    yield from _foot(found, notes)
+        yield Text(printable(_contact(result)))
+        if point.source == "press" and result.press is not None and len(result.press.tangent) > 1:
+            yield Text(printable(" ".join(words.press_facts(result))))
+        if result.lag is not None and result.lag.kind == "prior" and result.n:
+            yield Text(_assumed_lag(result))
+    yield from _foot(result, notes)
 
 
-def _stiffness(found: Identification, name: str) -> Iterator[Text]:
-    point = found.working_point
+def _without_point(result: Identification, name: str) -> Iterator[Text]:
+    """The reason for no stiffness at a working point, and the parameters if a model identifies one all the same."""
+    if not result.contacts:
+        title = words.no_contact_in(name, result)
+        yield Text(printable(f"{title}."), style="bold")
+        if title.startswith(words.UNTOUCHED.partition("in")[0]):
+            yield Text(words.ADVICE[Code.NO_CONTACT])
+        return
+    lacking = "no stiffness without a model" if result.identified else "no stiffness"
+    text = f"{name} shows {lacking}: no stretch in contact is long enough."
+    yield Text(printable(text), style="bold")
+    yield Text("Log longer, or press deeper.")
+    if result.identified:
+        yield from _rows(result)
+
+
+def _stiffness(result: Identification, name: str) -> Iterator[Text]:
+    point = result.working_point
     assert point is not None
-    own, what, at = point.stiffness, "stiffness", words.place_of(found, point)
-    lost = own.verdict is Verdict.NOT_IDENTIFIABLE and words.loss_of(found, point)
-    if lost:
-        at += f", beside {lost}"
-    mark = _IN_DOUBT if words.unit_warnings(found) else _mark(own)
-    detail = _limit(at, words.limited_by(found))
-    if words.behind_the_arm(found):
-        what, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
-        detail = f"{at}. The arm's own compliance is inside: give --robot-stiffness."
+    stiffness, title, place = point.stiffness, "stiffness", words.point_place(result, point)
+    loss = stiffness.verdict is Verdict.NOT_IDENTIFIABLE and words.loss_words(result, point)
+    if loss:
+        place += f", beside {loss}"
+    mark = _IN_DOUBT if words.unit_warnings(result) else _mark(stiffness)
+    detail = _limit(place, words.limited_by(result))
+    if words.behind_the_arm(result):
+        title, mark = "stiffness of surface and arm in series", _BOUND_OF_SURFACE
+        detail = f"{place}. The arm's own compliance is inside: give --robot-stiffness."
     elif point.differs:
         text = f"{words.each_press(point)}   stiffness of each press   "
-        line = Text(text, style="bold").append("? they differ", style=words.STYLES[own.verdict])
+        line = Text(text, style="bold").append("? they differ", style=words.STYLES[stiffness.verdict])
         yield line.append(printable(f"        {name}") if name else "")
-        yield Text(printable(f"   {at}: {words.APART}."))
+        yield Text(printable(f"   {place}: {words.APART}."))
         return
-    elif words.by_the_model(found):
-        own, what = found.parameters["K"], f"stiffness by the model {found.model}"
-        mark = _IN_DOUBT if words.unit_warnings(found) else _mark(own)
-        detail = _limit(at, cause_of(next(iter(own.budget), None)))
-    elif own.value is not None and own.ci95 is not None and own.ci95[1] < 0:
-        detail = (
-            f"{at}: the force falls as the probe goes in. The surface yields, or the probe's support moves."
-        )
-    elif own.value is None:
-        detail = f"{at}: {_sentence(own.reason)}."
-    yield from _head(own, what, name, detail, mark)
+    elif words.by_the_model(result):
+        stiffness, title = result.parameters["K"], f"stiffness by the model {result.model}"
+        mark = _IN_DOUBT if words.unit_warnings(result) else _mark(stiffness)
+        detail = _limit(place, cause_of(next(iter(stiffness.budget), None)))
+    elif stiffness.value is not None and stiffness.ci95 is not None and stiffness.ci95[1] < 0:
+        detail = f"{place}: the force falls as the probe goes in. The surface yields, or the probe's support moves."
+    elif stiffness.value is None:
+        detail = f"{place}: {_sentence(stiffness.reason)}."
+    yield from _head(stiffness, title, name, detail, mark)
 
 
-def _limit(at: str, cause: Cause) -> str:
-    return f"{at}. Limited by {cause.described}: {cause.remedy}."
+def _limit(place: str, cause: Cause) -> str:
+    return f"{place}. Limited by {cause.described}: {cause.remedy}."
 
 
-def _head(p: Parameter, what: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
-    """The value, what it is and its verdict; below, what it belongs to."""
+def _head(p: Parameter, title: str, name: str, detail: str, mark: Text) -> Iterator[Text]:
+    """The value with its name and verdict; below, its place and largest cause."""
     value = "no number" if p.value is None else words.full_number(p)
-    line = Text(value, style="bold").append(f"   {what}   ").append(mark)
+    line = Text(value, style="bold").append(f"   {title}   ").append(mark)
     yield line.append(printable(f"        {name}") if name else "")
     yield Text(printable(f"{' ' * (len(value) + 3)}{detail}"))
 
@@ -218,12 +239,12 @@ def _mark(p: Parameter) -> Text:
     return Text(f"{words.MARKS[p.verdict]} {p.verdict}", style=words.STYLES[p.verdict])
 
 
-def _rows(found: Identification) -> Iterator[Text]:
-    """A row a parameter: its interval, verdict, largest cause, and what makes it narrower."""
+def _rows(result: Identification) -> Iterator[Text]:
+    """A row for each parameter: interval, verdict, largest cause, remedy."""
     cells = [[Text(title) for title in ("", "95 %", "verdict", "limited by", "remedy")]]
-    for name, p in found.parameters.items():
+    for name, p in result.parameters.items():
         if name != "E" and (name not in _MINOR or p.verdict is Verdict.IDENTIFIED):
-            cells.append(_cells(name, p, found))
+            cells.append(_cells(name, p, result))
     widths = [max(cell.cell_len for cell in column) for column in zip(*cells, strict=True)]
     for row in cells:
         line = Text()
@@ -233,31 +254,31 @@ def _rows(found: Identification) -> Iterator[Text]:
         yield line
 
 
-def _reasons(found: Identification) -> Iterator[Text]:
-    """Why a parameter is rejected, each reason once."""
+def _reasons(result: Identification) -> Iterator[Text]:
+    """Reasons of rejected parameters, each reason once."""
     names: dict[str, list[str]] = {}
-    for name, p in found.parameters.items():
+    for name, p in result.parameters.items():
         if p.verdict is Verdict.REJECTED and name not in {*_MINOR, "E"}:
             names.setdefault(_sentence(p.reason), []).append(name)
-    for reason, own in names.items():
-        yield Text(printable(f"{', '.join(own)}: {reason}."))
+    for reason, rejected in names.items():
+        yield Text(printable(f"{', '.join(rejected)}: {reason}."))
 
 
-def _cells(name: str, p: Parameter, found: Identification) -> list[Text]:
-    bound = name == "K" and words.behind_the_arm(found)
+def _cells(name: str, p: Parameter, result: Identification) -> list[Text]:
+    bound = name == "K" and words.behind_the_arm(result)
     cause = next(iter(p.budget), "")
-    why = (
-        f"lag, ± {plain(1e3 * _lag_half(found), 2)} ms"
-        if cause == "lag" and found.lag
+    limit = (
+        f"lag, ± {plain(1e3 * _lag_half(result), 2)} ms"
+        if cause == "lag" and result.lag
         else _CAUSES.get(cause, cause)
     )
     remedy = "--robot-stiffness" if bound else _REMEDIES.get(cause, "")
     if p.verdict is not Verdict.NOT_IDENTIFIABLE:
         remedy = ""
-    texts = (name, _interval(p, bound), "", why, remedy)
+    texts = (name, _interval(p, bound), "", limit, remedy)
     cells = [Text(printable(text)) for text in texts]
     cells[2] = _BOUND if bound else _mark(p)
-    if words.unit_warnings(found) and p.verdict is Verdict.IDENTIFIED:
+    if words.unit_warnings(result) and p.verdict is Verdict.IDENTIFIED:
         cells[2] = Text("? in doubt", style="yellow")
     return cells
 
@@ -273,32 +294,32 @@ def _interval(p: Parameter, bound: bool) -> str:
     return words.interval(p.ci95, p.unit)
 
 
-def _lag_half(found: Identification) -> float:
-    return 0.0 if found.lag is None else found.lag.bound or NORMAL * found.lag.std
+def _lag_half(result: Identification) -> float:
+    return 0.0 if result.lag is None else result.lag.bound or NORMAL * result.lag.std
 
 
-def _contact(found: Identification) -> str:
-    """When it touched, and how much of the force the model explains."""
-    count = len(found.contacts)
-    span = f"{plain(found.contacts[0][0], 2)} to {plain(found.contacts[-1][1], 2)} s"
+def _contact(result: Identification) -> str:
+    """Time of the contacts, and the fraction of the force that the model explains."""
+    count = len(result.contacts)
+    span = f"{plain(result.contacts[0][0], 2)} to {plain(result.contacts[-1][1], 2)} s"
     start = f"{'One contact' if count == 1 else f'{count} contacts'}, {span}."
-    if not found.n:
+    if not result.n:
         return start
-    K = found.parameters.get("K")
+    K = result.parameters.get("K")
     if K is not None and K.verdict is Verdict.REJECTED:
-        return f"{start} {_PARTS.get(found.model, found.model)} do not describe the force ({found.model})."
-    explained = 100 * max(found.r2, 0.0)
-    share = f"{explained:.3g} %" if explained < 99.95 else "more than 99.9 %"
-    parts = _PARTS.get(found.model, found.model)
-    return f"{start} {parts} explain {share} of the force ({found.model})."
+        return f"{start} {_PARTS.get(result.model, result.model)} do not describe the force ({result.model})."
+    explained = 100 * max(result.r2, 0.0)
+    fraction = f"{explained:.3g} %" if explained < 99.95 else "more than 99.9 %"
+    parts = _PARTS.get(result.model, result.model)
+    return f"{start} {parts} explain {fraction} of the force ({result.model})."
 
 
-def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
+def _foot(result: Identification, notes: Sequence[str]) -> Iterator[Text]:
     """The other warnings, and how the log was read."""
-    shown = {*_SHOWN_OTHERWISE, *words.UNIT_WARNINGS}
-    others = dict.fromkeys(warn.code.word for warn in found.warnings if warn.code not in shown)
-    if others:
-        yield Text(f"Seen, too: {', '.join(others)} (--verbose explains each).", style="yellow")
+    shown_codes = {*_SHOWN_OTHERWISE, *words.UNIT_WARNINGS}
+    other_codes = dict.fromkeys(warn.code.word for warn in result.warnings if warn.code not in shown_codes)
+    if other_codes:
+        yield Text(f"Seen, too: {', '.join(other_codes)} (--verbose explains each).", style="yellow")
     read = next((note for note in notes if note.startswith("read as ")), None)
     if read is not None:
         yield Text(printable(f"R{read[1:]}"))
@@ -307,65 +328,47 @@ def _foot(found: Identification, notes: Sequence[str]) -> Iterator[Text]:
 _ONE_CLOCK = "Where one converter samples both channels, unfiltered: --lag 0:STD, STD the time of a row."
 
 
-def _assumed_lag(found: Identification) -> str:
-    """That the lag is assumed, what a calibration of it is worth, and the option for one clock of both channels."""
-    lag = found.lag
+def _assumed_lag(result: Identification) -> str:
+    """The assumed lag in words: its interval, the gain of a calibration, the option for one clock of both channels."""
+    lag = result.lag
     assert lag is not None
-    text = f"The lag of the force sensor is assumed, {with_half(1e3 * lag.value, 1e3 * _lag_half(found))} ms"
+    text = f"The lag of the force sensor is assumed, {with_half(1e3 * lag.value, 1e3 * _lag_half(result))} ms"
     for name in ("B", "M"):
-        p = found.parameters.get(name)
+        p = result.parameters.get(name)
         if p is None or p.ci95 is None or next(iter(p.budget), "") != "lag":
             continue
-        whole = hypot(*p.budget.values())
-        rest = sqrt(max(whole**2 - p.budget["lag"] ** 2, 0.0))
-        if rest:
-            text += f": a calibration makes the {words.CALLED[name]}'s interval {plain(whole / rest, 2)} times narrower"
+        total = hypot(*p.budget.values())
+        without_lag = sqrt(max(total**2 - p.budget["lag"] ** 2, 0.0))
+        if without_lag:
+            gain = plain(total / without_lag, 2)
+            text += f": a calibration makes the {words.CALLED[name]}'s interval {gain} times narrower"
             break
     return f"{text}. {_ONE_CLOCK}"
 
 
-NAME = "a record"
-HEAD = ("parameter", "value", "verdict", "why")
-
-
-def line(found: Identification) -> str:
+def line(result: Identification) -> str:
     """The model, and each parameter with its verdict."""
-    values = [f"{name} {_value(own)} {own.verdict}" for name, own in found.parameters.items()]
-    return printable(f"{found.model}; {', '.join(values)}")
+    values = [f"{name} {_value(p)} {p.verdict}" for name, p in result.parameters.items()]
+    return f"{result.model}; {', '.join(values)}"
 
 
-def text(found: Identification) -> str:
-    """The output of `palpate identify`; `report` has all evidence."""
-    return console_text(lambda console: show(found, NAME, console))
+def _value(p: Parameter) -> str:
+    return "-" if p.value is None else words.full_number(p)
 
 
-def html(found: Identification) -> str:
-    """The sentence, a row a parameter, and the warnings."""
-    rows = [HEAD, *(_row(name, parameter) for name, parameter in found.parameters.items())]
-    return as_html(words.sentence(found), rows, [f"{warn.code.word}: {warn.text}" for warn in found.warnings])
-
-
-def _row(name: str, own: Parameter) -> tuple[str, ...]:
-    return name, _value(own), str(own.verdict), own.reason
-
-
-def _value(own: Parameter) -> str:
-    return "-" if own.value is None else words.full_number(own)
-
-
-def draw(found: Identification) -> Figure:
+def draw(result: Identification) -> Figure:
     """The figure of `palpate identify`.
 
     Raises:
         InputError: its traces were left out.
     """
-    if found.traces is None:
+    if result.traces is None:
         raise InputError(
             "this identification holds no traces, as many logs' do not; identify its log alone to draw it"
         )
-    return figure.draw(found, NAME)
+    return pages.draw(result, _PYTHON.title)
 
 
-def page(found: Identification) -> str:
+def page(result: Identification) -> str:
     """The page of `palpate identify --report`."""
-    return pages.page(found, words.Source(NAME, found.options, command="palpate.identify(...).report(...)"))
+    return pages.page(result, replace(_PYTHON, options=dict(result.options)))

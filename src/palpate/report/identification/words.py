@@ -1,14 +1,13 @@
 """An identification in words: the sentence, then each number and its limits."""
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from palpate.contact_frame.arm import LOWER_BOUND
 from palpate.files import RECORD
-from palpate.identification.causes import BRIEF, Cause, Code, cause_of
+from palpate.identification.causes import BRIEF_CONTACT, Cause, Code, cause_of
 from palpate.identification.result import Identification, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.text import printable
@@ -28,6 +27,8 @@ CALLED = {
 }
 STYLES = {Verdict.IDENTIFIED: "green", Verdict.NOT_IDENTIFIABLE: "yellow", Verdict.REJECTED: "red"}
 MARKS = {Verdict.IDENTIFIED: "✓", Verdict.NOT_IDENTIFIABLE: "?", Verdict.REJECTED: "✕"}
+TONES = {Verdict.IDENTIFIED: "ok", Verdict.NOT_IDENTIFIABLE: "warn", Verdict.REJECTED: "fail"}
+"""Colours of a verdict on a terminal, its mark, and its class on a page."""
 NO_NUMBER = "no number"
 
 ADVICE = {
@@ -65,86 +66,93 @@ ADVICE = {
 UNTOUCHED = "Nothing is touched in this log"
 
 
-def sentence(found: Identification) -> str:
+def sentence(result: Identification) -> str:
     """The stiffness, its place, its largest cause of uncertainty, and the next step; of a slide its friction."""
-    if found.slide is not None:
-        return found.slide.sentence
-    if not found.contacts:
-        return f"{no_contact_in('this log', found)}."
-    point = found.working_point
+    if result.slide is not None:
+        return result.slide.sentence
+    if not result.contacts:
+        return f"{no_contact_in('this log', result)}."
+    point = result.working_point
     if point is None:
+        K = result.parameters.get("K")
+        if K is not None and K.verdict is Verdict.IDENTIFIED:
+            return _stiffness_of_model(result.model, K)
         return "The log shows no stiffness: no stretch in contact is long enough; log longer or press deeper."
-    own, where = point.stiffness, place_of(found, point)
-    if behind_the_arm(found):
+    stiffness, where = point.stiffness, point_place(result, point)
+    if behind_the_arm(result):
         return (
-            f"The stiffness of surface and arm in series is {full_number(own)} {where}, a lower bound of the surface's:"
-            " give --robot-stiffness."
+            f"The stiffness of surface and arm in series is {full_number(stiffness)} {where}, a lower bound of the"
+            " surface's: give --robot-stiffness."
         )
-    limit = limited_by(found)
-    by_model = _known_by_model(found)
-    if by_model is not None:
+    limit = limited_by(result)
+    by_model = _stiffness_of_model(result.model, result.parameters["K"]) if by_the_model(result) else ""
+    if by_model:
         return (
-            by_model if own.value is None else f"{by_model} Without a model it is {full_number(own)} {where}."
+            by_model
+            if stiffness.value is None
+            else f"{by_model} Without a model it is {full_number(stiffness)} {where}."
         )
     if point.differs:
         return f"{len(point.each)} presses differ, {each_press(point)} {where}; {APART}."
-    if own.value is None or own.ci95 is None or own.ci95[0] <= 0 <= own.ci95[1]:
-        lost = loss_of(found, point)
+    if stiffness.value is None or stiffness.ci95 is None or stiffness.ci95[0] <= 0 <= stiffness.ci95[1]:
+        lost = loss_words(result, point)
         start = f"The log shows {lost}, but no stiffness" if lost else "The log shows no stiffness"
-        return f"{start} {where} ({own.reason}); {limit.remedy}."
-    if own.ci95[1] < 0 and own.verdict is not Verdict.IDENTIFIED:
-        number = quantity(-own.value, own.unit, (own.ci95[1] - own.ci95[0]) / 2)
+        return f"{start} {where} ({stiffness.reason}); {limit.remedy}."
+    if stiffness.ci95[1] < 0 and stiffness.verdict is not Verdict.IDENTIFIED:
+        number = quantity(-stiffness.value, stiffness.unit, (stiffness.ci95[1] - stiffness.ci95[0]) / 2)
         return (
             f"The force falls by {number} as the probe goes in, {where}: either the surface yields, or it moves, and"
             " then this is the stiffness of the probe's own support."
         )
-    only = "" if own.verdict is Verdict.IDENTIFIED else f", known to {_share(own)} only,"
-    return f"The stiffness is {full_number(own)}{only} {where}; {_mostly(limit)}."
+    only = (
+        ""
+        if stiffness.verdict is Verdict.IDENTIFIED
+        else f", known to {_relative_half_width(stiffness)} only,"
+    )
+    return f"The stiffness is {full_number(stiffness)}{only} {where}; {_mostly(limit)}."
 
 
 APART = "to identify one alone, give --start and --end"
-_LISTED = 5
+_MAX_PRESSES = 5
 
 
 def each_press(point: WorkingPoint) -> str:
     """The stiffness of each press, in the order of time; of many, of the first."""
-    more = ", ..." if len(point.each) > _LISTED else ""
-    return ", ".join(quantity(own, point.stiffness.unit) for own in point.each[:_LISTED]) + more
+    ending = ", ..." if len(point.each) > _MAX_PRESSES else ""
+    return ", ".join(quantity(value, point.stiffness.unit) for value in point.each[:_MAX_PRESSES]) + ending
 
 
-def _known_by_model(found: Identification) -> str | None:
-    """The stiffness of a model of one constant stiffness, where the working point is known less well."""
-    if not by_the_model(found):
-        return None
-    K = found.parameters["K"]
-    limit = cause_of(next(iter(K.budget), None))
-    return f"By the model {found.model} the stiffness is {full_number(K)}; {_mostly(limit)}."
+def _stiffness_of_model(model: str, stiffness: Parameter) -> str:
+    limit = cause_of(next(iter(stiffness.budget), None))
+    return f"By the model {model} the stiffness is {full_number(stiffness)}; {_mostly(limit)}."
 
 
 def _mostly(limit: Cause) -> str:
     return f"its uncertainty is mostly due to {limit.described}: {limit.remedy}"
 
 
-def loss_of(found: Identification, point: WorkingPoint) -> str:
-    """The loss, where the octave of the working point shows it: of a damper it is the answer."""
-    own = next((o for o in found.dynamic_stiffness if o.frequency == point.frequency_Hz), None)
-    if point.source != "octave" or own is None or not own.loss_half < own.loss:
+def loss_words(result: Identification, point: WorkingPoint) -> str:
+    """The loss at the working point's octave, in words; "" if it is not significant."""
+    octave = next(
+        (octave for octave in result.dynamic_stiffness if octave.frequency == point.frequency_Hz), None
+    )
+    if point.source != "octave" or octave is None or not octave.loss_half < octave.loss:
         return ""
-    return f"a loss of {quantity(own.loss, point.stiffness.unit, own.loss_half)}"
+    return f"a loss of {quantity(octave.loss, point.stiffness.unit, octave.loss_half)}"
 
 
-def place_of(found: Identification, point: WorkingPoint) -> str:
+def point_place(result: Identification, point: WorkingPoint) -> str:
     """`at 13 N, 2.4 mm deep and 0.57 Hz`; a depth of zero is the middle of the motion."""
-    force, depth, frequency = facts_of(found, point)
+    force, depth, frequency = point_facts(result, point)
     deep = " deep" if point.from_surface and point.depth_m > 0 else " from the middle of the motion"
     if not point.from_surface and point.depth_m == 0:
         return f"at {force}, in the middle of the motion and at {frequency}"
     return f"at {force}, {depth}{deep} and {frequency}"
 
 
-def facts_of(found: Identification, point: WorkingPoint) -> tuple[str, str, str]:
+def point_facts(result: Identification, point: WorkingPoint) -> tuple[str, str, str]:
     """Force, depth and frequency of the working point, with their units."""
-    force, position = units_of(found)
+    force, position = force_and_depth_units(result)
     return (
         quantity(point.force_N, force),
         quantity(abs(point.depth_m), position),
@@ -152,26 +160,28 @@ def facts_of(found: Identification, point: WorkingPoint) -> tuple[str, str, str]
     )
 
 
-def units_of(found: Identification) -> tuple[str, str]:
+def force_and_depth_units(result: Identification) -> tuple[str, str]:
     """Units of force and position of the log."""
-    if found.traces is not None:
-        return found.traces.force_unit, found.traces.position_unit
-    return ("1", "1") if any(p.unit == "1" for n, p in found.parameters.items() if n == "K") else ("N", "m")
+    if result.traces is not None:
+        return result.traces.force_unit, result.traces.position_unit
+    return ("1", "1") if any(p.unit == "1" for n, p in result.parameters.items() if n == "K") else ("N", "m")
 
 
-def work_loss(share: float) -> str:
+def work_loss(fraction: float) -> str:
     """A sentence about the lost share of the work of a press."""
-    if share < 0:
-        return f"{-100 * share:.2g} % more work comes back than was put in: the force is probably read late"
-    return f"{100 * share:.2g} % of the work of loading is lost"
+    if fraction < 0:
+        return (
+            f"{-100 * fraction:.2g} % more work comes back than was put in: the force is probably read late"
+        )
+    return f"{100 * fraction:.2g} % of the work of loading is lost"
 
 
-def press_facts(found: Identification) -> list[str]:
+def press_facts(result: Identification) -> list[str]:
     """Sentences on the press: the slope at each force, the lost work, the relaxation."""
-    press, point = found.press, found.working_point
+    press, point = result.press, result.working_point
     if press is None:
         return []
-    force, stiffness = units_of(found)[0], point.stiffness.unit if point else "1"
+    force, stiffness = force_and_depth_units(result)[0], point.stiffness.unit if point else "1"
     slopes = [
         f"{quantity(t.stiffness, stiffness, t.half)} at {quantity(t.force, force)}" for t in press.tangent
     ]
@@ -179,54 +189,53 @@ def press_facts(found: Identification) -> list[str]:
     if press.hysteresis_loss is not None:
         facts.append(f"{work_loss(press.hysteresis_loss)}.")
     if press.relaxation is not None:
-        own = press.relaxation
-        share = f"{100 * own.share:.2g} % of the force relaxes"
-        facts.append(f"{share} in {own.duration:.3g} s, half of that in {own.half_time:.2g} s.")
+        relaxation = press.relaxation
+        relaxed = f"{100 * relaxation.share:.2g} % of the force relaxes"
+        facts.append(
+            f"{relaxed} in {relaxation.duration:.3g} s, half of that in {relaxation.half_time:.2g} s."
+        )
     return facts
 
 
-def limited_by(found: Identification) -> Cause:
+def limited_by(result: Identification) -> Cause:
     """Largest cause of the working point's interval."""
-    point = found.working_point
+    point = result.working_point
     assert point is not None
     return cause_of(next(iter(point.stiffness.budget), None), point.source)
 
 
-def model_line(found: Identification) -> str:
-    """The verdicts of the model's parameters, in one line."""
-    if not found.contacts or not found.n:
-        return ""
-    verdicts = [
-        f"{enumeration([CALLED.get(name, name) for name in names])} {'is' if len(names) == 1 else 'are'} {verdict}"
-        for verdict in Verdict
-        if (names := [name for name, p in found.parameters.items() if p.verdict is verdict])
+def reasons(result: Identification) -> list[str]:
+    """Reasons of parameters that are not identified, and the warnings, each with its name."""
+    parameters = [
+        f"{name}: {p.reason}"
+        for name, p in result.parameters.items()
+        if p.verdict is not Verdict.IDENTIFIED or name == "E"
     ]
-    text = "; ".join(verdicts)
-    return f"By the model {found.model}, {text}."
+    return [*parameters, *(f"{warn.code.word}: {warn.text}" for warn in result.warnings)]
 
 
-def subtitle(found: Identification) -> str:
-    """The fit and what it is worth, in one line."""
-    if not found.n:
+def subtitle(result: Identification) -> str:
+    """The model and the quality of its fit, in one line."""
+    if not result.n:
         return "no contact"
-    if found.slide is not None:
-        return " ".join(found.slide.facts)
-    count = len(found.contacts)
-    force = units_of(found)[0]
+    if result.slide is not None:
+        return " ".join(result.slide.facts)
+    count = len(result.contacts)
+    force = force_and_depth_units(result)[0]
     parts = [
-        f"{found.model}, R² {found.r2:.4f}",
-        f"rms misfit {quantity(found.rmse, force)}",
-        f"{found.n} samples of {count} contact{'s' * (count != 1)}",
-        f"filters {plain(found.cutoff, 3)} Hz",
+        f"{result.model}, R² {result.r2:.4f}",
+        f"rms misfit {quantity(result.rmse, force)}",
+        f"{result.n} samples of {count} contact{'s' * (count != 1)}",
+        f"filters {plain(result.cutoff, 3)} Hz",
     ]
-    if found.lag:
-        parts.append(lag_of(found))
+    if result.lag:
+        parts.append(describe_lag(result))
     return ", ".join(parts)
 
 
-def lag_of(found: Identification) -> str:
-    """How late the force is, and who says so."""
-    lag = found.lag
+def describe_lag(result: Identification) -> str:
+    """The lag of the force and its source."""
+    lag = result.lag
     if lag is None:
         return "no lag known"
     value = with_half(1e3 * lag.value, 1e3 * lag.bound) if lag.bound else plain(1e3 * lag.value, 3)
@@ -242,7 +251,7 @@ def number(p: Parameter) -> str:
 
 
 def full_number(p: Parameter) -> str:
-    """The same with its unit."""
+    """A parameter's value, half-width and unit; or that there is none."""
     if p.value is None:
         return NO_NUMBER
     return quantity(p.value, p.unit, (p.ci95[1] - p.ci95[0]) / 2 if p.ci95 else None, 4)
@@ -263,52 +272,47 @@ def unit(p: Parameter) -> str:
     return "" if p.unit == "1" else p.unit
 
 
-def enumeration(names: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _share(p: Parameter) -> str:
+def _relative_half_width(p: Parameter) -> str:
     if p.value is None or p.ci95 is None or not p.value:
         return "?"
     return f"{50 * (p.ci95[1] - p.ci95[0]) / abs(p.value):.2g} %"
 
 
-UNIT_WARNINGS = (Code.UNIT_DOUBTFUL, Code.TIME_DOUBTFUL, Code.COLUMNS_SWAPPED)
-"""Warnings by which the answer may be in another unit, or of another column."""
+UNIT_WARNINGS = (Code.UNIT_DOUBTFUL, Code.TIME_DOUBTFUL, Code.COLUMNS_SWAPPED, Code.UNIT_GUESS)
+"""Warnings by which the answer may be in another unit, or of another column; a guess is one until it is stated."""
 
 
-def unit_warnings(found: Identification) -> list[str]:
+def unit_warnings(result: Identification) -> list[str]:
     """The warnings that ask for a unit or a column to be corrected, the first of each kind of sentence."""
-    return [warn.text for code in UNIT_WARNINGS for warn in found.warnings if warn.code is code]
+    return [warn.text for code in UNIT_WARNINGS for warn in result.warnings if warn.code is code]
 
 
-def behind_the_arm(found: Identification) -> bool:
-    """Whether the arm's own compliance is in the stiffness, which then is a lower bound of the surface's."""
-    K = found.parameters.get("K")
-    return Code.SERIES_COMPLIANCE.word in found.codes and K is not None and K.reason.startswith(LOWER_BOUND)
+def behind_the_arm(result: Identification) -> bool:
+    """True if the stiffness includes the arm's compliance, and so is a lower bound of the surface's."""
+    K = result.parameters.get("K")
+    return Code.SERIES_COMPLIANCE.word in result.codes and K is not None and K.reason.startswith(LOWER_BOUND)
 
 
-def by_the_model(found: Identification) -> bool:
-    """Whether a model of one constant stiffness knows it, and the working point does not, or by the lag's prior alone.
+def by_the_model(result: Identification) -> bool:
+    """True if a model of constant stiffness identifies K, and the working point does not, or by the lag's prior alone.
 
     A lag moves the storage of an octave with its frequency; the model's K rests on the slowest motion as well.
     """
-    K, point = found.parameters.get("K"), found.working_point
-    constant = found.model in ("kelvin-voigt", "kelvin-voigt-mass")
+    K, point = result.parameters.get("K"), result.working_point
+    constant = result.model in ("kelvin-voigt", "kelvin-voigt-mass")
     if K is None or point is None or not constant or K.verdict is not Verdict.IDENTIFIED:
         return False
-    own = point.stiffness
-    late = point.source == "octave" and next(iter(own.budget), "") == "lag" != next(iter(K.budget), "")
-    return own.verdict is not Verdict.IDENTIFIED or (late and (K.std or 0.0) < (own.std or 0.0))
+    stiffness = point.stiffness
+    late = point.source == "octave" and next(iter(stiffness.budget), "") == "lag" != next(iter(K.budget), "")
+    return stiffness.verdict is not Verdict.IDENTIFIED or (late and (K.std or 0.0) < (stiffness.std or 0.0))
 
 
-def no_contact_in(log: str, found: Identification) -> str:
-    """Why a log has no contact."""
-    own = next((warn.text for warn in found.warnings if warn.code is Code.NO_CONTACT), "")
-    if own.startswith(BRIEF):
-        return f"The contacts in {log} are too short: {own.replace(':', ';')}"
-    reason = own.partition(":")[0].rstrip(".") or "the force does not leave its rest"
+def no_contact_in(log: str, result: Identification) -> str:
+    """The reason why a log has no contact."""
+    text = next((warn.text for warn in result.warnings if warn.code is Code.NO_CONTACT), "")
+    if text.startswith(BRIEF_CONTACT):
+        return f"The contacts in {log} are too short: {text.replace(':', ';')}"
+    reason = text.partition(":")[0].rstrip(".") or "the force does not leave its rest"
     return f"{UNTOUCHED.replace('this log', log)}: {reason}"
 
 
@@ -317,7 +321,7 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True)
 class Source:
-    """Where an identification is from.
+    """Origin of an identification: log, options, command.
 
     Args:
         file: the log, as it was named.
@@ -339,26 +343,26 @@ class Source:
     def title(self) -> str:
         """The log's own name, a run's with its folder, without characters that a page or a terminal would obey."""
         path = Path(self.file)
-        own = f"{path.parent.name}/{path.name}" if path.name == RECORD else path.name
-        return printable(own.removeprefix("/") or self.file)
+        name = f"{path.parent.name}/{path.name}" if path.name == RECORD else path.name
+        return printable(name.removeprefix("/") or self.file)
 
 
-def as_json(found: Identification, source: Source) -> dict[str, Any]:
+def as_json(result: Identification, source: Source) -> dict[str, Any]:
     """The object that `palpate identify --json` prints for one log."""
     from importlib.metadata import version
 
-    own = found.to_json()
+    values = result.to_json()
     return {
         "file": source.file,
-        **own,
-        "options": {**source.options, **own["options"]},
+        **values,
+        "options": {**source.options, **values["options"]},
         "sha256": source.sha256,
         "version": version("palpate"),
     }
 
 
-def sha256_of(path: Path) -> str:
-    """Of a file; of a sheet, of its book; of a folder that is a log, of all its files in the order of their names."""
+def file_digest(path: Path) -> str:
+    """Digest of a file, of the book of a sheet, or of all files of a folder in the order of their names."""
     total = hashlib.sha256()
     files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
     files = [path.parent] if path.parent.is_file() else files  # a sheet of a book

@@ -1,1 +1,1 @@
-"""How every page and every picture looks: colours by quantity, one frame, one kind of chart."""
+"""Look of all pages and pictures: colours by quantity, one frame, one kind of chart."""

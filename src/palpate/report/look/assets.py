@@ -1,7 +1,7 @@
 """Style sheets and scripts that lie in the page itself, and the policy that lets nothing else run.
 
-A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2, 1.4.11); what is written in a
-quantity's colour takes its `-text`, of 4.5:1 or more (1.4.3). `tests/report/test_look.py` measures both.
+A data colour draws, and has a contrast of 3:1 or more on every ground (WCAG 2.2, 1.4.11); letters in the
+colour of the force take `F-text`, of 4.5:1 or more (1.4.3). `tests/report/test_look.py` measures both.
 """
 
 import base64
@@ -10,35 +10,6 @@ import json
 from functools import cache
 from importlib import resources
 from typing import Any
-
-import numpy as np
-
-from palpate.arrays import Array
-
-GAP = -32768
-"""Where there is no value."""
-NO_PLACE = -32767
-"""Where a column has no place, and a line goes on over it."""
-ABSENT = "absent"
-"""The same, in a column that is not packed."""
-_HALF = 32500
-"""Steps of a two-byte number on either side of the middle, but for what says that there is none."""
-
-
-def packed_column(values: Array) -> dict[str, Any]:
-    """A column: `b` its values as little-endian int16 in base64, value = origin `o` + step `s` (i + 32500).
-
-    Infinite stands for a place that the column does not have, NaN for a gap. The step is a 65,000th of the column's
-    range: finer than a screen, and than four digits of most readings.
-    """
-    known = np.isfinite(values)
-    low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 0.0)
-    step = (high - low) / (2 * _HALF) or 1.0
-    codes = np.full(len(values), GAP, dtype="<i2")
-    codes[np.isinf(values)] = NO_PLACE
-    codes[known] = np.round((values[known] - low) / step).astype(np.int64) - _HALF
-    return {"b": base64.b64encode(codes.tobytes()).decode(), "s": step, "o": low}
-
 
 DATA = {
     "K": "#2f8bf2",
@@ -50,7 +21,7 @@ DATA = {
     "warn": "#9a7400",
     "ok": "#2b8a57",
 }
-"""Stiffness, damping, mass, true force; what a sensor said; it failed, it is in doubt, it holds."""
+"""Colours of stiffness, damping, mass, true force, a sensor's reading, and of failed, doubtful and good results."""
 
 SERIES = {
     "s0": "#6a5ff0",
@@ -77,9 +48,6 @@ OUTCOMES = {
 }
 """Background colours of the outcomes of a run in a map."""
 
-MAPS = {"map-low": "#e6f3c9", "map-high": "#173f6b", "map-mark": "#14181d", "map-halo": "#ffffff"}
-"""Of a map: the ends of its scale, what is marked on it, and the rim that keeps a mark legible on any field."""
-
 PAIRS = {
     "paper": ("#ffffff", "#13161a"),
     "card": ("#f5f6f8", "#1b1f25"),
@@ -89,9 +57,6 @@ PAIRS = {
     "ink": ("#1a1d21", "#e8eaed"),
     "quiet": ("#59616c", "#a3abb6"),
     "link": ("#1665bd", "#6fb1fa"),
-    "K-text": ("#1665bd", "#6fb1fa"),
-    "B-text": ("#96560a", "#e9a24a"),
-    "M-text": ("#7a3f9f", "#c294de"),
     "F-text": ("#1d6646", "#5cb98a"),
     "bad": ("#b3242f", "#ff8a8f"),
     "doubt": ("#7a5a00", "#dcb13c"),
@@ -104,7 +69,7 @@ PAIRS = {
 
 def style_sheet() -> str:
     """The tokens as custom properties of CSS; paper that is printed on is always light."""
-    light = "".join(f"--{name}:{value};" for name, value in (DATA | SERIES | MAPS).items())
+    light = "".join(f"--{name}:{value};" for name, value in (DATA | SERIES).items())
     light += "".join(f"--{name}:{pair[0]};" for name, pair in PAIRS.items())
     dark = "".join(f"--{name}:{pair[1]};" for name, pair in PAIRS.items())
     return (
@@ -122,7 +87,7 @@ TABLES = ("tables.js",)
 
 @cache
 def text_of(name: str, package: str = "palpate.report.look") -> str:
-    """A file of a package; of this one, if no other is named."""
+    """Text of a file of a package, by default of this one."""
     return (resources.files(package) / name).read_text(encoding="utf-8")
 
 
@@ -138,12 +103,12 @@ def scripts(*names: str) -> tuple[str, ...]:
     return tuple(text_of(name) for name in names)
 
 
-def policy(codes: tuple[str, ...], *more: str) -> str:
+def policy(codes: tuple[str, ...], *directives: str) -> str:
     """A content security policy under which exactly these scripts run, and nothing is fetched.
 
     Args:
-        codes: the scripts, letter by letter.
-        more: further directives.
+        codes: texts of the scripts.
+        directives: further rules of the policy.
     """
     hashes = " ".join(f"'sha256-{_digest(code)}'" for code in codes) or "'none'"
     rules = (
@@ -154,7 +119,7 @@ def policy(codes: tuple[str, ...], *more: str) -> str:
         "style-src 'unsafe-inline'",
         f"script-src {hashes}",
     )
-    return "; ".join((*rules, *more))
+    return "; ".join((*rules, *directives))
 
 
 def data(value: Any) -> str:

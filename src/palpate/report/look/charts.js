@@ -32,24 +32,14 @@ const palpate = (() => {
   };
   const tick = (value) => (value == null ? "" : String(+value.toPrecision(6)).replace("-", "−"));
 
-  /* A column as `look/columns.py` packs it; gaps are null, and what it has no place for is undefined. */
-  const unpacked = (column) => {
-    if (Array.isArray(column)) return column.map((value) => (value === "absent" ? undefined : value));
-    const bytes = Uint8Array.from(atob(column.b), (letter) => letter.charCodeAt(0));
-    const codes = new DataView(bytes.buffer);
-    return Array.from({ length: bytes.length / 2 }, (_, i) => {
-      const code = codes.getInt16(2 * i, true);
-      return code === -32768 ? null : code === -32767 ? undefined : (code + 32500) * column.s + column.o;
-    });
-  };
+  /* A column as `report/chart.py` makes it; gaps are null, and what it has no place for is undefined. */
+  const unpacked = (column) => column.map((value) => (value === "absent" ? undefined : value));
 
   /* What a line means decides how it is drawn, everywhere. */
   const KINDS = {
     measured: { width: 1, dash: [] },
     own: { width: 2, dash: [] },
     known: { width: 1.25, dash: [5, 4] },
-    model: { width: 1.5, dash: [] },
-    other: { width: 1.5, dash: [8, 3] },
   };
   const look = (one) => (one.width == null ? KINDS[one.kind] : { width: one.width, dash: one.dash || [] });
   const sample = (one) => {
@@ -72,13 +62,12 @@ const palpate = (() => {
   const legend = (series) => make("ul", { class: "legend" }, ...series.filter((one) => !one.silent).map((one) => make("li", {}, sample(one), one.label)));
 
   class Group {
-    constructor() { this.charts = []; this.watchers = []; this.busy = false; }
+    constructor() { this.charts = []; this.busy = false; }
     /* Tells all charts but one where the reader points: a value of x, or null. */
     point(x, from) {
       if (this.busy) return;
       this.busy = true;
       for (const chart of this.charts) if (chart !== from) chart.point(x);
-      for (const watcher of this.watchers) watcher(x);
       this.busy = false;
     }
     zoom(low, high, from) {
@@ -93,19 +82,18 @@ const palpate = (() => {
     grid: { stroke: () => token("grid"), width: 1 }, values: (_, list) => list.map(tick), ...more });
 
   /* A chart in `host`.
-     spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, colour}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, kind, colour, of}] or [{..., kind: "band",
-     low, high}], where `of`, `low` and `high` name columns (of a line `within` does, its range, which is read with it), and a `silent` one has no place in the legend; `x_of` names that of x; log
-     is "x", "y" or "xy". A series may have its own width, dash, alpha, or dots [px] in place of a line. */
-  const chart = (host, spec, columns, group = new Group()) => {
-    const self = { marks: spec.marks || [] };
+     spec: title, y and x (what stands at the axes), unit of x, height [px], range [low, high] of y, marks [{x, colour}], shades [[from, to, colour]], keys of the legend that are no series, series [{label, colour, of, width, dash, alpha, dots [px]}] or
+     [{label, colour, kind: "band", low, high}], where `of`, `low` and `high` name columns, and a `silent` one has no
+     place in the legend; log is "", "x", "y" or "xy". */
+  const chart = (host, spec, columns, group) => {
+    const self = {};
     const whole = make("button", { type: "button", class: "screen" }, "whole range");
-    const head = make("header", {}, make("div", {}, make("h3", {}, spec.title), legend([...spec.series, ...(spec.keys || [])])), whole);
+    const head = make("header", {}, make("div", {}, make("h3", {}, spec.title), legend([...spec.series, ...spec.keys])), whole);
     const read = make("span", { class: "read" });
-    const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.alt || spec.title });
+    const box = make("div", { class: "plot", tabindex: 0, role: "img", "aria-label": spec.title });
     host.classList.add("chart");
     host.replaceChildren(head, make("div", { class: "axis" }, make("span", {}, spec.y), read), box);
     if (spec.x) host.append(make("div", { class: "axis below" }, make("span", {}, spec.x)));
-    if (spec.caption) host.append(make("figcaption", {}, spec.caption));
 
     const series = [{}], bands = [], rows = [];
     for (const one of spec.series) {
@@ -120,17 +108,10 @@ const palpate = (() => {
         series.push({ stroke: ink, ...look(one), ...dots });
       }
     }
-    const logarithmic = { x: (spec.log || "").includes("x"), y: (spec.log || "").includes("y") };
-    const taken = (from) => [from[spec.x_of || "t"], ...rows.map((name) => from[name])];
-    const data = taken(columns);
+    const logarithmic = { x: spec.log.includes("x"), y: spec.log.includes("y") };
+    const data = [columns.t, ...rows.map((name) => columns[name])];
     const height = () => (innerWidth < 560 ? Math.round(0.85 * spec.height) : spec.height);
     const ends = () => [data[0][0], data[0][data[0].length - 1]];
-    const padded = (_, low, high) => {
-      if (low == null) return [0, 1];
-      if (logarithmic.y) return [low / 1.3, high * 1.3];
-      const room = 0.07 * (high - low) || Math.abs(high) * 0.1 || 1;
-      return [low - room, high + room];
-    };
     const nearest = (x) => {
       let low = 0, high = data[0].length - 1;
       while (high - low > 1) { const middle = (low + high) >> 1; if (data[0][middle] < x) low = middle; else high = middle; }
@@ -143,25 +124,22 @@ const palpate = (() => {
     };
     const tell = (x) => {
       if (x == null || !data[0].length) { read.textContent = ""; return; }
-      const i = nearest(x), parts = [`${figure(data[0][i], 5)} ${spec.unit || "s"}`];
+      const i = nearest(x), parts = [`${figure(data[0][i], 5)} ${spec.unit}`];
       let k = 1;
       for (const one of spec.series) {
         if (one.kind === "band" && one.silent) k += 2;
         else if (one.kind === "band") { parts.push(`${one.label} ${figure(data[k + 1][i])} to ${figure(data[k][i])}`); k += 2; }
         else if (one.silent) k++;
-        else {
-          const ends = one.within && [one.within.low, one.within.high].map((name) => figure(there(columns[name], i)));
-          parts.push(`${one.label} ${figure(there(data[k++], i))}${ends ? ` (${ends.join(" to ")})` : ""}`);
-        }
+        else parts.push(`${one.label} ${figure(there(data[k++], i))}`);
       }
       read.textContent = parts.join("  ·  ");
     };
     const behind = (plot) => {
       const { ctx, bbox } = plot;
-      for (const [from, to, colour] of spec.shades || []) {
+      for (const [from, to, colour] of spec.shades) {
         const left = Math.max(bbox.left, plot.valToPos(from, "x", true));
         const right = Math.min(bbox.left + bbox.width, plot.valToPos(to, "x", true));
-        ctx.fillStyle = colour ? faded(colour, 0.16) : faded("F", 0.09);
+        ctx.fillStyle = faded(colour, 0.16);
         if (right > left) ctx.fillRect(left, bbox.top, right - left, bbox.height);
       }
     };
@@ -169,7 +147,7 @@ const palpate = (() => {
       const { ctx, bbox } = plot, dense = devicePixelRatio || 1;
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-      for (const mark of self.marks) {
+      for (const mark of spec.marks) {
         const at = plot.valToPos(mark.x, "x", true);
         if (at < bbox.left - 1) continue;
         ctx.strokeStyle = token(mark.colour);
@@ -184,8 +162,8 @@ const palpate = (() => {
       cursor: { y: false, drag: { x: true, y: false, setScale: true }, points: { show: false },
         bind: { dblclick: () => () => full() } },
       scales: { x: { time: false, distr: logarithmic.x ? 3 : 1, range: (_, low, high) => [low, high] },
-        y: { distr: logarithmic.y ? 3 : 1, range: spec.range || padded } },
-      axes: [axis({ size: 26 }), axis({ size: spec.left || 52, space: 22 })],
+        y: { distr: logarithmic.y ? 3 : 1, range: spec.range } },
+      axes: [axis({ size: 26 }), axis({ size: 52, space: 22 })],
       series, bands,
       hooks: {
         setCursor: [(own) => {

@@ -1,13 +1,12 @@
 /* Tables that can be sorted by their heads and sifted by a word: `data-sort` and `data-sift` on a table. */
 "use strict";
 (() => {
-  const worth = (cell) => {
-    const own = cell.querySelector("data");
-    const text = (own ? own.value : cell.textContent).trim().replace("−", "-");
+  const sortKey = (cell) => {
+    const text = cell.textContent.trim().replace("−", "-");
     const number = parseFloat(text);
     return Number.isNaN(number) ? text.toLowerCase() : number;
   };
-  const compared = (a, b) => (typeof a === typeof b ? (a < b ? -1 : a > b ? 1 : 0) : typeof a === "number" ? -1 : 1);
+  const compare = (a, b) => (typeof a === typeof b ? (a < b ? -1 : a > b ? 1 : 0) : typeof a === "number" ? -1 : 1);
   for (const table of document.querySelectorAll("table[data-sort]")) {
     const body = table.tBodies[0];
     [...table.tHead.rows[0].cells].forEach((head, column) => {
@@ -15,11 +14,11 @@
       button.append(...head.childNodes);
       head.append(button);
       button.addEventListener("click", () => {
-        const falling = head.getAttribute("aria-sort") === "ascending";
-        for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-        head.setAttribute("aria-sort", falling ? "descending" : "ascending");
-        const rows = [...body.rows].sort((a, b) => compared(worth(a.cells[column]), worth(b.cells[column])));
-        body.append(...(falling ? rows.reverse() : rows));
+        const descending = head.getAttribute("aria-sort") === "ascending";
+        for (const cell of table.tHead.rows[0].cells) cell.removeAttribute("aria-sort");
+        head.setAttribute("aria-sort", descending ? "descending" : "ascending");
+        const rows = [...body.rows].sort((a, b) => compare(sortKey(a.cells[column]), sortKey(b.cells[column])));
+        body.append(...(descending ? rows.reverse() : rows));
       });
     });
   }

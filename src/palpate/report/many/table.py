@@ -5,6 +5,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from palpate.identification.pooling import Pooled, PooledParameter, PooledPoint
 from palpate.identification.result import Identification
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification import words
-from palpate.report.page import CommandAnswer, Table
+from palpate.report.page import Answer, Table
 from palpate.units import NONE, plain, quantity, si_prefix, with_half
 
 POINT = "working point"
@@ -26,36 +27,36 @@ class LogRow:
 
     Args:
         source: where it is from.
-        found: None if the log could not be read.
+        result: None if the log could not be read.
         error: why not, in one line.
     """
 
     source: words.Source
-    found: Identification | None
+    result: Identification | None
     error: str = ""
 
-    def value_of(self, name: str) -> Parameter | None:
+    def parameter(self, name: str) -> Parameter | None:
         """A parameter of it, or the stiffness at the working point; None if it has none."""
-        if self.found is None:
+        if self.result is None:
             return None
         if name == POINT:
-            return self.found.working_point.stiffness if self.found.working_point else None
-        return self.found.parameters.get(name)
+            return self.result.working_point.stiffness if self.result.working_point else None
+        return self.result.parameters.get(name)
 
     def to_json(self) -> dict[str, Any]:
-        """As of one log; a log that could not be read has an `error` and nothing else."""
-        if self.found is None:
+        """The object of one log; that of a log that could not be read has only an `error`."""
+        if self.result is None:
             return {"file": self.source.file, "error": self.error}
-        return words.as_json(self.found, self.source)
+        return words.as_json(self.result, self.source)
 
 
-def json_of(rows: Sequence[LogRow], pooled: Pooled) -> dict[str, Any]:
+def pooled_json(rows: Sequence[LogRow], pooled: Pooled) -> dict[str, Any]:
     """The object that `palpate identify --json` prints for many logs."""
     return {"logs": [row.to_json() for row in rows], "pooled": pooled.to_json()}
 
 
 def quantities(pooled: Pooled) -> dict[str, PooledParameter]:
-    """All that is pooled, the working point first."""
+    """Pooled quantities by name, the working point first."""
     first = {POINT: pooled.working_point.stiffness} if pooled.working_point else {}
     return first | pooled.parameters
 
@@ -66,8 +67,8 @@ def quantities_with_number(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
 
 
 def has_number(row: LogRow, name: str) -> bool:
-    """Whether a log gives a quantity a number."""
-    p = row.value_of(name)
+    """True if a log gives a quantity a number."""
+    p = row.parameter(name)
     return p is not None and p.value is not None
 
 
@@ -76,34 +77,38 @@ def sentence(rows: Sequence[LogRow], pooled: Pooled) -> str:
     point = pooled.working_point
     if point is None:
         return f"None of {len(rows)} logs shows a stiffness at a working point."
-    own = point.stiffness.parameter
+    stiffness = point.stiffness.parameter
     where = place(rows, point)
-    if own.value is None:
-        return f"The {len(rows)} logs show no stiffness together {where}: {own.reason}."
-    limit = cause_of(next(iter(own.budget), None))
-    after = point.stiffness.prediction95
+    if stiffness.value is None:
+        return f"The {len(rows)} logs show no stiffness together {where}: {stiffness.reason}."
+    limit = cause_of(next(iter(stiffness.budget), None))
+    next_press = point.stiffness.prediction95
     changes = [p for p in point.stiffness.slopes.values() if p.value is not None]
-    by = f", it changes by {' and '.join(map(words.full_number, changes))}" if changes else ""
-    again = f", the next press is predicted at {words.interval(after, own.unit)} (95 %)" if after else ""
+    change = f", it changes by {' and '.join(map(words.full_number, changes))}" if changes else ""
+    prediction = (
+        f", the next press is predicted at {words.interval(next_press, stiffness.unit)} (95 %)"
+        if next_press
+        else ""
+    )
     return (
-        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {words.full_number(own)}{by}{again},"
-        f" {where}; its uncertainty is mostly due to {limit.described}: {limit.remedy}."
+        f"Over {len(point.stiffness.logs)} of {len(rows)} logs the stiffness is {words.full_number(stiffness)}"
+        f"{change}{prediction}, {where}; its uncertainty is mostly due to {limit.described}: {limit.remedy}."
     )
 
 
 def slopes(pooled: Pooled) -> dict[str, Parameter]:
-    """How each quantity depends on each covariate, by "K by temperature_C"."""
+    """Slope of each quantity over each covariate, by names like "K by temperature_C"."""
     return {
         f"{name} by {covariate}": p
-        for name, own in quantities(pooled).items()
-        for covariate, p in own.slopes.items()
+        for name, pooled_value in quantities(pooled).items()
+        for covariate, p in pooled_value.slopes.items()
     }
 
 
 def place(rows: Sequence[LogRow], point: PooledPoint) -> str:
-    """The ranges of force, depth and frequency that it belongs to."""
-    found = next((row.found for row in rows if row.found is not None), None)
-    force, position = words.units_of(found) if found else ("N", "m")
+    """Ranges of force, depth and frequency of a pooled working point, in words."""
+    result = next((row.result for row in rows if row.result is not None), None)
+    force, position = words.force_and_depth_units(result) if result else ("N", "m")
 
     def spread(ends: tuple[float, float], unit: str) -> str:
         low, high = (f"{plain(x, 2)} Hz" if unit == "Hz" else quantity(x, unit) for x in ends)
@@ -115,36 +120,44 @@ def place(rows: Sequence[LogRow], point: PooledPoint) -> str:
 
 
 def failures(rows: Sequence[LogRow]) -> str:
-    """How many logs could not be read; nothing if all could."""
-    count = sum(row.found is None for row in rows)
+    """A sentence on the number of logs that could not be read; empty if all could."""
+    count = sum(row.result is None for row in rows)
     if not count:
         return ""
     return f"{count} of {len(rows)} logs could not be identified; their rows say why."
 
 
-def answer_of(rows: Sequence[LogRow], pooled: Pooled) -> CommandAnswer:
+def build_answer(rows: Sequence[LogRow], pooled: Pooled) -> Answer:
     """The answer of `palpate identify` for many logs."""
     files = [{"file": row.source.file, "sha256": row.source.sha256} for row in rows]
-    json = {"files": files, **json_of(rows, pooled)}
+    json = {"files": files, **pooled_json(rows, pooled)}
     doubts = [
         f"! {row.source.title}: {text}"
         for row in rows
-        if row.found
-        for text in words.unit_warnings(row.found)
+        if row.result
+        for text in words.unit_warnings(row.result)
     ]
-    return CommandAnswer(json, sentence(rows, pooled), "", tables(rows, pooled), notes(rows, pooled), doubts)
+    return Answer(
+        json,
+        sentence=sentence(rows, pooled),
+        tables=tables(rows, pooled),
+        notes=notes(rows, pooled),
+        doubts=doubts,
+    )
 
 
 def notes(rows: Sequence[LogRow], pooled: Pooled) -> list[str]:
-    """Why a pooled quantity is not identified, and why a log is not."""
-    own = {name: whole.parameter for name, whole in quantities(pooled).items()} | slopes(pooled)
-    reasons = [f"{name}: {p.reason}" for name, p in own.items() if p.verdict is not Verdict.IDENTIFIED]
+    """Reasons of pooled quantities and of logs that are not identified."""
+    parameters = {name: pooled_value.parameter for name, pooled_value in quantities(pooled).items()} | slopes(
+        pooled
+    )
+    reasons = [f"{name}: {p.reason}" for name, p in parameters.items() if p.verdict is not Verdict.IDENTIFIED]
     return [*reasons, *faults(rows)]
 
 
 def faults(rows: Sequence[LogRow]) -> list[str]:
-    """How many logs could not be identified, and why each could not."""
-    errors = [f"{row.source.title}: {row.error}" for row in rows if row.found is None]
+    """Number of logs that could not be identified, and the reason of each."""
+    errors = [f"{row.source.title}: {row.error}" for row in rows if row.result is None]
     return [failures(rows), *errors] if errors else []
 
 
@@ -155,38 +168,45 @@ def tables(rows: Sequence[LogRow], pooled: Pooled, *, places: bool = False) -> l
 
 
 def _logs(rows: Sequence[LogRow], pooled: Pooled, places: bool) -> Table:
-    """A row a log: its quantities, and the verdict of its stiffness, as of one log alone."""
+    """A row for each log: its quantities, and the verdict of its stiffness."""
     names = quantities_with_number(rows, pooled)
     units = [f"{_title(name)}{_unit(quantities(pooled)[name].parameter)}" for name in names]
     lines = []
     for row in rows:
         *place, verdict = _place_and_verdict(row)
-        numbers = (_cell(row.value_of(name)) for name in names)
+        numbers = (_cell(row.parameter(name)) for name in names)
         lines.append((row.source.title, *numbers, *(place if places else ()), verdict))
     return Table("", ("log", *units, *(("at", "model") if places else ()), "verdict"), lines)
 
 
 def _place_and_verdict(row: LogRow) -> tuple[str, str, str]:
-    """Where a log's working point is, its model, and the verdict of its stiffness."""
-    if row.found is None:
+    """Place of a log's working point, its model, and the verdict of its stiffness."""
+    if row.result is None:
         return NONE, NONE, "not identified"
-    point = row.found.working_point
+    point = row.result.working_point
     if point is None:
-        return NONE, row.found.model, "no working point" if row.found.contacts else "no contact"
-    own = row.found.parameters["K"] if words.by_the_model(row.found) else point.stiffness
-    return ", ".join(words.facts_of(row.found, point)), row.found.model, str(own.verdict)
+        return NONE, row.result.model, "no working point" if row.result.contacts else "no contact"
+    stiffness = row.result.parameters["K"] if words.by_the_model(row.result) else point.stiffness
+    return ", ".join(words.point_facts(row.result, point)), row.result.model, str(stiffness.verdict)
 
 
 def together(pooled: Pooled) -> Table:
     """Each quantity over all logs: mean, next press, deviation between logs, and the verdict."""
     rows = []
-    for name, own in quantities(pooled).items():
-        p = own.parameter
+    for name, pooled_value in quantities(pooled).items():
+        p = pooled_value.parameter
         mean = NONE if p.value is None else words.full_number(p)
-        between = NONE if own.between is None else quantity(own.between, p.unit, digits=2)
-        count = f"{len(own.logs)} of {pooled.count}"
+        between = NONE if pooled_value.between is None else quantity(pooled_value.between, p.unit, digits=2)
+        count = f"{len(pooled_value.logs)} of {pooled.count}"
         rows.append(
-            (name, mean, words.interval(own.prediction95, p.unit) or NONE, between, count, str(p.verdict))
+            (
+                name,
+                mean,
+                words.interval(pooled_value.prediction95, p.unit) or NONE,
+                between,
+                count,
+                str(p.verdict),
+            )
         )
     return Table("", ("pooled", "mean ± 95 %", "next press", "between", "logs", "verdict"), rows)
 
@@ -211,19 +231,13 @@ def _unit(p: Parameter) -> str:
     return f" [{words.unit(p)}]" if words.unit(p) else ""
 
 
-ENDINGS = (".csv", ".md", ".tex")
 _MARK = "log (palpate)"
 """The first cell of a CSV file, which takes no comment: by it a table may be replaced."""
-_TEX = {
-    "\\": r"\textbackslash{}", "_": r"\_", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}",
-    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "±": r"$\pm$",
-}  # fmt: skip
-
 Row = tuple[str, ...]
 
 
 def write_table(rows: Sequence[LogRow], pooled: Pooled | None, path: Path) -> None:
-    """Write the table, as CSV, Markdown or LaTeX (booktabs) by the ending of its name.
+    """Write the table as CSV.
 
     Args:
         rows: one of each log.
@@ -234,47 +248,63 @@ def write_table(rows: Sequence[LogRow], pooled: Pooled | None, path: Path) -> No
         InputError: palpate may not write there.
     """
     head, body = cells(rows, pooled)
-    layout = {".csv": _csv, ".md": _markdown, ".tex": _latex}[path.suffix.lower()]
-    write_text(path, layout(head, body))
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerows([(_MARK, *head[1:]), *((_as_text(name), *values) for name, *values in body)])
+    write_text(path, file.getvalue())
+
+
+def _as_text(name: str) -> str:
+    """The name of a log, quoted where a spreadsheet would take it for a formula."""
+    return f"'{name}" if name[:1] in {"=", "+", "-", "@"} else name
 
 
 def cells(rows: Sequence[LogRow], pooled: Pooled | None) -> tuple[Row, list[Row]]:
     """The head and the rows; an empty cell where there is no number."""
-    whole = quantities(pooled) if pooled else {}
-    names = _names(rows, whole)
-    scales = {name: _scale(rows, name) for name in names}
-    head = (
-        "log",
-        *(text for name in names for text in (f"{_title(name)} {scales[name][1]}".strip(), "± 95 %")),
-    )
-    body = [(row.source.title, *_values(row, scales)) for row in rows]
+    pooled_values = quantities(pooled) if pooled else {}
+    covariates = list(dict.fromkeys(name for p in pooled_values.values() for name in p.slopes))
+    labels = ["log", *(" ".join(row.source.title.split()) for row in rows)]
+    point = rows[0].result.working_point if not pooled and rows[0].result else None
     if pooled:
-        own = [(whole.get(name), scales[name][0]) for name in names]
-        body += [
-            ("n", *(text for p, _ in own for text in (str(len(p.logs)) if p else "", ""))),
-            ("mean", *(text for p, factor in own for text in _number(p.parameter if p else None, factor))),
-            (
-                "next press",
-                *(text for p, factor in own for text in _next(p.prediction95 if p else None, factor)),
-            ),
-            ("deviation", *(text for p, factor in own for text in _deviation(p, factor))),
-        ]
-        for name in dict.fromkeys(name for p in whole.values() for name in p.slopes):
-            slopes_of = [(p.slopes.get(name) if p else None, factor) for p, factor in own]
-            body.append((f"per {name}", *(text for pair in slopes_of for text in _number(*pair))))
-    else:
-        point = rows[0].found.working_point if rows[0].found else None
-        again = point.prediction95 if point else None
-        own_next = (_next(again if name == POINT else None, scales[name][0]) for name in names)
-        body += [("next press", *(text for pair in own_next for text in pair))] if again else []
+        labels += ["n", "mean", "next press", "deviation", *(f"per {name}" for name in covariates)]
+    elif point and point.prediction95:
+        labels.append("next press")
+    columns = []
+    for name in _names(rows, pooled_values):
+        factor, unit = _scale(rows, name)
+        column = [(f"{_title(name)} {unit}".strip(), "± 95 %")]
+        column += [_number(row.parameter(name), factor) for row in rows]
+        if name in pooled_values:
+            column += _pooled_cells(pooled_values[name], factor, covariates)
+        elif point and name == POINT:
+            column.append(_middle_and_half(point.prediction95, factor))
+        columns.append(column + [("", "")] * (len(labels) - len(column)))
+    head, *body = [
+        (label, *chain.from_iterable(pairs)) for label, *pairs in zip(labels, *columns, strict=False)
+    ]
     return head, body
 
 
-def _names(rows: Sequence[LogRow], whole: dict[str, PooledParameter]) -> list[str]:
+def _pooled_cells(p: PooledParameter, factor: float, covariates: Sequence[str]) -> list[tuple[str, str]]:
+    """Number of logs, mean, next press, deviation between logs, and the slope over each covariate."""
+    return [
+        (str(len(p.logs)), ""),
+        _number(p.parameter, factor),
+        _middle_and_half(p.prediction95, factor),
+        ("", "") if p.between is None else (f"{p.between / factor:.2g}", ""),
+        *(_number(p.slopes.get(name), factor) for name in covariates),
+    ]
+
+
+def _names(rows: Sequence[LogRow], pooled_values: dict[str, PooledParameter]) -> list[str]:
     """The quantities with a number, Young's modulus first, then the stiffness at the working point."""
-    own = dict.fromkeys([*whole, *(name for row in rows if row.found for name in row.found.parameters)])
-    there = [name for name in dict.fromkeys(["E", POINT, *own]) if any(has_number(row, name) for row in rows)]
-    return [name for name in there if name in ("E", POINT) or name in own]
+    known = dict.fromkeys(
+        [*pooled_values, *(name for row in rows if row.result for name in row.result.parameters)]
+    )
+    shown = [
+        name for name in dict.fromkeys(["E", POINT, *known]) if any(has_number(row, name) for row in rows)
+    ]
+    return [name for name in shown if name in ("E", POINT) or name in known]
 
 
 def _title(name: str) -> str:
@@ -283,13 +313,9 @@ def _title(name: str) -> str:
 
 def _scale(rows: Sequence[LogRow], name: str) -> tuple[float, str]:
     """The factor and the unit of a column: that of its largest number."""
-    found = [p for row in rows if (p := row.value_of(name)) is not None and p.value is not None]
-    factor, prefix = si_prefix(max(abs(p.value or 0.0) for p in found), found[0].unit)
-    return factor, "" if found[0].unit == "1" else f"[{prefix}{found[0].unit}]"
-
-
-def _values(row: LogRow, scales: dict[str, tuple[float, str]]) -> list[str]:
-    return [text for name, (factor, _) in scales.items() for text in _number(row.value_of(name), factor)]
+    numbers = [p for row in rows if (p := row.parameter(name)) is not None and p.value is not None]
+    factor, prefix = si_prefix(max(abs(p.value or 0.0) for p in numbers), numbers[0].unit)
+    return factor, "" if numbers[0].unit == "1" else f"[{prefix}{numbers[0].unit}]"
 
 
 def _number(p: Parameter | None, factor: float) -> tuple[str, str]:
@@ -300,42 +326,10 @@ def _number(p: Parameter | None, factor: float) -> tuple[str, str]:
 
 def _pair(value: float, half: float) -> tuple[str, str]:
     """A value and its half-width, with as many digits as the latter means."""
-    left, _, right = with_half(value, half).partition(" ± ")
-    plain = re.fullmatch(r"[-0-9.]+", left) and re.fullmatch(r"[-0-9.]+", right)
-    return (left, right) if plain else (f"{value:.6g}", f"{half:.2g}" if half else "")
+    number, _, right = with_half(value, half).partition(" ± ")
+    plain = re.fullmatch(r"[-0-9.]+", number) and re.fullmatch(r"[-0-9.]+", right)
+    return (number, right) if plain else (f"{value:.6g}", f"{half:.2g}" if half else "")
 
 
-def _next(ends: tuple[float, float] | None, factor: float) -> tuple[str, str]:
+def _middle_and_half(ends: tuple[float, float] | None, factor: float) -> tuple[str, str]:
     return ("", "") if ends is None else _pair(sum(ends) / 2 / factor, (ends[1] - ends[0]) / 2 / factor)
-
-
-def _deviation(p: PooledParameter | None, factor: float) -> tuple[str, str]:
-    return ("", "") if p is None or p.between is None else (f"{p.between / factor:.2g}", "")
-
-
-def _csv(head: Row, body: list[Row]) -> str:
-    file = io.StringIO()
-    csv.writer(file, lineterminator="\n").writerows([(_MARK, *head[1:]), *(_text_cell(row) for row in body)])
-    return file.getvalue()
-
-
-def _text_cell(row: Row) -> Row:
-    """The name of a log that a spreadsheet would take for a formula is a text."""
-    return (f"'{row[0]}", *row[1:]) if row[0][:1] in {"=", "+", "-", "@", "\t"} else row
-
-
-def _markdown(head: Row, body: list[Row]) -> str:
-    rule = ("---", *("---:" for _ in head[1:]))
-    rows = [[cell.replace("|", r"\|") for cell in row] for row in (head, rule, *body)]
-    return "\n".join(["<!-- Made by palpate -->", "", *(f"| {' | '.join(row)} |" for row in rows)]) + "\n"
-
-
-def _latex(head: Row, body: list[Row]) -> str:
-    def line(row: Row) -> str:
-        return " & ".join("".join(_TEX.get(letter, letter) for letter in cell) for cell in row) + r" \\"
-
-    summary = next((i for i, row in enumerate(body) if row[0] == "n"), len(body))
-    parts = [r"\toprule", line(head), r"\midrule", *map(line, body[:summary])]
-    parts += [r"\midrule", *map(line, body[summary:])] if summary < len(body) else []
-    begin = ["% Made by palpate", rf"\begin{{tabular}}{{l{'r' * (len(head) - 1)}}}"]
-    return "\n".join([*begin, *parts, r"\bottomrule", r"\end{tabular}", ""])

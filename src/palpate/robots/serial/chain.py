@@ -57,7 +57,7 @@ class KinematicChain(NamedTuple):
 
     @property
     def inertia(self) -> Array:
-        """Of each link about its centre of mass, in its joint's frame [kg m^2], shape (n, 3, 3)."""
+        """Inertia of each link about its centre of mass, in its joint's frame [kg m^2], shape (n, 3, 3)."""
         a = self.spread
         return self.least[:, None, None] * np.eye(3) + a.swapaxes(1, 2) @ a
 

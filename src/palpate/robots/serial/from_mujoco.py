@@ -67,7 +67,7 @@ def _tip(model: Any, site: str | None, where: str) -> tuple[int, Array, Array]:
 
 
 def _site_index(model: Any, site: str | None, where: str = "") -> int:
-    """Of the site of that name, or of the only one; -1 where it names a body."""
+    """Index of the named site, or of the only one; -1 where the name is a body's."""
     sites = [model.site(k).name for k in range(model.nsite)]
     bodies = [model.body(k).name for k in range(1, model.nbody)]
     if site is None:
@@ -86,21 +86,21 @@ def _site_index(model: Any, site: str | None, where: str = "") -> int:
 
 def _joints_to(model: Any, body: int, where: str) -> list[int]:
     """The joints that move a body, from the base on."""
-    found: list[int] = []
+    joints: list[int] = []
     while body > 0:
         first = model.body_jntadr[body]
-        found = [*range(first, first + model.body_jntnum[body]), *found] if first >= 0 else found
+        joints = [*range(first, first + model.body_jntnum[body]), *joints] if first >= 0 else joints
         body = int(model.body_parentid[body])
     kinds = mujoco().mjtJoint
-    for j in found:
+    for j in joints:
         if model.jnt_type[j] not in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE)):
             raise InputError(
                 f"{where}: joint {model.joint(j).name!r} is a ball or a free joint; a serial arm has hinges and slides "
                 "from the world to its tip: weld its base to the world"
             )
-    if not found:
+    if not joints:
         raise InputError(f"{where}: no joint moves the tip; name a site or a body further out")
-    return found
+    return joints
 
 
 def _at_reference(model: Any, where: str) -> Any:
@@ -165,7 +165,8 @@ def _chain(
     links: list[tuple[float, Array, Array]],
 ) -> KinematicChain:
     at, turn = [], []
-    p0, R0 = np.zeros(3), np.eye(3)
+    p0 = np.zeros(3)
+    R0 = np.eye(3)
     for j, (p, R) in zip(joints, frames, strict=True):
         slides = _slides(model, j)
         zero = float(model.qpos0[model.jnt_qposadr[j]])  # the position at which the joint displaces nothing
@@ -203,18 +204,18 @@ def _limits(model: Any, joints: list[int]) -> tuple[Array, Array]:
 def _torques(model: Any, joints: list[int]) -> Array:
     """The joint's own limit, or that of the motor that drives it straight."""
     drives = int(mujoco().mjtTrn.mjTRN_JOINT)
-    found = []
+    limits = []
     for j in joints:
-        most = float(model.jnt_actfrcrange[j][1]) if model.jnt_actfrclimited[j] else np.inf
+        limit = float(model.jnt_actfrcrange[j][1]) if model.jnt_actfrclimited[j] else np.inf
         for a in range(model.nu):
             if (
                 model.actuator_trntype[a] == drives
                 and model.actuator_trnid[a][0] == j
                 and model.actuator_forcelimited[a]
             ):
-                most = min(most, float(abs(model.actuator_gear[a][0]) * model.actuator_forcerange[a][1]))
-        found.append(most if most > 0.0 else np.inf)
-    return np.array(found)
+                limit = min(limit, float(abs(model.actuator_gear[a][0]) * model.actuator_forcerange[a][1]))
+        limits.append(limit if limit > 0.0 else np.inf)
+    return np.array(limits)
 
 
 def _home(model: Any, positions: Counts) -> Array:
@@ -225,10 +226,10 @@ def _home(model: Any, positions: Counts) -> Array:
 def _left_out(model: Any, joints: list[int], dofs: Counts) -> list[str]:
     """Parts of the model that the arm's own laws do not include."""
     notes = []
-    others = [model.joint(j).name or str(j) for j in range(model.njnt) if j not in joints]
-    if others:
+    unused_joints = [model.joint(j).name or str(j) for j in range(model.njnt) if j not in joints]
+    if unused_joints:
         notes.append(
-            f"joints beside the way to the tip are held where they displace nothing: {', '.join(others)}"
+            f"joints beside the way to the tip are held where they displace nothing: {', '.join(unused_joints)}"
         )
     at_work = {
         "damping": model.dof_damping[dofs],
@@ -237,9 +238,9 @@ def _left_out(model: Any, joints: list[int], dofs: Counts) -> list[str]:
         "constraints": np.array([model.neq, model.ntendon]),
         "buoyancy or drag": np.array([model.opt.density, model.opt.viscosity]),
     }
-    there = [name for name, values in at_work.items() if np.any(values)]
-    if there:
-        notes.append(f"only MuJoCo's physics has the model's {', '.join(there)}")
+    effects = [name for name, values in at_work.items() if np.any(values)]
+    if effects:
+        notes.append(f"only MuJoCo's physics has the model's {', '.join(effects)}")
     return notes
 
 
@@ -259,5 +260,6 @@ def _rotate(quat: Any) -> Array:
 
 
 def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -64,7 +64,7 @@ class ArmFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     flange_turn: Triple = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw [deg]."""
     gravity: Triple = (0.0, 0.0, -GRAVITY)
-    """In the base's axes [m/s^2]."""
+    """Gravity in the base's axes [m/s^2]."""
     joint: list[JointTable]
 
 
@@ -169,8 +169,8 @@ def rotation(degrees: Triple) -> Array:
 
 def _cosine_and_sine(degrees: float) -> tuple[float, float]:
     quarter = {0.0: (1.0, 0.0), 90.0: (0.0, 1.0), 180.0: (-1.0, 0.0), 270.0: (0.0, -1.0)}
-    found = quarter.get(degrees % 360.0)
-    return found or (float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))
+    exact = quarter.get(degrees % 360.0)
+    return exact or (float(np.cos(np.radians(degrees))), float(np.sin(np.radians(degrees))))
 
 
 def _column(values: Any) -> Array:
@@ -190,14 +190,14 @@ _SEEN = ("visual", "collision")
 def from_urdf(path: Path, link: str) -> SerialArm:
     """The arm of a URDF file, see `SerialArm.from_urdf`."""
     root = _robot(path)
-    links = [one.get("name", "") for one in root.iter("link")]
+    links = [element.get("name", "") for element in root.iter("link")]
     if link not in links:
         raise unknown(f"link in {path}", link, links)
     for part in root.iter("link"):
-        for seen in [child for child in part if child.tag in _SEEN]:
-            part.remove(seen)
-    for own in root.findall("mujoco"):
-        root.remove(own)
+        for shape in [child for child in part if child.tag in _SEEN]:
+            part.remove(shape)
+    for section in root.findall("mujoco"):
+        root.remove(section)
     options = ElementTree.SubElement(root, "mujoco")
     ElementTree.SubElement(options, "compiler", fusestatic="false", discardvisual="false")
     model, notes = load_mjcf(path, ElementTree.tostring(root, encoding="unicode"))
@@ -225,7 +225,7 @@ def _robot(path: Path) -> ElementTree.Element:
 
 def _speeds(root: ElementTree.Element) -> dict[str, float]:
     """Limits of the joints' rates, which MuJoCo does not keep; 0 and what is no number are none."""
-    found = {}
+    speeds = {}
     for joint in root.iter("joint"):
         limit = joint.find("limit")
         try:
@@ -233,5 +233,5 @@ def _speeds(root: ElementTree.Element) -> dict[str, float]:
         except ValueError:
             value = 0.0
         if value > 0.0:
-            found[joint.get("name", "")] = value
-    return found
+            speeds[joint.get("name", "")] = value
+    return speeds

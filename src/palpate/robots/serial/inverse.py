@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from palpate.arrays import Array
 from palpate.errors import InputError
+from palpate.signals.rotations import vector_from_matrix
 
 if TYPE_CHECKING:
     from palpate.robots.serial.serial_arm import SerialArm
@@ -17,21 +18,22 @@ if TYPE_CHECKING:
 _STARTS = 24
 """Points from which the search begins; the first is where the arm is."""
 _REACHED = 1e-9
-"""Distance [m], and angle [rad], under which a pose is reached: a nanometre is below any encoder."""
+"""Distance [m] and angle [rad] within which a pose is reached: a nanometre is below any encoder."""
 _STEPS, _LONGEST = 100, 0.3
-"""Of one search, and the most that a joint moves in one of them [rad, m]."""
+"""Maximum steps of one search, and the largest motion of a joint in one step [rad, m]."""
 _TURN = 2.0 * np.pi
 
 
 def inverse_kinematics(arm: SerialArm, pose: ArrayLike, near: Array) -> Array:
     """Joint positions of a pose, see `SerialArm.inverse_kinematics`."""
     goal = checked_pose(pose)
-    best, off = near, np.full(6, np.inf)
+    best = near
+    off = np.full(6, np.inf)
     for start in _starts(arm, near):
         q = _search(arm, goal, start)
-        left = pose_error(arm.forward_kinematics(q), goal)
-        if np.linalg.norm(left) < np.linalg.norm(off):
-            best, off = q, left
+        error = pose_error(arm.forward_kinematics(q), goal)
+        if np.linalg.norm(error) < np.linalg.norm(off):
+            best, off = q, error
         if np.abs(off).max() < _REACHED:
             return best
     raise InputError(_out_of_reach(arm, goal, off))
@@ -52,32 +54,13 @@ def checked_pose(pose: ArrayLike) -> Array:
     return goal
 
 
-def pose_error(found: Array, goal: Array) -> Array:
-    """From one pose to another: translation [m] above rotation vector [rad], in the base's axes, shape (6,)."""
-    return np.concatenate([goal[:3, 3] - found[:3, 3], rotation_vector(goal[:3, :3] @ found[:3, :3].T)])
-
-
-def rotation_vector(R: Array) -> Array:
-    """Axis times angle of a rotation [rad], shape (3,)."""
-    w = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine, cosine = float(np.linalg.norm(w)), 0.5 * (float(np.trace(R)) - 1.0)
-    if sine > 1e-6 or cosine > 0.0:
-        return w * (np.arctan2(sine, cosine) / sine) if sine > 0.0 else w
-    # Half a turn: the sign of the axis does not matter, its direction is the column that is longest.
-    outer = 0.5 * (R + np.eye(3))
-    axis = outer[:, int(np.argmax(np.diag(outer)))]
-    return np.pi * axis / np.linalg.norm(axis)
-
-
-def rotation_by(vector: Array) -> Array:
-    """The rotation about an axis times an angle [rad], shape (3, 3)."""
-    angle = float(np.linalg.norm(vector))
-    k = np.cross(np.eye(3), vector / angle if angle > 0.0 else vector)
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
+def pose_error(pose: Array, goal: Array) -> Array:
+    """Error of a pose: translation to the goal [m] above rotation vector [rad], in the base's axes, shape (6,)."""
+    return np.concatenate([goal[:3, 3] - pose[:3, 3], vector_from_matrix(goal[:3, :3] @ pose[:3, :3].T)])
 
 
 def _starts(arm: SerialArm, near: Array) -> list[Array]:
-    """Where the arm is, and points all over its range."""
+    """Starts of the search: the present position, and random points of the range."""
     generator = np.random.default_rng(0)
     lower, upper = _box(arm)
     inside = np.clip(near, lower, upper)
@@ -101,11 +84,12 @@ def _search(arm: SerialArm, goal: Array, q: Array) -> Array:
         error = pose_error(arm.forward_kinematics(q), goal)
         if np.abs(error).max() < 1e-3 * _REACHED:
             break
-        J, damping = arm.jacobian(q), 1e-3 * min(float(error @ error), 1.0)
+        J = arm.jacobian(q)
+        damping = 1e-3 * min(float(error @ error), 1.0)
         step = _step(J, error, damping)
-        held = ((q <= arm.lower) & (step < 0.0)) | ((q >= arm.upper) & (step > 0.0))
-        if held.any():
-            step = _step(np.where(held, 0.0, J), error, damping)
+        blocked = ((q <= arm.lower) & (step < 0.0)) | ((q >= arm.upper) & (step > 0.0))
+        if blocked.any():
+            step = _step(np.where(blocked, 0.0, J), error, damping)
         q = np.clip(q + step / max(1.0, float(np.abs(step).max()) / _LONGEST), arm.lower, arm.upper)
     return q
 
@@ -115,8 +99,8 @@ def _step(J: Array, error: Array, damping: float) -> Array:
 
 
 def _out_of_reach(arm: SerialArm, goal: Array, off: Array) -> str:
-    place = ", ".join(f"{v:.4g}" for v in goal[:3, 3])
+    point = ", ".join(f"{v:.4g}" for v in goal[:3, 3])
     return (
-        f"the pose at ({place}) m is out of reach of {arm.title} by {1e3 * np.linalg.norm(off[:3]):.0f} mm and "
+        f"the pose at ({point}) m is out of reach of {arm.title} by {1e3 * np.linalg.norm(off[:3]):.0f} mm and "
         f"{np.degrees(np.linalg.norm(off[3:])):.3g} deg at the nearest found within the joints' limits"
     )

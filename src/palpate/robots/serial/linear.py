@@ -176,7 +176,7 @@ for _cls in (Twist, Wrench, Inertia):
 
 
 _ROUNDING = 1e-12
-"""Of an inertia tensor's eigenvalues, as a share of the largest: some thousand last places of a float."""
+"""Rounding of an inertia tensor's eigenvalues, relative to the largest: some thousand last places of a float."""
 
 
 def check_inertia(name: str, mass: float, moment: Array) -> str:
@@ -197,16 +197,16 @@ def check_inertia(name: str, mass: float, moment: Array) -> str:
         raise InputError(f"link {name}: a mass must be 0 kg or more, got {mass:g}")
     if not np.isfinite(moment).all() or not np.allclose(moment, moment.T, rtol=1e-9, atol=1e-15):
         raise InputError(f"link {name}: an inertia is six finite numbers of a symmetric matrix")
-    least, middle, most = np.linalg.eigvalsh(moment)
-    if least < -_ROUNDING * max(abs(most), abs(least)):
+    smallest, middle, largest = np.linalg.eigvalsh(moment)
+    if smallest < -_ROUNDING * max(abs(largest), abs(smallest)):
         raise InputError(
-            f"link {name}: its inertia is none, the moment about one axis is {least:.4g} kg m^2; it must be 0 or more "
-            "about every axis: check signs and order (xx yy zz xy xz yz, about the centre of mass)"
+            f"link {name}: its inertia is none, the moment about one axis is {smallest:.4g} kg m^2; it must be "
+            "0 or more about every axis: check signs and order (xx yy zz xy xz yz, about the centre of mass)"
         )
-    excess = most - (least + middle)
-    if excess <= _ROUNDING * most:
+    excess = largest - (smallest + middle)
+    if excess <= _ROUNDING * largest:
         return ""
     return (
-        f"link {name}: its principal moments break the triangle inequality, {most:.4g} > {least:.4g} + {middle:.4g} "
-        "kg m^2, so no body has them; taken as published"
+        f"link {name}: its principal moments break the triangle inequality, {largest:.4g} > {smallest:.4g} + "
+        f"{middle:.4g} kg m^2, so no body has them; taken as published"
     )

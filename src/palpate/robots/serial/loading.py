@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palpate.arrays import Array
-from palpate.errors import InputError
+from palpate.errors import InputError, how_to_install
 from palpate.files import open_file
 from palpate.files.confined import read_confined
 from palpate.files.reading import GB, ReadingBudget, ReadingLimits
@@ -26,7 +26,7 @@ def mujoco() -> Any:
         import mujoco as found
     except ImportError:
         raise InputError(
-            "reading MJCF and URDF, and MuJoCo's physics, need MuJoCo; install it with: pip install 'palpate[arms]'"
+            f"reading MJCF and URDF, and MuJoCo's physics, need MuJoCo: {how_to_install('palpate[arms]')}"
         ) from None
     return found
 
@@ -110,14 +110,14 @@ def compile_model(spec: Any) -> tuple[Any, list[str]]:
 
 def _odd(spec: Any) -> list[tuple[Any, Array, str]]:
     """Links whose published inertia breaks the triangle inequality, its moments, and the note."""
-    found = []
+    bodies = []
     for body in spec.bodies:
         if body.explicitinertial and body.name != "world":
             moment = _moment(body)
             note = check_inertia(body.name, float(body.mass), moment)
             if note:
-                found.append((body, moment, note))
-    return found
+                bodies.append((body, moment, note))
+    return bodies
 
 
 def _moment(body: Any) -> Array:
@@ -130,11 +130,14 @@ def _moment(body: Any) -> Array:
 
 def _restore(model: Any, source: Any, moment: Array) -> None:
     """Puts the published moments back, which MuJoCo keeps as principal ones and their axes."""
-    body, quat = source.id, np.array(source.iquat, dtype=float)
+    body = source.id
+    quat = np.array(source.iquat, dtype=float)
     if np.isnan(source.fullinertia[0]):
         model.body_inertia[body] = np.diag(moment)  # the axes are still the published ones
         return
-    package, turn, total = mujoco(), np.zeros(9), np.zeros(4)
+    package = mujoco()
+    turn = np.zeros(9)
+    total = np.zeros(4)
     package.mju_quat2Mat(turn, quat / np.linalg.norm(quat))
     principal, axes = np.linalg.eigh(moment)
     axes[:, 0] *= np.sign(np.linalg.det(axes))

@@ -203,13 +203,18 @@ class SerialArm(Readable):
 
     def joint_places(self, q: ArrayLike) -> Array:
         """Origin of the base, of each joint's frame, and of the tip [m], shape (n + 2, 3)."""
-        c, p, R, places = self.chain, np.zeros(3), np.eye(3), [np.zeros(3)]
+        c = self.chain
+        p = np.zeros(3)
+        R = np.eye(3)
+        places = [np.zeros(3)]
         for i, value in enumerate(self._check(q, "q")):
-            p, R = p + R @ c.at[i], R @ c.turn[i]
+            p = p + R @ c.at[i]
+            R = R @ c.turn[i]
             if c.slide[i]:
                 p = p + value * R[:, 2]
             else:
-                cosine, sine = np.cos(value), np.sin(value)
+                cosine = np.cos(value)
+                sine = np.sin(value)
                 R = R @ np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
             places.append(p)
         return np.array([*places, p + R @ c.tip])
@@ -256,22 +261,22 @@ class SerialArm(Readable):
         self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint torques M qdd + h + J^T w [N m], shape (n,)."""
-        found = self._state_at(q, qd)
-        torque = found.room.M @ self._check(qdd, "qdd") + found.room.h
-        return torque if tip_wrench is None else torque + found.room.J.T @ _wrench(tip_wrench)
+        state = self._state_at(q, qd)
+        torque = state.room.M @ self._check(qdd, "qdd") + state.room.h
+        return torque if tip_wrench is None else torque + state.room.J.T @ _wrench(tip_wrench)
 
     def forward_dynamics(
         self, q: ArrayLike, qd: ArrayLike, torque: ArrayLike, tip_wrench: ArrayLike | None = None
     ) -> Array:
         """Joint accelerations, the qdd of torque = M qdd + h + J^T w, shape (n,)."""
-        found = self._state_at(q, qd)
-        push = self._check(torque, "torque") - found.room.h
+        state = self._state_at(q, qd)
+        push = self._check(torque, "torque") - state.room.h
         if tip_wrench is not None:
-            push = push - found.room.J.T @ _wrench(tip_wrench)
-        return np.asarray(np.linalg.solve(found.room.M, push))
+            push = push - state.room.J.T @ _wrench(tip_wrench)
+        return np.asarray(np.linalg.solve(state.room.M, push))
 
     def singular_values(self, q: ArrayLike) -> Array:
-        """Of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
+        """Singular values of J, largest first, shape (min(6, n),): the last is 0 in a singular pose."""
         return np.asarray(np.linalg.svd(self.jacobian(q), compute_uv=False))
 
     def _check(self, values: ArrayLike, name: str) -> Array:
@@ -286,9 +291,9 @@ class SerialArm(Readable):
 
     def _state_at(self, q: ArrayLike, qd: ArrayLike | None = None) -> ArmState:
         rates = np.zeros(self.joints) if qd is None else self._check(qd, "qd")
-        found = arm_state_for(self.joints)
-        compiled_description(self.chain, self._check(q, "q"), rates, found)
-        return found
+        state = arm_state_for(self.joints)
+        compiled_description(self.chain, self._check(q, "q"), rates, state)
+        return state
 
 
 def _wrench(w: ArrayLike) -> Array:
@@ -301,7 +306,7 @@ def _wrench(w: ArrayLike) -> Array:
 def _check_range(arm: SerialArm) -> None:
     """Refuse numbers that no arm has and that its laws, which multiply five of them, overflow by."""
     chain = arm.chain
-    for what, unit, most, values in (
+    for what, unit, limit, values in (
         ("joint frame, centre of mass or tip", "m", 1e3, (chain.at, chain.com, chain.tip)),
         ("mass", "kg", 1e6, (chain.mass,)),
         ("moment of inertia", "kg m^2", 1e9, (chain.least, chain.spread**2)),
@@ -309,22 +314,22 @@ def _check_range(arm: SerialArm) -> None:
         ("gravity", "m/s^2", 1e3, (chain.gravity,)),
         ("home position", "rad or m", 1e3, (arm.home,)),
     ):
-        largest = float(np.max(np.abs(np.concatenate([own.ravel() for own in values]))))
-        if not largest <= most:
-            raise InputError(f"{arm.title}: a {what} must be within {most:g} {unit}, got {largest:g}")
+        largest = float(np.max(np.abs(np.concatenate([array.ravel() for array in values]))))
+        if not largest <= limit:
+            raise InputError(f"{arm.title}: a {what} must be within {limit:g} {unit}, got {largest:g}")
 
 
 def _check_moves(arm: SerialArm) -> None:
     """A mass matrix that is not positive definite belongs to no arm: its joints would move without being pushed."""
     room = room_for(arm.joints)
-    chain_model(
-        arm.chain, arm.home, 0.0 * arm.home, room
-    )  # plain: an arm that is refused has compiled nothing
-    least = np.linalg.eigvalsh(room.M)[0]
-    if not least > 0.0:
+    # The laws run without compilation here: an arm that is refused has compiled nothing.
+    chain_model(arm.chain, arm.home, 0.0 * arm.home, room)
+    min_eigenvalue = np.linalg.eigvalsh(room.M)[0]
+    if not min_eigenvalue > 0.0:
         raise InputError(
-            f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue {least:.3g}); a joint "
-            "moves nothing: give its link a mass and an inertia, or the joint a rotor inertia"
+            f"{arm.title}: the mass matrix at home is not positive definite (smallest eigenvalue "
+            f"{min_eigenvalue:.3g}); a joint moves nothing: "
+            "give its link a mass and an inertia, or the joint a rotor inertia"
         )
 
 

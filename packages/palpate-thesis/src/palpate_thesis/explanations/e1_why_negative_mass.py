@@ -13,8 +13,8 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad, butterworth2, butterworth3
 from palpate_thesis.claims import ThesisClaim, claim, spread
+from palpate_thesis.drawing import ZERO, Axes, Figure
 from palpate_thesis.least_squares import panels, press_runs
-from palpate_thesis.look import ZERO, Axes, Figure
 from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 CAUSES = {
@@ -108,7 +108,7 @@ def through_sensor(force: Array, cutoff: float = 120.0, sampling: float = 480.0)
 
 
 def filter_signal(section: Biquad, signal: Array) -> Array:
-    """A signal through a filter that has seen its first value for ever."""
+    """Filter a signal, from the steady state at its first value."""
     from scipy.signal import lfilter, lfilter_zi
 
     b, a = (section.b0, section.b1, section.b2), (1.0, section.a1, section.a2)
@@ -116,7 +116,7 @@ def filter_signal(section: Biquad, signal: Array) -> Array:
 
 
 def late(signal: Array, seconds: float) -> Array:
-    """A signal so many seconds late; linear between samples."""
+    """Delay a signal [s], linearly between samples."""
     k = np.arange(len(signal), dtype=float)
     return signal if seconds == 0.0 else np.interp(k - seconds / TICK, k, signal)
 
@@ -182,25 +182,25 @@ def run(runs: Runs) -> Data:
 
 
 def _press(record: Record) -> EstimatesOfPress:
-    seen = window(record)
+    press = window(record)
     names = list(CAUSES)
     return EstimatesOfPress(
-        steps=np.array([estimate(seen, names[:i]) for i in range(len(names) + 1)]),
-        alone=np.array([estimate(seen, [name]) for name in names]),
-        chains=np.array([estimate(seen, causes) for causes in CHAINS.values()]),
-        lags=np.array([estimate(seen, (), lag) for lag in LAGS]),
-        sensor=estimate(seen, (), SENSOR_LAG),
-        matched=seen.matched,
+        steps=np.array([estimate(press, names[:i]) for i in range(len(names) + 1)]),
+        alone=np.array([estimate(press, [name]) for name in names]),
+        chains=np.array([estimate(press, causes) for causes in CHAINS.values()]),
+        lags=np.array([estimate(press, (), lag) for lag in LAGS]),
+        sensor=estimate(press, (), SENSOR_LAG),
+        matched=press.matched,
     )
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The thesis' own reason, the lag, the wrong model, and the cure."""
-    masses = _masses(data, "relaxing foam", "perfect signals")
-    wrong_model = claim("negative-mass.model", max(masses) < 0.0, masses=masses)
+    relaxing = _masses(data, "relaxing foam", "perfect signals")
+    wrong_model = claim("negative-mass.model", max(relaxing) < 0.0, masses=relaxing)
     perfect = {s: _masses(data, s, "perfect signals") for s in MODELLED}
     right = all(abs(float(np.median(perfect[s])) - data.truth[s][0]) < 0.05 for s in MODELLED)
-    told = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in MODELLED)
+    masses = "; ".join(f"{s} {spread(perfect[s], 'kg', 2)}, true {data.truth[s][0]:g} kg" for s in MODELLED)
     parts, worst = [], 0.0
     for surface in MODELLED:
         M, B, K = data.truth[surface]
@@ -215,7 +215,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         claim(
             "negative-mass.small",
             not right,
-            masses=told,
+            masses=masses,
             foam_added=_contributions(data, "plain foam"),
             rubber_added=_contributions(data, "rubber"),
             filter=data.middle("rubber", "alone")[list(CAUSES).index("acceleration"), 0],
@@ -241,7 +241,7 @@ def _masses(data: Data, surface: str, chain: str) -> list[float]:
 
 
 def _contributions(data: Data, surface: str) -> str:
-    """Contribution of each cause, in words."""
+    """Sentence with the contribution of each cause."""
     steps = data.middle(surface, "steps")[:, 0]
     added = zip(CAUSES.values(), np.diff(steps), strict=True)
     return (
@@ -250,23 +250,25 @@ def _contributions(data: Data, surface: str) -> str:
 
 
 def _signs(data: Data) -> str:
-    """Under which conditions the signs are others."""
-    told = []
+    """Sentences with the conditions under which the signs differ."""
+    sentences = []
     for what, chain in (("The lag alone", "only the force's lag"), ("The whole chain", "as in the thesis")):
         at = list(CHAINS).index(chain)
         where = [
             f"{surface} with {condition}"
             for surface, by in data.varied.items()
-            for condition, some in by.items()
-            if np.median([p.chains[at, 0] for p in some]) >= 0.0
+            for condition, presses in by.items()
+            if np.median([p.chains[at, 0] for p in presses]) >= 0.0
         ]
-        told.append(f"{what} makes the mass negative under {'all' if not where else 'all but these'} of them")
-        told[-1] += f": {', '.join(where)}." if where else "."
-    return f"Friction, pose, mass and damping were varied. {' '.join(told)}"
+        sentences.append(
+            f"{what} makes the mass negative under {'all' if not where else 'all but these'} of them"
+        )
+        sentences[-1] += f": {', '.join(where)}." if where else "."
+    return f"Friction, pose, mass and damping were varied. {' '.join(sentences)}"
 
 
 def _reach(data: Data) -> str:
-    """Up to which lag the formula is right."""
+    """Sentence with the lag up to which the formula is right."""
     parts = []
     for surface in MODELLED:
         truth = data.truth[surface]
@@ -282,21 +284,21 @@ def _matched_claim(data: Data) -> ThesisClaim:
     parts, good = [], True
     for surface in MODELLED:
         truth = dict(zip("MBK", data.truth[surface], strict=True))
-        found = dict(zip("MBK", np.transpose([p.matched for p in data.presses[surface]]), strict=True))
-        middle = {key: float(np.median(found[key])) for key in "MBK"}
+        matched = dict(zip("MBK", np.transpose([p.matched for p in data.presses[surface]]), strict=True))
+        middle = {key: float(np.median(matched[key])) for key in "MBK"}
         good &= all(abs(middle[key] / truth[key] - 1.0) < NEAR_TRUTH[key] for key in "BK")
         good &= abs(middle["M"] - truth["M"]) < NEAR_TRUTH["M"]
         parts.append(
-            f"{surface}: K {spread(1e-3 * found['K'], 'kN/m')}, true {1e-3 * truth['K']:g}; "
-            f"B {spread(found['B'], 'N s/m')}, true {truth['B']:g}; "
-            f"M {spread(found['M'], 'kg', 2)}, true {truth['M']:g}"
+            f"{surface}: K {spread(1e-3 * matched['K'], 'kN/m')}, true {1e-3 * truth['K']:g}; "
+            f"B {spread(matched['B'], 'N s/m')}, true {truth['B']:g}; "
+            f"M {spread(matched['M'], 'kg', 2)}, true {truth['M']:g}"
         )
     return claim("negative-mass.matched", bool(good), surfaces="; ".join(parts))
 
 
 def plot(data: Data) -> Figure:
-    """Waterfalls of M and B on three surfaces, the lag formula, and conditions."""
-    drawing, axes = panels.grid(5)
+    """Waterfalls of M and B on three surfaces, and the lag formula."""
+    drawing, axes = panels.grid(4)
     for axis, letter, (surface, index) in zip(axes, "abcdef", product(PARAMETERS, (0, 1)), strict=False):
         panels.set_title(axis, letter, f"{LABELS[index].split(' ')[0]} on {surface}")
         _waterfall(axis, data, surface, index)
@@ -305,10 +307,6 @@ def plot(data: Data) -> Figure:
             axis.set_yticklabels([])
     for index, axis in enumerate(axes[6:8]):
         _lag_panel(axis, data, index)
-    for surface, axis, letter in zip(data.varied, axes[8:10], "ij", strict=True):
-        _conditions(axis, data, surface, letter)
-    handles, names = axes[8].get_legend_handles_labels()
-    drawing.legend(handles, names, loc="outside lower center", ncols=4)
     return drawing
 
 
@@ -344,18 +342,3 @@ def _lag_panel(axis: Axes, data: Data, index: int) -> None:
     axis.axhline(0.0, **ZERO)
     axis.set(xlabel="T [ms]", ylabel=LABELS[index])
     axis.legend()
-
-
-def _conditions(axis: Axes, data: Data, surface: str, letter: str) -> None:
-    panels.set_title(axis, letter, f"$M_e$ under varied conditions, {surface}")
-    colors = dict(zip(CHAINS, style.SERIES[:4], strict=True))
-    groups = {
-        chain: {
-            condition: [float(p.chains[i, 0]) for p in some]
-            for condition, some in {"as chosen": data.presses[surface], **data.varied[surface]}.items()
-        }
-        for i, chain in enumerate(CHAINS)
-    }
-    panels.dots(axis, groups, colors)
-    axis.axvline(0.0, **ZERO)
-    axis.set_xlabel("$M_e$ [kg]")

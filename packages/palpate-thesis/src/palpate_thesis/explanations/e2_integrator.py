@@ -9,9 +9,17 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.window import rms
+from palpate.studies.metrics.window import rms
 from palpate_thesis.claims import ThesisClaim, claim, on_one_line, spread
-from palpate_thesis.force_control.panels import limits, panels
+from palpate_thesis.drawing import Axes, Figure, across, limits, panels
+from palpate_thesis.force_control.interventions import (
+    COLUMN,
+    HOLD_INTERVAL,
+    WEIGHT_COLUMNS,
+    WeightsAtMoment,
+    hold,
+    watch,
+)
 from palpate_thesis.force_control.tracking import (
     FOAM,
     RUBBER,
@@ -22,8 +30,6 @@ from palpate_thesis.force_control.tracking import (
     tracking,
     variations,
 )
-from palpate_thesis.force_control.weights import COLUMN, HELD, HOLD, WeightsAtMoment, hold, watch
-from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "neural-is-an-integrator"
@@ -55,8 +61,8 @@ class BothControllers(NamedTuple):
 
     network: Record
     pi: Record
-    network_found: list[Tracking]
-    pi_found: list[Tracking]
+    network_runs: list[Tracking]
+    pi_runs: list[Tracking]
     ratios: dict[str, list[float]]  # RMS of the network over that of the PI, by variation
     held: dict[str, float]  # the same with the network's weights from the torques held at zero
 
@@ -81,12 +87,12 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     small = [i for i, rate in enumerate(RATES) if rate <= 1e-4]
     worst = max(np.abs(g / GAINS[:, None] - 1.0)[small].max() for g in data.gains.values())
     table = "; ".join(
-        f"{name} {_median(p.network_found):.2f} and {_median(p.pi_found):.2f} N"
+        f"{name} {_median(p.network_runs):.2f} and {_median(p.pi_runs):.2f} N"
         for name, p in data.pairs.items()
     )
     held = [value for pair in data.pairs.values() for value in pair.held.values()]
-    seeds = len(next(iter(data.pairs.values())).pi_found)
-    apart = max(abs(_median(p.network_found) / _median(p.pi_found) - 1.0) for p in data.pairs.values())
+    seeds = len(next(iter(data.pairs.values())).pi_runs)
+    apart = max(abs(_median(p.network_runs) / _median(p.pi_runs) - 1.0) for p in data.pairs.values())
     return [
         claim(
             "neural-integrator.gain",
@@ -113,15 +119,14 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """Four overlays, the gain over the rate, and the errors' ratios."""
+    """Four overlays, and the gain over the rate."""
     drawing, grid = panels([1.9, 1.9, 2.5], columns=2, width=11.0)
     for axis, (name, pair) in zip([*grid[0], *grid[1]], data.pairs.items(), strict=True):
         _overlay(axis, name, pair)
     style.legend(grid[0][0])
     for axis in grid[1]:
         axis.set_xlabel("time since contact [s]")
-    _gain_panel(grid[2][0], data.gains)
-    _ratio_panel(grid[2][1], data.pairs)
+    _gain_panel(across(grid[2]), data.gains)
     return drawing
 
 
@@ -131,74 +136,57 @@ def _overlay(axis: Axes, name: str, pair: BothControllers) -> None:
     axis.plot(pair.pi["t"], pair.pi["force"], color=style.SERIES[0], linewidth=1.0, label="PI")
     axis.plot(pair.pi["t"], pair.pi["force_desired"], **style.KNOWN, label="desired")
     limits(axis, pair.network)
-    axis.set_title(f"{name}: {_median(pair.network_found):.2f} and {_median(pair.pi_found):.2f} N")
+    axis.set_title(f"{name}: {_median(pair.network_runs):.2f} and {_median(pair.pi_runs):.2f} N")
     axis.set(ylabel="force [N]", xlim=JUDGED)
 
 
 def _gain_panel(axis: Axes, gains: Mapping[str, Array]) -> None:
     axis.plot(RATES, GAINS, color=style.INK, linewidth=1, label="eta (A/2)²/Ts")
-    for (name, found), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
+    for (name, measured), color, marker in zip(gains.items(), style.SERIES[:2], "o^", strict=True):
         ring: Any = {"color": color, "markersize": 6, "fillstyle": "none", "label": name}
-        axis.plot(RATES, np.median(found, axis=1), marker, **ring)
+        axis.plot(RATES, np.median(measured, axis=1), marker, **ring)
     axis.axvline(RATE, color=style.MEASURED, linewidth=1, linestyle="--", label="the text's")
     axis.axvline(1e-4, color=style.MEASURED, linewidth=1, linestyle=":", label="the listing's")
     axis.set(xscale="log", yscale="log", xlabel="learning rate eta", ylabel="K_i [1/s]")
     style.legend(axis, ncols=5, columnspacing=0.9, handletextpad=0.4)
 
 
-def _ratio_panel(axis: Axes, pairs: Mapping[str, BothControllers]) -> None:
-    colors = (*style.SERIES, style.INK)
-    names = list(dict.fromkeys(name for p in pairs.values() for name in p.ratios))
-    for i, name in enumerate(names):
-        found = [(k, v) for k, p in enumerate(pairs.values()) for v in p.ratios.get(name, ())]
-        at, values = np.array(found).T
-        at += 0.11 * (i - len(names) / 2)
-        axis.scatter(at, values, s=16, color=colors[i], linewidths=0, label=on_one_line(name))
-    at, held = np.array([(k + 0.4, v) for k, p in enumerate(pairs.values()) for v in p.held.values()]).T
-    cross: Any = {"s": 16, "color": style.INK, "marker": "x", "linewidths": 0.9}
-    axis.scatter(at, held, **cross, label="torque weights zero")
-    axis.axhspan(1 - SHARE, 1 + SHARE, color=style.OK, alpha=0.1, zorder=0)
-    axis.set_xticks(range(len(pairs)), [n.replace(", ", "\n", 1) for n in pairs])
-    axis.set(ylabel="RMS, network / PI", ylim=(0.5, 1.5))
-    style.legend(axis, ncols=4, columnspacing=0.7, handletextpad=0.1)
-
-
 def _pair(runs: Runs, experiment: Experiment) -> BothControllers:
     measure = tracking(*JUDGED)
     plain = with_values(experiment, PI)
-    found, pi_found = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
+    network_runs, pi_runs = runs.over_seeds(experiment, measure), runs.over_seeds(plain, measure)
     held: dict[str, float] = {}
-    ratios = {"as\nchosen": [a.rms / b.rms for a, b in zip(found, pi_found, strict=True)]}
+    ratios = {"as\nchosen": [a.rms / b.rms for a, b in zip(network_runs, pi_runs, strict=True)]}
     for name, e in variations(experiment, 0).items():
         if name not in OUTSIDE:
             network, pi = runs.over([(one, runs.seeds[0]) for one in (e, with_values(e, PI))], measure)
             ratios[name] = [network.rms / pi.rms]
             held[name] = _error_without_torques(runs, e) / pi.rms
-    network_shown, pi_shown = (slot(runs.one(e), *JUDGED) for e in (experiment, plain))
-    return BothControllers(network_shown, pi_shown, found, pi_found, ratios, held)
+    network_shown, pi_shown = (slot(runs.record(e), *JUDGED) for e in (experiment, plain))
+    return BothControllers(network_shown, pi_shown, network_runs, pi_runs, ratios, held)
 
 
 def _error_without_torques(runs: Runs, experiment: Experiment) -> float:
     """RMS error of the first seed when the network's weights from the torques are held at zero [N]."""
-    zero = hold(HELD["all torques"])
+    zero = hold(WEIGHT_COLUMNS["all torques"])
     errors: list[Array] = []
 
-    def look(one: WeightsAtMoment) -> None:
-        zero(one)
-        if JUDGED[0] <= one.t < JUDGED[1]:
-            errors.append(one.rows[:, COLUMN["force"]] - one.rows[:, COLUMN["force_desired"]])
+    def look(moment: WeightsAtMoment) -> None:
+        zero(moment)
+        if JUDGED[0] <= moment.t < JUDGED[1]:
+            errors.append(moment.rows[:, COLUMN["force"]] - moment.rows[:, COLUMN["force_desired"]])
 
-    watch(experiment, runs.seeds[0], JUDGED[1], look, runs.waiting, HOLD)
+    watch(experiment, runs.seeds[0], JUDGED[1], look, runs.waiting, HOLD_INTERVAL)
     return rms(np.concatenate(errors)) if errors else float("nan")
 
 
 def _gains(runs: Runs, experiment: Experiment) -> Array:
     e = with_values(experiment, {"run.press": FITTED})
     by_rate = {rate: with_values(e, {"controller.learning_rate": rate}) for rate in RATES}
-    return np.array(list(runs.by_name(by_rate, gain_of).values()))
+    return np.array(list(runs.by_name(by_rate, fit_integral_gain).values()))
 
 
-def gain_of(record: Record) -> float:
+def fit_integral_gain(record: Record) -> float:
     """Slope of the network's command over the integral of the measured force error [1/s]."""
     pressing = since_contact(record) >= 0.0
     error = (record["force_desired"] - record["force_measured"])[pressing]
@@ -206,12 +194,12 @@ def gain_of(record: Record) -> float:
     return float(np.polyfit(integral, command, 1)[0])
 
 
-def _median(found: Sequence[Tracking]) -> float:
-    return float(np.median([one.rms for one in found]))
+def _median(runs: Sequence[Tracking]) -> float:
+    return float(np.median([run.rms for run in runs]))
 
 
 def _outliers(data: Data) -> str:
-    """A sentence: where the errors are further apart."""
+    """Sentence with the variations in which the errors differ by more."""
     far = [
         f"{experiment}, {on_one_line(name)} ({np.median(values):.2f})"
         for experiment, pair in data.pairs.items()

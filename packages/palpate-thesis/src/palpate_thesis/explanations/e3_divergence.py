@@ -10,13 +10,18 @@ from palpate.bench import Experiment, with_values
 from palpate.controllers.neural import NeuralState
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.conditions import RELAXING_FOAM, move_wall, rougher
+from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, legend_inside, panels
 from palpate_thesis.explanations.e2_integrator import PI
-from palpate_thesis.force_control.panels import across, legend_inside, panels
+from palpate_thesis.force_control.interventions import (
+    HOLD_INTERVAL,
+    WEIGHT_COLUMNS,
+    WeightsAtMoment,
+    hold,
+    layers,
+    watch,
+)
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, SINE, since_contact
-from palpate_thesis.force_control.weights import HELD, HOLD, WeightsAtMoment, hold, layers, watch
-from palpate_thesis.look import LIMIT_LINE, Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import RELAXING_FOAM, Runs, move_wall, rougher
 
 DURATION = 240.0
 """Seconds of contact that count as steady [s]."""
@@ -30,12 +35,12 @@ PARTS = (
 
 
 class LongRun(NamedTuple):
-    """A long run: once a second the sizes of the weights, and the gains from the torques to the force."""
+    """A long run, with the norms of the weights and the gains from the torques to the force once a second."""
 
     t: Array  # (n,) [s]
     sizes: Array  # (n, 5), in the order of `PARTS`
     gains: Array  # (n, 3) [N per N m]
-    lost: float | None  # when contact was lost [s]
+    lost: float | None  # time of the loss of contact [s]
 
 
 class Loss(NamedTuple):
@@ -59,8 +64,8 @@ def weights_panel(axis: Axes, course: LongRun, name: str) -> None:
 
 def gains_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
     """Gain from the torques to the force, on each surface."""
-    for (name, found), color in zip(courses.items(), style.SERIES[:3], strict=True):
-        course = found[5e-5][0]
+    for (name, by_rate), color in zip(courses.items(), style.SERIES[:3], strict=True):
+        course = by_rate[5e-5][0]
         gain = np.linalg.norm(course.gains, axis=1)
         axis.plot(course.t, gain, color=color, linewidth=1.2, label=name)
         if course.lost is not None:
@@ -83,12 +88,12 @@ def loss_panel(axis: Axes, loss: Loss | None) -> None:
     legend_inside(axis, loc="upper left")
 
 
-def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
+def times_panel(axis: Axes, courses: Mapping[str, Mapping[float, Sequence[LongRun]]]) -> None:
     """Times of loss over the learning rate, on each surface."""
     shifts = (1.0, 0.94, 1.06)
-    for (name, found), color, shift in zip(found_on.items(), style.SERIES, shifts, strict=False):
-        for rate, courses in found.items():
-            for lost in (one.lost for one in courses):
+    for (name, by_rate), color, shift in zip(courses.items(), style.SERIES, shifts, strict=False):
+        for rate, runs in by_rate.items():
+            for lost in (run.lost for run in runs):
                 at, mark = (DURATION, "^") if lost is None else (lost, "o")
                 axis.plot(rate * shift, at, mark, color=color, markersize=5)
         axis.plot([], [], "o", color=color, markersize=4, label=name)
@@ -99,31 +104,13 @@ def times_panel(axis: Axes, found_on: Mapping[str, Mapping[float, Sequence[LongR
     legend_inside(axis, loc="center right", bbox_to_anchor=(1.0, 0.62))
 
 
-def steps_panel(axis: Axes, found: Mapping[float, Sequence[LongRun]]) -> None:
+def steps_panel(axis: Axes, by_rate: Mapping[float, Sequence[LongRun]]) -> None:
     """Growth of the output weights of the force over the steps asked for, at each learning rate."""
-    for rate, (one, *_) in found.items():
-        axis.plot(one.t / 2.5, one.sizes[:, 3], linewidth=1.5, label=f"{rate:g}")
+    for rate, (run, *_) in by_rate.items():
+        axis.plot(run.t / 2.5, run.sizes[:, 3], linewidth=1.5, label=f"{rate:g}")
     axis.set(xlabel="steps of the desired force", ylabel="force's output weights", yscale="log")
     axis.set_title("growth by steps, foam that relaxes")
     legend_inside(axis, loc="lower right", title="eta")
-
-
-def causes_panel(axis: Axes, causes: Mapping[str, Sequence[float | None]]) -> None:
-    """Times of loss with one thing changed at a time."""
-    for i, (name, times) in enumerate(causes.items()):
-        for lost in times:
-            marker, color = (">", style.OK) if lost is None else ("o", style.FAIL)
-            axis.plot(DURATION if lost is None else lost, i, marker, color=color, markersize=6)
-        last = max(DURATION if lost is None else lost for lost in times)
-        side = "right" if last > 0.8 * DURATION else "left"
-        axis.text(last + (-4 if side == "right" else 4), i, name, va="center", ha=side)
-    axis.set_yticks([])
-    axis.invert_yaxis()
-    axis.set(
-        xlim=(0.0, DURATION * 1.02),
-        xlabel=f"contact lost after [s]; at the right edge: kept for {DURATION:g} s",
-    )
-    axis.set_title("foam that relaxes, eta 5e-5, one thing changed at a time")
 
 
 NUMBER = "delayed-divergence"
@@ -165,46 +152,49 @@ class Data(NamedTuple):
 
 
 def run(runs: Runs) -> Data:
-    """All the long runs."""
+    """All long runs: rates, the plain PI, and causes changed one at a time."""
     courses: dict[str, dict[float, list[LongRun]]] = {}
     for name, e in PARAMETERS.items():
         rates, seeds = (RATES, runs.seeds[:5]) if e is RELAXING else (FEW_RATES, runs.seeds[:1])
         at_rate = {r: with_values(e, {"controller.learning_rate": r}) for r in rates}
-        cases = {r: [(one, seed) for seed in seeds] for r, one in at_rate.items()}
+        cases = {r: [(changed, seed) for seed in seeds] for r, changed in at_rate.items()}
         courses[name] = runs.map_each(lambda case: _course(runs, *case), cases)
     plain = _losses(runs, {name: with_values(e, PI) for name, e in PARAMETERS.items()})
     causes = _losses(runs, {name: with_values(RELAXING, change) for name, change in CAUSES.items()})
     causes |= runs.map_each(
-        lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD),
-        {f"weights from {name} held at zero": [columns] for name, columns in HELD.items()},
+        lambda columns: watch(RELAXING, runs.seeds[0], DURATION, hold(columns), runs.waiting, HOLD_INTERVAL),
+        {f"weights from {name} held at zero": [columns] for name, columns in WEIGHT_COLUMNS.items()},
     )
     return Data(courses, plain, causes, _loss(runs, courses["foam that relaxes"][5e-5][0].lost))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """A loss at every rate where the PI is steady; and, apart from that, on every surface."""
+    """Loss of contact at every rate, where the PI is steady; and on every surface."""
     relaxing = data.courses["foam that relaxes"]
-    times = [c.lost for found in relaxing.values() for c in found]
-    steady = all(lost is None for found in data.pi.values() for lost in found)
-    others = [c.lost for name in ("foam", "rubber") for found in data.courses[name].values() for c in found]
-    gone = sum(lost is not None for lost in others)
-    held = _range(data.causes["weights from all torques held at zero"])
+    times = [run.lost for runs in relaxing.values() for run in runs]
+    steady = all(lost is None for losses in data.pi.values() for lost in losses)
+    damped = [runs for name in ("foam", "rubber") for runs in data.courses[name].values()]
+    others = [run.lost for runs in damped for run in runs]
+    lost_others = sum(lost is not None for lost in others)
+    without_torques = _range(data.causes["weights from all torques held at zero"])
     return [
         claim(
             "neural-diverges.loss",
             all(lost is not None for lost in times) and steady,
             cases=", ".join(
-                f"{rate:g} after {_range([c.lost for c in some])}" for rate, some in relaxing.items()
+                f"{rate:g} after {_range([run.lost for run in runs])}" for rate, runs in relaxing.items()
             ),
             steady="steady" if steady else "lost",
             duration=DURATION,
-            kept=f"kept for {DURATION:g} s" if held == "never" else f"not kept beyond {held}",
+            kept=f"kept for {DURATION:g} s"
+            if without_torques == "never"
+            else f"not kept beyond {without_torques}",
             negative_damping=_negative_damping(data.loss),
         ),
         claim(
             "neural-diverges.everywhere",
-            gone == len(others),
-            gone=gone,
+            lost_others == len(others),
+            gone=lost_others,
             others=len(others),
             duration=DURATION,
             causes=", ".join(f"{name} {_range(times)}" for name, times in data.causes.items()),
@@ -213,8 +203,8 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """Weights, gains, the loss, times, growth by steps, causes."""
-    drawing, grid = panels([2.2, 2.2, 2.2, 3.5], columns=2, width=11.0)
+    """Weights, gains, the loss, times, growth by steps."""
+    drawing, grid = panels([2.2, 2.2, 2.2], columns=2, width=11.0)
     for axis, name in zip(grid[0], ("foam that relaxes", "foam"), strict=True):
         weights_panel(axis, data.courses[name][5e-5][0], name)
     legend_inside(grid[0][1], loc="upper right", ncols=2)
@@ -222,30 +212,29 @@ def plot(data: Data) -> Figure:
     loss_panel(grid[1][1], data.loss)
     times_panel(grid[2][0], data.courses)
     steps_panel(grid[2][1], data.courses["foam that relaxes"])
-    causes_panel(across(grid[3]), data.causes)
     return drawing
 
 
 def _course(runs: Runs, experiment: Experiment, seed: int) -> LongRun:
-    seen: list[tuple[Any, ...]] = []
+    rows: list[tuple[Any, ...]] = []
 
-    def look(one: WeightsAtMoment) -> None:
-        assert one.neural is not None
-        seen.append((one.t, sizes_of(one.neural), torque_gains_of(one.neural)))
+    def look(moment: WeightsAtMoment) -> None:
+        assert moment.neural is not None
+        rows.append((moment.t, weight_norms(moment.neural), torque_gains(moment.neural)))
 
     lost = watch(experiment, seed, DURATION, look, runs.waiting)
-    t, sizes, gains = map(np.array, zip(*seen, strict=True))
+    t, sizes, gains = map(np.array, zip(*rows, strict=True))
     return LongRun(t, sizes, gains, lost)
 
 
-def sizes_of(state: NeuralState) -> Array:
+def weight_norms(state: NeuralState) -> Array:
     """Root of the sum of squares of each of `PARTS`, shape (5,)."""
     hidden, output = layers(state)
     parts = (hidden[:, 7:], hidden[:, 1:7], hidden[:, 0], output[0, 1:], output[:, 0])
     return np.array([np.sqrt(np.sum(part**2)) for part in parts])
 
 
-def torque_gains_of(state: NeuralState) -> Array:
+def torque_gains(state: NeuralState) -> Array:
     """Change of the network's force for a change of each torque among its inputs [N per N m], shape (3,)."""
     hidden, output = layers(state)
     inside, out = state.network.signals[9:21], state.network.signals[21]
@@ -254,7 +243,7 @@ def torque_gains_of(state: NeuralState) -> Array:
 
 
 def _losses(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[float | None]]:
-    """When each loses contact with the first seed [s]."""
+    """Time at which each loses contact with the first seed [s]."""
     return runs.map_each(
         lambda e: watch(e, runs.seeds[0], DURATION, lambda _: None, runs.waiting),
         {name: [e] for name, e in experiments.items()},
@@ -265,7 +254,7 @@ def _loss(runs: Runs, lost: float | None) -> Loss | None:
     """The last 0.4 s before the loss of the first seed, at the text's learning rate."""
     if lost is None:
         return None
-    record = runs.one(with_values(RELAXING, {"run.press": lost, "run.duration": DURATION + 60.0}))
+    record = runs.record(with_values(RELAXING, {"run.press": lost, "run.duration": DURATION + 60.0}))
     t = since_contact(record) - lost
     last = (t >= -0.4) & (t < 0.0)
     columns = (record[name][last] for name in ("memory_fx", "vx_measured", "force"))
@@ -273,7 +262,7 @@ def _loss(runs: Runs, lost: float | None) -> Loss | None:
 
 
 def _range(times: Sequence[float | None]) -> str:
-    lost = [one for one in times if one is not None]
+    lost = [time for time in times if time is not None]
     if not lost:
         return "never"
     ends = dict.fromkeys((f"{min(lost):.0f}", f"{max(lost):.0f}"))
@@ -282,7 +271,7 @@ def _range(times: Sequence[float | None]) -> str:
 
 
 def _negative_damping(loss: Loss | None) -> str:
-    """A sentence on what the network's force does to the motion before the loss."""
+    """Sentence on the damping by the network's force before the loss."""
     if loss is None:
         return ""
     slope = float(np.polyfit(loss.velocity, loss.force, 1)[0])

@@ -1,9 +1,7 @@
 """Explanation 4: causes of the neural identifier's answer."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,16 +9,14 @@ from palpate.arrays import Array
 from palpate.bench import with_values
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often, spread
-from palpate_thesis.least_squares import panels
-from palpate_thesis.look import STATED, Axes, Figure
+from palpate_thesis.drawing import STATED, Axes, Figure, panels
+from palpate_thesis.least_squares.panels import set_title
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.claims import describe_spread, share_of_starts
 from palpate_thesis.neural_identifier.network import STARTS, NetworkAnswer, NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
 
-if TYPE_CHECKING:
-    from matplotlib.gridspec import GridSpec
-
+NUMBER = "what-the-probe-depends-on"
 SHOWN_STARTS = STARTS[:6]
 TITLES = (
     "Force as the network knows it, at rest, foam",
@@ -29,121 +25,7 @@ TITLES = (
     "The same: rubber",
     "M of each start: foam",
     "The same: rubber",
-    "K over f/x as contact lasts, foam: five starts",
-    "K over f/x, varied conditions",
 )
-
-
-def plot(data: Mapping[str, SurfaceResults]) -> Figure:
-    """Learned force, K by probing, every variation, and M by initial weights."""
-    drawing, axes = panels.grid(5)
-    tall = _merge(drawing, axes)
-    eight = [axes[0], axes[1], *tall, axes[6], axes[7], axes[8], axes[9]]
-    for axis, letter, title in zip(eight, "abcdefgh", TITLES, strict=True):
-        panels.set_title(axis, letter, title)
-    foam = data["foam"]
-    _draw_known_force(eight[0], eight[1], foam)
-    for toggles, masses, surface in zip(eight[2:4], eight[4:6], data.values(), strict=True):
-        _toggles(toggles, surface, named=surface is foam)
-        _masses(masses, surface)
-    _lasting(eight[6], foam)
-    _draw_conditions(eight[7], data)
-    return drawing
-
-
-def _merge(drawing: Figure, axes: list[Axes]) -> list[Axes]:
-    """The second and third row made one, for the long list of changes."""
-    grid = cast("GridSpec", axes[2].get_gridspec())
-    for axis in axes[2:6]:
-        axis.remove()
-    tall = [drawing.add_subplot(grid[1:3, column]) for column in (0, 1)]
-    for axis in tall:
-        style.plain(axis)
-        axis.grid(visible=False, axis="y")
-    return tall
-
-
-def _draw_known_force(force: Axes, stiffness: Axes, surface: SurfaceResults) -> None:
-    press = surface.press
-    x = np.linspace(0.0, 2.0 * press.rest, 80)
-
-    def both(known: Array, label: str | None, **options: Any) -> None:
-        force.plot(1e3 * x, known, label=label, **options)
-        stiffness.plot(1e3 * x[1:], known[1:] / x[1:] / press.ratio, **options)
-
-    for (label, choice), color in zip(SHOWN.items(), style.SERIES, strict=False):
-        for start in SHOWN_STARTS:
-            probe, _ = network.learn(press, choice, start)
-            known = np.array([probe.force((d, 0.0, 0.0)) for d in x])
-            both(known, None if start else label, color=color, linewidth=0.9, alpha=0.8)
-    truth = press.force[-500:].mean() + surface.stiffness * (x - press.rest)
-    both(truth, "the surface", color=style.INK, linewidth=1.3, linestyle="--")
-    stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
-    asked = 1e3 * NetworkChoice().probe(press.surface, 0).values[0]
-    for axis in (force, stiffness):
-        axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
-        axis.axvline(asked, **STATED)
-        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
-    force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
-    stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
-    force.legend(ncols=2, loc="lower right")
-
-
-def _toggles(axis: Axes, surface: SurfaceResults, *, named: bool) -> None:
-    names = list(surface.toggled)
-    for i, some in enumerate(surface.toggled.values()):
-        warned = all(look.warned for look in some)
-        _strip(axis, [look.over for look in some], i - 0.16, style.FAIL if warned else style.SERIES[0])
-        _strip(axis, [look.tangent for look in some], i + 0.16, style.SERIES[1])
-    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
-    for at, color in zip((surface.perfect, surface.slope), style.SERIES, strict=False):
-        axis.axvline(at, color=color, linewidth=0.9, linestyle="--")
-    axis.set_yticks(range(len(names)), names if named else [""] * len(names))
-    axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
-    axis.set_xlabel("above: K; below: slope; dashed: no error")
-
-
-def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
-    axis.plot(values, np.full(len(values), y), ".", color=color, markersize=3.5, alpha=0.55)
-    axis.plot(np.median(values), y, "|", color=style.INK, markersize=9, markeredgewidth=1.4)
-
-
-def _masses(axis: Axes, surface: SurfaceResults) -> None:
-    order = np.argsort(np.median(surface.masses, axis=0))
-    rows = np.arange(len(MANY_STARTS))
-    ring: Any = {"color": style.MEASURED, "markersize": 4, "fillstyle": "none", "label": "untrained"}
-    axis.plot(rows, surface.before[order], "o", **ring)
-    after = axis.plot(rows, surface.masses[:, order].T, ".", color=style.SERIES[0], markersize=3)
-    after[0].set_label("after 4 s, each noise seed")
-    axis.axhline(0.0, color=style.INK, linewidth=0.8)
-    axis.set(xlabel="start, by its M", ylabel="$M_e$ [kg]")
-    axis.legend(loc="upper left")
-
-
-def _lasting(axis: Axes, surface: SurfaceResults) -> None:
-    press = surface.long
-    t = (np.arange(len(press.force)) + 1) * network.TICK
-    for start in SHOWN_STARTS[:5]:
-        _, curve = network.learn(press, NetworkChoice(), start)
-        axis.plot(t, curve[:, 0] / press.ratio, color=style.SERIES[0], linewidth=0.9)
-    axis.plot(t, press.squares[:, 2] / press.ratio, color=style.MEASURED, linewidth=1.0, linestyle="--")
-    axis.axhline(surface.perfect, color=style.SERIES[0], linewidth=0.9, linestyle="--")
-    axis.axhline(1.0, color=style.MEASURED, linewidth=0.8)
-    axis.set(
-        xscale="log", xlim=(0.01, t[-1]), ylim=(0.0, 2.0), xlabel="time since 5 N [s]; dashed: least squares"
-    )
-    axis.set_ylabel("K over f/x")
-
-
-def _draw_conditions(axis: Axes, data: Mapping[str, SurfaceResults]) -> None:
-    names = list(dict.fromkeys(name for s in data.values() for name in s.varied))
-    for surface, color, shift in zip(data.values(), style.SERIES, (-0.15, 0.15), strict=False):
-        for name, some in surface.varied.items():
-            _strip(axis, [a.over for a in some], names.index(name) + shift, color)
-    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
-    axis.set_yticks(range(len(names)), names)
-    axis.set(ylim=(len(names) - 0.5, -0.5), xlabel="K over f/x; above: foam, below: rubber")
-
 
 LONG = 20.0
 """Seconds of contact for one of the toggles; everything else stops at the thesis' four [s]."""
@@ -189,7 +71,7 @@ TOGGLES = {
 
 
 class Looked(NamedTuple):
-    """One network after one press, asked at a probe of one's own."""
+    """Answer of one network after one press, at any probe."""
 
     over: float  # K by probing over f/x
     tangent: float  # slope of its force where it rests, over f/x
@@ -200,7 +82,6 @@ class SurfaceResults(NamedTuple):
     """Results on one surface."""
 
     press: NetworkPress  # of the first noise seed, 4 s
-    long: NetworkPress  # the same, gone on with
     stiffness: float  # of the surface [N/m]
     perfect: float  # K over f/x of a network that knows the surface without error
     toggled: dict[str, list[Looked]]
@@ -233,38 +114,37 @@ def run(runs: Runs) -> Data:
 def _surface(runs: Runs, name: str) -> SurfaceResults:
     experiment = PARAMETERS[name]
     whole = network.presses(runs, experiment, name, list(runs.seeds)[:FEW])
-    some = network.presses(runs, with_values(experiment, {"run.press": network.PRESS}), name)
+    contacts = network.presses(runs, with_values(experiment, {"run.press": network.PRESS}), name)
     cases = {name: [(t, p, s) for p in whole for s in network.STARTS] for name, t in TOGGLES.items()}
     x = NetworkChoice().probe(name, 0).values[0]
     switch, stiffness = experiment.approach.switch, experiment.surface.stiffness
-    far, near = _truths(runs, some, switch, stiffness, float(x))
+    far, near = _truths(runs, contacts, switch, stiffness, float(x))
     return SurfaceResults(
-        press=some[0],
-        long=whole[0],
+        press=contacts[0],
         stiffness=stiffness,
-        perfect=float((switch / x + stiffness) / np.median([press.ratio for press in some])),
+        perfect=float((switch / x + stiffness) / np.median([press.ratio for press in contacts])),
         toggled=runs.map_each(lambda case: look(*case), cases),
-        nominal=network.answers(runs, some, NetworkChoice(), MANY_STARTS),
+        nominal=network.answers(runs, contacts, NetworkChoice(), MANY_STARTS),
         before=np.array([NetworkChoice().probe(name, start).probe().mass for start in MANY_STARTS]),
         far=far,
         near=near,
-        gap=gap(some[0]),
+        gap=gap(contacts[0]),
         varied=network.answers_under_conditions(runs, getattr(network, name.upper()), name),
     )
 
 
 def look(toggle: Toggle, press: NetworkPress, start: int) -> Looked:
     """Lets a network learn for as long as the toggle says, and asks it."""
-    seen = network.cut(press, toggle.duration)
-    probe, _ = network.learn(seen, toggle.choice, start)
-    at = seen.rest if toggle.displacement is None else toggle.displacement * probe.values[0]
-    asked = probe.probe(displacement=at)
-    slope = network.tangent(probe, seen.rest)
-    return Looked(asked.stiffness / seen.ratio, slope / seen.ratio, bool(asked.warnings))
+    cut = network.cut(press, toggle.duration)
+    probe, _ = network.learn(cut, toggle.choice, start)
+    at = cut.rest if toggle.displacement is None else toggle.displacement * probe.values[0]
+    probed = probe.probe(displacement=at)
+    slope = network.tangent(probe, cut.rest)
+    return Looked(probed.stiffness / cut.ratio, slope / cut.ratio, bool(probed.warnings))
 
 
 def _truths(
-    runs: Runs, some: Sequence[NetworkPress], switch: float, stiffness: float, x: float
+    runs: Runs, contacts: Sequence[NetworkPress], switch: float, stiffness: float, x: float
 ) -> tuple[list[tuple[float, bool]], list[float]]:
     """The network's force over the surface's, at twice the largest displacement and at the probe; a start a press."""
 
@@ -275,20 +155,21 @@ def _truths(
         at_far, at_probe = (probe.force((d, 0.0, 0.0)) / (switch + stiffness * d) for d in (far, x))
         return (at_far, bool(probe.probe(displacement=far).warnings)), at_probe
 
-    found = runs.map(work, list(enumerate(some)))
-    return [f for f, _ in found], [n for _, n in found]
+    results = runs.map(work, list(enumerate(contacts)))
+    return [far for far, _ in results], [near for _, near in results]
 
 
 def gap(press: NetworkPress) -> tuple[float, float]:
-    """How far the nearest sample is from where K and M are asked, in the units that the network sees."""
+    """Distance of the nearest sample from the probes for K and M, in the units of the network's inputs."""
     probe = NetworkChoice().probe(press.surface, 0)
-    seen = press.inputs * probe.scale
-    asked = probe.values * probe.scale
-    for_stiffness, for_mass = (np.linalg.norm(seen - at, axis=1).min() for at in (asked * [1, 0, 0], asked))
+    learned = press.inputs * probe.scale
+    probed = probe.values * probe.scale
+    for_stiffness, for_mass = (
+        np.linalg.norm(learned - at, axis=1).min() for at in (probed * [1, 0, 0], probed)
+    )
     return float(for_stiffness), float(for_mass)
 
 
-NUMBER = "what-the-probe-depends-on"
 STUDY = (1.3, 2.3)
 """K over f/x with learning thresholds, from an earlier study of ours."""
 FAR = 0.10
@@ -302,9 +183,9 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     chosen = [a.over for s in data.values() for a in s.nominal]
     large = [look.over for s in data.values() for look in s.toggled["weights to 2"]]
     medians = {
-        f"{condition} ({name})": float(np.median([a.over for a in some]))
+        f"{condition} ({name})": float(np.median([a.over for a in answers]))
         for name, s in data.items()
-        for condition, some in s.varied.items()
+        for condition, answers in s.varied.items()
     }
     low, high = min(medians, key=lambda m: medians[m]), max(medians, key=lambda m: medians[m])
     return [
@@ -370,14 +251,14 @@ def firm_signs(values: Array) -> Array:
 
 
 def _steady_conditions(data: Data) -> tuple[int, int]:
-    """Under how many conditions the starts keep the signs that they have as chosen, and of how many."""
-    kept = []
+    """Number of conditions under which the starts keep their signs, and number of all."""
+    steady = []
     for surface in data.values():
         usual = np.sign(np.median(surface.masses, axis=0))[: network.VARIED_STARTS]
-        for some in surface.varied.values():
-            found = np.sign(np.array([a.M for a in some]).reshape(-1, network.VARIED_STARTS))
-            kept.append(often((found == usual).ravel()))
-    return sum(map(bool, kept)), len(kept)
+        for answers in surface.varied.values():
+            signs = np.sign(np.array([a.M for a in answers]).reshape(-1, network.VARIED_STARTS))
+            steady.append(often((signs == usual).ravel()))
+    return sum(map(bool, steady)), len(steady)
 
 
 def _outside(data: Data) -> ThesisClaim:
@@ -424,3 +305,73 @@ def _percent(surface: SurfaceResults) -> str:
 
 def _spread(values: Sequence[float], unit: str) -> str:
     return describe_spread(values, unit, len(MANY_STARTS))
+
+
+def plot(data: Data) -> Figure:
+    """Learned force, K by probing, every change, and M by initial weights."""
+    drawing, (known, toggles, masses) = panels([2.4, 4.6, 2.4], columns=2)
+    for axis, letter, title in zip((*known, *toggles, *masses), "abcdef", TITLES, strict=True):
+        set_title(axis, letter, title)
+    foam = data["foam"]
+    _draw_known_force(known[0], known[1], foam)
+    for upper, lower, surface in zip(toggles, masses, data.values(), strict=True):
+        _toggles(upper, surface, named=surface is foam)
+        _masses(lower, surface)
+    return drawing
+
+
+def _draw_known_force(force: Axes, stiffness: Axes, surface: SurfaceResults) -> None:
+    press = surface.press
+    x = np.linspace(0.0, 2.0 * press.rest, 80)
+
+    def both(known: Array, label: str | None, **options: Any) -> None:
+        force.plot(1e3 * x, known, label=label, **options)
+        stiffness.plot(1e3 * x[1:], known[1:] / x[1:] / press.ratio, **options)
+
+    for (label, choice), color in zip(SHOWN.items(), style.SERIES, strict=False):
+        for start in SHOWN_STARTS:
+            probe, _ = network.learn(press, choice, start)
+            known = np.array([probe.force((d, 0.0, 0.0)) for d in x])
+            both(known, None if start else label, color=color, linewidth=0.9, alpha=0.8)
+    truth = press.force[-500:].mean() + surface.stiffness * (x - press.rest)
+    both(truth, "the surface", color=style.INK, linewidth=1.3, linestyle="--")
+    stiffness.axhline(1.0, color=style.MEASURED, linewidth=0.8)
+    probed = 1e3 * NetworkChoice().probe(press.surface, 0).values[0]
+    for axis in (force, stiffness):
+        axis.axvspan(0.0, 1e3 * press.inputs[:, 0].max(), color=style.MEASURED, alpha=0.12, linewidth=0)
+        axis.axvline(probed, **STATED)
+        axis.set(xlim=(0.0, 2e3 * press.rest), xlabel="x [mm]; shaded: learned; dotted: probe")
+    force.set(ylim=(-2.0, 40.0), ylabel="force [N]")
+    stiffness.set(ylim=(0.0, 3.0), ylabel="K over f/x")
+    force.legend(ncols=2, loc="lower right")
+
+
+def _toggles(axis: Axes, surface: SurfaceResults, *, named: bool) -> None:
+    names = list(surface.toggled)
+    for i, looks in enumerate(surface.toggled.values()):
+        warned = all(look.warned for look in looks)
+        _strip(axis, [look.over for look in looks], i - 0.16, style.FAIL if warned else style.SERIES[0])
+        _strip(axis, [look.tangent for look in looks], i + 0.16, style.SERIES[1])
+    axis.axvline(1.0, color=style.MEASURED, linewidth=1.0)
+    for at, color in zip((surface.perfect, surface.slope), style.SERIES, strict=False):
+        axis.axvline(at, color=color, linewidth=0.9, linestyle="--")
+    axis.set_yticks(range(len(names)), names if named else [""] * len(names))
+    axis.set(xlim=(-0.6, 3.0), ylim=(len(names) - 0.5, -0.5))
+    axis.set_xlabel("above: K; below: slope; dashed: no error")
+
+
+def _strip(axis: Axes, values: Sequence[float], y: float, color: str) -> None:
+    axis.plot(values, np.full(len(values), y), ".", color=color, markersize=3.5, alpha=0.55)
+    axis.plot(np.median(values), y, "|", color=style.INK, markersize=9, markeredgewidth=1.4)
+
+
+def _masses(axis: Axes, surface: SurfaceResults) -> None:
+    order = np.argsort(np.median(surface.masses, axis=0))
+    rows = np.arange(len(MANY_STARTS))
+    ring: Any = {"color": style.MEASURED, "markersize": 4, "fillstyle": "none", "label": "untrained"}
+    axis.plot(rows, surface.before[order], "o", **ring)
+    after = axis.plot(rows, surface.masses[:, order].T, ".", color=style.SERIES[0], markersize=3)
+    after[0].set_label("after 4 s, each noise seed")
+    axis.axhline(0.0, color=style.INK, linewidth=0.8)
+    axis.set(xlabel="start, by its M", ylabel="$M_e$ [kg]")
+    axis.legend(loc="upper left")

@@ -11,66 +11,72 @@ from palpate.bench.summary import CONTACT, LOST, losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.following import SHARE
+from palpate.studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, stops_holding
-from palpate_thesis.force_control.disturbances import Disturbance, run_with, surface_back
-from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.drawing import ZERO, Axes, Figure, across, panels
+from palpate_thesis.force_control.interventions import Disturbance, run_with, surface_back
 from palpate_thesis.force_control.tracking import since_contact, slot
-from palpate_thesis.look import ZERO, Axes, Figure
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import (
+    SHORT,
+    SURFACES,
+    VARIED_SEEDS,
+    Runs,
+    by_condition,
+    friction_and_pose,
+    stops_holding,
+)
 
 LOSS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
-GONE, BACK, FOUND = 2.5, 0.005, 10.0
-"""When the surface goes [s after contact], how far [m], and within what time it has to be felt again [s]."""
-AGAIN, PEAK = 3.0, 1.25
-"""Seconds from regain to the desired force; largest force on the way, over the desired one."""
+RETREAT_TIME, RETREAT = 2.5, 0.005
+"""Time after contact at which the surface retracts [s], and its distance [m]."""
+MAX_RECOVERY, MAX_SETTLING, MAX_PEAK = 10.0, 3.0, 1.25
+"""Limits of the time to regain contact, of the time from there to the desired force [s], and of the relative force."""
 
 
 class Recovery(NamedTuple):
     """Outcome of a lost contact."""
 
     took: float  # from loss to contact [s]; infinite if never
-    off: float  # of the force, `AGAIN` seconds later, as a share of the desired one
+    off: float  # relative error of the force `MAX_SETTLING` seconds later
     peak: float  # largest true force after the loss, over the desired one
     times: int  # losses
 
     @property
     def well(self) -> bool:
-        """Whether it came back in time, and gently."""
-        return self.times == 1 and self.took <= FOUND and self.off <= SHARE and self.peak <= PEAK
+        """True if contact came back in time, and gently."""
+        return self.times == 1 and self.took <= MAX_RECOVERY and self.off <= SHARE and self.peak <= MAX_PEAK
 
 
-def found_again(found: Sequence[Recovery]) -> ThesisClaim:
-    """Whether contact comes back in time, and gently."""
+def recovery_claim(recoveries: Sequence[Recovery]) -> ThesisClaim:
+    """Claim that contact comes back in time, and gently."""
     return claim(
         "contact-regained",
-        often(r.well for r in found),
-        found=found,
-        again=AGAIN,
-        within=FOUND,
+        often(recovery.well for recovery in recoveries),
+        found=recoveries,
+        again=MAX_SETTLING,
+        within=MAX_RECOVERY,
         share=SHARE,
-        limit=PEAK,
+        limit=MAX_PEAK,
     )
 
 
-def loss_panel(axis: Axes, one: Record) -> None:
-    """The true force, and when there was no contact."""
-    axis.plot(one["t"], one["force"], color=style.F, linewidth=1.1, label="true force")
+def loss_panel(axis: Axes, record: Record) -> None:
+    """Draw the true force, and shade the time without contact."""
+    axis.plot(record["t"], record["force"], color=style.F, linewidth=1.1, label="true force")
     shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
-    lost = one["phase"] != CONTACT
-    axis.fill_between(one["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
+    lost = record["phase"] != CONTACT
+    axis.fill_between(record["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
     axis.set(xlabel="time since contact [s]", xlim=(0.0, LOSS.run.press))
     axis.set(ylabel="true force [N]", ylim=(-0.5, 24.0))
     style.legend(axis)
 
 
 def drawn_back(seed: int) -> Record:
-    """A press whose surface goes."""
-    return run_with(LOSS, seed, [Disturbance(GONE, surface_back(BACK))])
+    """Press whose surface retracts."""
+    return run_with(LOSS, seed, [Disturbance(RETREAT_TIME, surface_back(RETREAT))])
 
 
-def recovery_of(record: Record) -> Recovery:
+def measure_recovery(record: Record) -> Recovery:
     """Outcome of the contact after its first loss."""
     t, phase, force = since_contact(record), record["phase"], record["force"]
     lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
@@ -80,7 +86,7 @@ def recovery_of(record: Record) -> Recovery:
     if not len(after):
         return Recovery(np.inf, np.inf, np.inf, len(lost))
     back = t[after[0]]
-    late = (t >= back + AGAIN - 0.1) & (t < back + AGAIN + 0.1)
+    late = (t >= back + MAX_SETTLING - 0.1) & (t < back + MAX_SETTLING + 0.1)
     off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
     return Recovery(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
 
@@ -113,7 +119,7 @@ class Ratio(NamedTuple):
 
     @property
     def helps(self) -> bool:
-        """Whether enough of the error is gone, and contact kept."""
+        """True if at most `HALF` of the error is left, and contact is kept."""
         return not self.lost and self.error <= HALF
 
 
@@ -135,11 +141,11 @@ def run(runs: Runs) -> Data:
     hammer = runs.over_seeds(with_blend(PARAMETERS, PRINTED_BLEND), held_in)
     sweep = runs.by_name({b: with_blend(PARAMETERS, b) for b in BLENDS}, held_in, VARIED_SEEDS)
     traces = {
-        "as printed: never acts": slot(runs.one(PLAIN)),
-        "blend 0.002 rad/s, acting": slot(runs.one(with_blend(PARAMETERS, PRINTED_BLEND))),
-        "blend 0.05 rad/s": slot(runs.one(PARAMETERS)),
+        "as printed: never acts": slot(runs.record(PLAIN)),
+        "blend 0.002 rad/s, acting": slot(runs.record(with_blend(PARAMETERS, PRINTED_BLEND))),
+        "blend 0.05 rad/s": slot(runs.record(PARAMETERS)),
     }
-    regains = runs.map(lambda seed: recovery_of(drawn_back(seed)), list(runs.seeds))
+    regains = runs.map(lambda seed: measure_recovery(drawn_back(seed)), list(runs.seeds))
     return Data(traces, plain, hammer, sweep, _ratios(runs), regains, slot(drawn_back(runs.seeds[0])))
 
 
@@ -166,33 +172,31 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             plain=data.plain,
             shakes=SHAKES,
         ),
-        found_again(data.regains),
+        recovery_claim(data.regains),
     ]
 
 
 def plot(data: Data) -> Figure:
-    """The press, the blends, the worlds, the loss."""
-    drawing, grid = panels([2.3, 2.4, 1.9, 2.2], 2, 11.0)
-    wide = [across(grid[i]) for i in (0, 2, 3)]
-    for name, one in data.traces.items():
-        wide[0].plot(one["t"], one["force"], linewidth=1.0, label=name)
+    """The press, the blends, the loss."""
+    drawing, grid = panels([2.3, 2.4, 2.2], 2, 11.0)
+    wide = [across(grid[i]) for i in (0, 2)]
+    for name, trace in data.traces.items():
+        wide[0].plot(trace["t"], trace["force"], linewidth=1.0, label=name)
     wide[0].axhline(20.0, **style.KNOWN)
     wide[0].set(xlabel="time since contact [s]", xlim=(0.0, PLAIN.run.press))
     wide[0].set(ylabel="true force [N]", ylim=(14.0, 23.0))
     style.legend(wide[0])
     _blend_panel(grid[1][0], data, lambda h: h.error, "force error [N]")
     _blend_panel(grid[1][1], data, lambda h: h.shaking, "shaking of the force [N]")
-    dots_panel(wide[1], data.varied, lambda r: 100 * r.error, lambda r: r.helps, 100 * HALF)
-    wide[1].set(
-        ylabel="error left [%]", title="with a blend of 0.05 rad/s over without; each dot a run; dashed: half"
-    )
-    loss_panel(wide[2], data.regain)
+    loss_panel(wide[1], data.regain)
     return drawing
 
 
 def _blend_panel(axis: Axes, data: Data, value: Callable[[Held], float], label: str) -> None:
-    for blend, found in data.sweep.items():
-        axis.plot([blend] * len(found), [value(h) for h in found], "o", color=style.SERIES[0], markersize=4)
+    for blend, presses in data.sweep.items():
+        axis.plot(
+            [blend] * len(presses), [value(h) for h in presses], "o", color=style.SERIES[0], markersize=4
+        )
     without = np.median([value(h) for h in data.plain])
     axis.axhline(without, color=style.MEASURED, linewidth=1.2, label="without")
     for quantum, name in zip(_quanta(), ("one count a tick", None), strict=False):
@@ -216,8 +220,8 @@ def with_blend(experiment: Experiment, blend: float) -> Experiment:
 
 def _ratios(runs: Runs) -> dict[str, list[Ratio]]:
     def ratio(world: Mapping[str, Any], seed: int) -> Ratio:
-        without = held_in(runs.one(with_values(PLAIN, world), seed))
-        compensated = runs.one(with_values(PARAMETERS, world), seed)
+        without = held_in(runs.record(with_values(PLAIN, world), seed))
+        compensated = runs.record(with_values(PARAMETERS, world), seed)
         return Ratio(held_in(compensated).error / without.error, losses(compensated) > 0)
 
     worlds = SURFACES

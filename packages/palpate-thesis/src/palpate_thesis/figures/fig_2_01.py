@@ -15,11 +15,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.robots.arm3 import Arm3
 from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line
-from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, stops_holding
-from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.drawing import Axes, Figure, panels
 from palpate_thesis.force_control.tracking import since_contact, slot
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import SHORT, SURFACES, Runs, by_condition, friction_and_pose, stops_holding
 
 NUMBER = "2.1"
 PARAMETERS = with_values(load("foam-raibert-craig"), {**SHORT, "run.press": 10.0})
@@ -35,7 +33,7 @@ LAWS = ("without dynamics", "with dynamics")
 
 
 class StepResponse(NamedTuple):
-    """How a run answered its steps of force."""
+    """Response of a run to steps of force."""
 
     overshoot: float  # over the size of the step, mean over the steps
     phi: float  # largest stray within a second of a step, mean over the steps [deg]
@@ -50,12 +48,12 @@ class BothLaws(NamedTuple):
 
     @property
     def phi(self) -> float:
-        """How far the tip turns under the original, over that under (4.13)."""
+        """Stray of the angle under the original, over that under (4.13)."""
         return self.original.phi / self.dynamic.phi
 
     @property
     def worse(self) -> bool:
-        """Whether the original is worse in both, by enough."""
+        """True if the original is worse in overshoot and stray by the factor `WORSE`, or lost contact."""
         more = self.original.overshoot > 0.0 and self.original.overshoot >= WORSE * self.dynamic.overshoot
         return self.original.lost > 0 or (more and self.phi >= WORSE)
 
@@ -75,17 +73,20 @@ def run(runs: Runs) -> Data:
     worlds = {n: with_values(PARAMETERS, c) for n, c in {**surfaces, **friction_and_pose(PARAMETERS)}.items()}
 
     def both(e: Experiment, seed: int) -> BothLaws:
-        return BothLaws(*(_measure(runs.one(law, seed)) for law in (e, with_values(e, DYNAMIC))))
+        return BothLaws(*(_measure(runs.record(law, seed)) for law in (e, with_values(e, DYNAMIC))))
 
     varied = by_condition(runs, worlds, both, {"foam"})
-    traces = {LAWS[0]: slot(runs.one(PARAMETERS)), LAWS[1]: slot(runs.one(with_values(PARAMETERS, DYNAMIC)))}
+    traces = {
+        LAWS[0]: slot(runs.record(PARAMETERS)),
+        LAWS[1]: slot(runs.record(with_values(PARAMETERS, DYNAMIC))),
+    }
     growth = growth_over(1.0, np.ones((len(YS), len(XS)), dtype=bool))
     others = [growth_over(gain, growth > GROWS) for gain in (0.1, 10.0)]
     return Data(traces, varied, growth, np.fmin.reduce([growth, *others]))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """Problems of the original, and what leaving out the dynamics does."""
+    """Problems of the original, and the effect of leaving out the dynamics."""
     reach = np.isfinite(data.growth)
     share = float((data.growth[reach] > GROWS).mean())
     always = float((data.any_gain[reach] > GROWS).mean())
@@ -114,24 +115,22 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def _losses_in_words(data: Data) -> str:
-    """Where contact was lost, in words."""
-    told = [
+    """Sentence with the variations in which contact was lost."""
+    lost = [
         f"{on_one_line(name)} ({sum(p.original.lost > 0 for p in v)} of {len(v)} runs of the original, "
         f"{sum(p.dynamic.lost > 0 for p in v)} of (4.13))"
         for name, v in data.varied.items()
         if any(p.original.lost or p.dynamic.lost for p in v)
     ]
-    return f"Contact was lost with {', '.join(told)}." if told else "Contact was never lost."
+    return f"Contact was lost with {', '.join(lost)}." if lost else "Contact was never lost."
 
 
 def plot(data: Data) -> Figure:
-    """Force and angle over time, the map, and the runs."""
-    drawing, grid = panels([2.5, 1.7, 3.0], 2, 11.0)
-    for row, name in zip(grid[:2], ("force", "phi"), strict=True):
-        _over_time(across(row), data, name)
-    _map_panel(drawing, grid[2][0], data)
-    dots_panel(grid[2][1], data.varied, lambda p: 100 * p.phi, lambda p: p.worse, 100 * WORSE)
-    grid[2][1].set(ylabel="ratio [%]", title="stray of the angle; a dot: worse in this and in overshoot")
+    """Force and angle over time, and the map."""
+    drawing, ((force,), (angle,), (growth,)) = panels([2.5, 1.7, 3.0])
+    _over_time(force, data, "force")
+    _over_time(angle, data, "phi")
+    _map_panel(drawing, growth, data)
     return drawing
 
 
@@ -160,20 +159,20 @@ def _map_panel(drawing: Figure, axis: Axes, data: Data) -> None:
 
 
 def growth_over(gain: float, where: Mask) -> Array:
-    """Of the original's position loop, its stiffness times `gain`, over YS and XS [1/s]; NaN elsewhere."""
+    """Growth rate of the original's position loop with `gain` times its stiffness, over YS and XS [1/s]; else NaN."""
     arm: Any = Arm3()
     into = Vec3(1.0, 0.0, 0.0)
     table: Any = PARAMETERS.controller
     stiffness, damping = gain * Vec3(*table.stiffness), np.sqrt(gain) * Vec3(*table.damping)
     law = RaibertCraig(stiffness, damping, 0.0 * damping, table.kf, table.ki, table.feed_forward, 1e-3)
-    found = np.full((len(YS), len(XS)), np.nan)
+    growth = np.full((len(YS), len(XS)), np.nan)
     for i, y in enumerate(YS):
         for j, x in enumerate(XS):
             pose = Vec3(float(x), float(y), 0.0)
             q = arm.inverse(pose, 1.0)
             if where[i, j] and arm.beyond_reach(pose) <= 0.0 and abs(np.sin(q.y)) > 0.02:
-                found[i, j] = growth_rate(law, arm.model(q, 0.0 * q), into)
-    return found
+                growth[i, j] = growth_rate(law, arm.model(q, 0.0 * q), into)
+    return growth
 
 
 def _measure(record: Record) -> StepResponse:

@@ -14,16 +14,14 @@ from palpate.controllers.controller import AnyController
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import SHORT, SURFACES, by_condition, friction_and_pose, rougher, stops_holding
-from palpate_thesis.force_control.disturbances import Change, Disturbance, run_with
-from palpate_thesis.force_control.panels import dots_panel, panels
+from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
+from palpate_thesis.force_control.interventions import Change, Disturbance, run_with
 from palpate_thesis.force_control.tracking import since_contact, slot
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import SHORT, SURFACES, Runs, by_condition, friction_and_pose, rougher, stops_holding
 
 NUMBER = "2.2"
 DEPTHS = (0.0090, 0.0050, 0.0080, 0.0040, 0.0095, 0.0060, 0.0085, 0.0045)
-"""Of the desired x beyond the wall [m], a second each; within what motor 2 can press on rubber."""
+"""Desired x beyond the wall, each for a second; motor 2 can press them on rubber [m]."""
 PARAMETERS = with_values(
     load("foam-impedance"), {**SHORT, "run.press": float(len(DEPTHS)), "controller.beyond": DEPTHS[0]}
 )
@@ -35,7 +33,7 @@ TARGET = {"K": 2000.0, "B": 600.0, "M": 5.0}
 
 
 class ArmImpedance(NamedTuple):
-    """Estimated impedance of the arm over its target."""
+    """Estimated impedance of the arm, relative to its target."""
 
     K: float  # slope of force over displacement at the ends of the intervals
     B: float  # least squares on the motion
@@ -43,7 +41,7 @@ class ArmImpedance(NamedTuple):
     lost: int
 
     def within(self, name: str) -> bool:
-        """Whether one of them is as asked for."""
+        """True if contact was kept and this estimate is within its tolerance of the target."""
         return self.lost == 0 and abs(getattr(self, name) - 1.0) <= TOLERANCES[name]
 
 
@@ -57,7 +55,7 @@ class Data(NamedTuple):
 def run(runs: Runs) -> Data:
     """Jumps of the desired depth on foam and rubber, and under varied conditions."""
     worlds = _worlds()
-    varied = by_condition(runs, worlds, lambda e, s: found_in(record_jumps(e, s)), _ALL)
+    varied = by_condition(runs, worlds, lambda e, s: estimate_impedance(record_jumps(e, s)), _ALL)
     rough, free = (record_jumps(worlds[name], runs.seeds[0]) for name in ("foam", _FREE))
     traces = {
         "with friction": slot(rough),
@@ -73,11 +71,11 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def _claim(data: Data, name: str) -> ThesisClaim:
-    found = {surface: [getattr(f, name) for f in data.varied[surface]] for surface in (*_ALL, _FREE)}
+    estimates = {surface: [getattr(f, name) for f in data.varied[surface]] for surface in (*_ALL, _FREE)}
     return claim(
         f"impedance-holds.{name}",
         all(often(f.within(name) for f in data.varied[surface]) for surface in _ALL),
-        **{surface.split(" ")[0]: [100 * f for f in some] for surface, some in found.items()},
+        **{surface.split(" ")[0]: [100 * value for value in values] for surface, values in estimates.items()},
         tolerance=TOLERANCES[name],
         where=stops_holding(data.varied, lambda f: f.within(name)),
     )
@@ -86,24 +84,24 @@ def _claim(data: Data, name: str) -> ThesisClaim:
 def plot(data: Data) -> Figure:
     """The force over time, and the estimates under each condition."""
     drawing, grid = panels([2.6, 1.8, 1.8, 1.8])
-    for name, one in data.traces.items():
-        grid[0][0].plot(one["t"], one["force"], linewidth=1.2, label=name)
+    for name, trace in data.traces.items():
+        grid[0][0].plot(trace["t"], trace["force"], linewidth=1.2, label=name)
     grid[0][0].set(xlabel="time since contact [s]", ylabel="force [N]", xlim=(0.0, len(DEPTHS)))
     style.legend(grid[0][0])
     for name, (axis,) in zip(("K", "B", "M"), grid[1:], strict=True):
-        _share_panel(axis, data, name)
+        _fraction_panel(axis, data, name)
     return drawing
 
 
-def _share_panel(axis: Axes, data: Data, name: str) -> None:
-    dots_panel(axis, data.varied, lambda f: 100 * getattr(f, name), lambda f: f.within(name), 100.0)
+def _fraction_panel(axis: Axes, data: Data, name: str) -> None:
+    for place, estimates in enumerate(data.varied.values()):
+        values = [100 * getattr(estimate, name) for estimate in estimates]
+        axis.plot([place] * len(values), values, "o", color=style.SERIES[0], markersize=4)
+    axis.axhline(100.0, **LIMIT_LINE)
+    axis.set_xticks(range(len(data.varied)), list(data.varied))
     axis.set(
-        ylabel=f"{name} [%]",
-        title=f"{WORDS[name]} found, over the target's; a dot: within {TOLERANCES[name]:.0%}; dashed: the "
-        "target",
+        ylabel=f"{name} [%]", title=f"{WORDS[name]} estimated, over the target's (dashed); each dot a run"
     )
-    values = [100 * getattr(f, name) for runs in data.varied.values() for f in runs]
-    axis.set_ylim(min(0.0, 1.1 * min(values)), 1.1 * max(120.0, *values))
 
 
 _ALL = ("foam", "rubber")
@@ -143,7 +141,7 @@ def record_jumps(experiment: Experiment, seed: int) -> Record:
     return run_with(experiment, seed, disturbances)
 
 
-def found_in(record: Record) -> ArmImpedance:
+def estimate_impedance(record: Record) -> ArmImpedance:
     """Spring from the ends of the intervals; damper and mass by least squares on the true motion between the jumps."""
     t, f, x = since_contact(record), record["force"], record["x"]
     interval = np.clip(np.floor(t + 5e-7).astype(int), 0, len(DEPTHS) - 1)

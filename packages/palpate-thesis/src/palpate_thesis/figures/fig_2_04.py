@@ -12,12 +12,10 @@ from palpate.friction import LuGre
 from palpate.records import Record
 from palpate.references import ForceSchedule
 from palpate.report import style
-from palpate_studies.metrics.following import LIMIT, SHARE
-from palpate_studies.metrics.window import SETTLE, rms
+from palpate.studies.metrics.following import LIMIT, SHARE
+from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, often, spread
-from palpate_thesis.conditions import by_condition, stops_holding
-from palpate_thesis.force_control.panels import across, dots_panel, panels
-from palpate_thesis.look import LIMIT_LINE, Axes, Figure
+from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
 from palpate_thesis.one_joint import (
     JOINT_FRICTION,
     DirectIntegral,
@@ -25,7 +23,7 @@ from palpate_thesis.one_joint import (
     direct_neural,
     one_joint,
 )
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs, by_condition, stops_holding
 
 NUMBER = "2.4"
 
@@ -53,11 +51,11 @@ WORLDS = {
     "noise\ndouble": JointWorld(FOAM.surface, noise=1.2),
     "inputs\nin N": JointWorld(FOAM.surface, force=1.0),
 }
-"""Other noise and other weights in each run; lever, inertia and motor are joint 2's, see `one_joint`."""
+"""Each run has other noise and weights; lever, inertia and motor are those of joint 2, see `one_joint`."""
 RATES = (5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3)
 DURATION, FROM = 15.0, 10.0
 SAME = 0.10
-"""How near the integral's error has to be to the network's."""
+"""Maximum relative difference of the errors of integral and network."""
 FOLLOWS = (
     f"in 9 of 10 runs on each surface, from {FROM:g} to {DURATION:g} s: RMS of the true force's error at "
     f"most {LIMIT:g} N outside the first {SETTLE:g} s after each step, mean error in the last second of each "
@@ -66,16 +64,16 @@ FOLLOWS = (
 
 
 class RunAfterStart(NamedTuple):
-    """How a run went from `FROM` on."""
+    """Tracking errors of a run from `FROM` on."""
 
     settled: float  # RMS error outside the steps [N]
     rms: float  # steps included [N]
-    off: float  # largest mean error at an interval's end, as a share of the desired force
+    off: float  # largest mean error at an interval's end, as a fraction of the desired force
     gain: float  # integral gain on the force: torque per newton and second, over the lever [1/s]
 
     @property
     def follows(self) -> bool:
-        """Whether the force keeps to the desired one."""
+        """True if the force follows the desired one."""
         return self.settled <= LIMIT and self.off <= SHARE
 
 
@@ -107,9 +105,9 @@ def run(runs: Runs) -> Data:
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """That it follows; and that it is an integral."""
+    """The network alone follows, and it acts as an integral."""
     both = {n: data.worlds[n] for n in ("foam", "rubber")}
-    told = "; ".join(
+    errors = "; ".join(
         f"{n}: RMS {spread([p.settled for p in v], 'N')}, interval ends off by "
         f"{spread([100 * p.off for p in v], '%', 2)}"
         for n, v in both.items()
@@ -124,7 +122,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         claim(
             "network-alone",
             all(often(p.follows for p in v) for v in both.values()),
-            surfaces=told,
+            surfaces=errors,
             follows=FOLLOWS,
             foam_slow=slow[0],
             rubber_slow=slow[1],
@@ -147,9 +145,8 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """The force and the gain over time; the error over rates and worlds."""
-    drawing, grid = panels([2.6, 2.6], 2, 11.0)
-    force = across(grid[0])
+    """The force and the gain over time; the error over rates."""
+    drawing, ((force,), (rates,)) = panels([2.6, 2.6])
     c = data.record
     force.plot(c["t"], c["force"], color=style.F, linewidth=1.1, label="true force")
     force.plot(c["t"], c["force_desired"], **style.KNOWN, label="desired")
@@ -158,15 +155,13 @@ def plot(data: Data) -> Figure:
     )
     force.set(xlabel="time [s]", ylabel="force [N]", xlim=(0.0, DURATION), ylim=(0.0, 27.0))
     style.legend(force)
-    _rate_panel(grid[1][0], data)
-    dots_panel(grid[1][1], data.worlds, lambda p: p.settled, lambda p: p.follows, LIMIT)
-    grid[1][1].set(ylabel="RMS error [N]", title="at the chosen rate; a dot follows, a cross does not")
+    _rate_panel(rates, data)
     return drawing
 
 
 def _rate_panel(axis: Axes, data: Data) -> None:
-    for (name, found), color in zip(data.rates.items(), style.SERIES, strict=False):
-        settled = np.array([[p.settled for p in v] for v in found])
+    for (name, by_rate), color in zip(data.rates.items(), style.SERIES, strict=False):
+        settled = np.array([[p.settled for p in v] for v in by_rate])
         axis.loglog(RATES, np.median(settled, axis=1), color=color, linewidth=1.2, label=name)
         axis.plot(np.repeat(RATES, VARIED_SEEDS), settled.ravel(), "o", color=color, markersize=3)
     axis.axhline(LIMIT, **LIMIT_LINE)
@@ -177,11 +172,11 @@ def _rate_panel(axis: Axes, data: Data) -> None:
 
 
 def _span(data: Data) -> tuple[float, float]:
-    """The first and the last of the rates that follow on both surfaces; NaN if none does."""
+    """Lowest and highest rate that follows on both surfaces; NaN if none does."""
     good = [
         rate
         for i, rate in enumerate(RATES)
-        if all(p.follows for found in data.rates.values() for p in found[i])
+        if all(p.follows for by_rate in data.rates.values() for p in by_rate[i])
     ]
     return (min(good), max(good)) if good else (float("nan"), float("nan"))
 

@@ -3,20 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from palpate.bench import Experiment, load, with_values
 from palpate.environments import KelvinVoigt
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim, often, on_one_line, spread
-from palpate_thesis.conditions import SHORT, SURFACES, by_condition, move_wall, rougher, stops_holding
-from palpate_thesis.force_control.disturbances import Disturbance, other_surface, run_with
-from palpate_thesis.force_control.panels import dots_panel, force_panel, panels
+from palpate_thesis.drawing import Figure, force_panel, panels
+from palpate_thesis.force_control.interventions import Disturbance, other_surface, run_with
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracking, describe, following, slot, tracking
-from palpate_thesis.look import Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import SHORT, SURFACES, Runs, by_condition, move_wall, rougher, stops_holding
 
 NUMBER = "2.5"
 PARAMETERS = with_values(
@@ -46,27 +41,29 @@ def run(runs: Runs) -> Data:
     worlds = _worlds()
     measure = tracking(*JUDGED)
     full = {*_SURFACES, *_POSES}
-    tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.one(e, seed)), full)
-    fixed = by_condition(runs, worlds, lambda e, seed: measure(runs.one(with_values(e, FIXED), seed)), full)
+    tuned = by_condition(runs, worlds, lambda e, seed: measure(runs.record(e, seed)), full)
+    fixed = by_condition(
+        runs, worlds, lambda e, seed: measure(runs.record(with_values(e, FIXED), seed)), full
+    )
     turned = runs.map(lambda seed: measure(turned_into_rubber(seed)), list(runs.seeds))
     return Data(slot(turned_into_rubber(runs.seeds[0]), *SHOWN), tuned, fixed, turned)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Surfaces, poses, a surface that changes, and whether it is the network that does it."""
-    found = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
+    tracked = {"foam into\nrubber": data.turned, **{n: data.tuned[n] for n in _SURFACES}}
     shares = {n: _shares(data, n) for n in (*_SURFACES, *_POSES[1:])}
     return [
         claim(
             "self-tuning-robust.environment",
-            all(following(f) for f in found.values()),
+            all(following(f) for f in tracked.values()),
             described=describe(data.turned),
-            others=_how_many_follow(found),
+            others=_how_many_follow(tracked),
             follows=FOLLOWS,
             fixed_kept=_count_following(data.fixed),
             surfaces=len(data.fixed),
             tuned_kept=_count_following(data.tuned),
-            where=stops_holding({**data.tuned, **found}, lambda f: f.follows),
+            where=stops_holding({**data.tuned, **tracked}, lambda f: f.follows),
         ),
         _configuration(data),
         claim(
@@ -82,20 +79,20 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def _configuration(data: Data) -> ThesisClaim:
-    found = {n: data.tuned[n] for n in _POSES}
+    tracked = {n: data.tuned[n] for n in _POSES}
     return claim(
         "self-tuning-robust.configuration",
-        all(following(f) for f in found.values()),
-        poses=_how_many_follow(found),
+        all(following(f) for f in tracked.values()),
+        poses=_how_many_follow(tracked),
         follows=FOLLOWS,
         near=data.tuned["wall at\n0.40 m"],
-        where=stops_holding(found, lambda f: f.follows),
+        where=stops_holding(tracked, lambda f: f.follows),
     )
 
 
 def plot(data: Data) -> Figure:
-    """The turn, the gains, and the runs."""
-    drawing, ((force,), (gains,), (dots,)) = panels([2.8, 1.8, 2.2])
+    """The turn, and the gains."""
+    drawing, ((force,), (gains,)) = panels([2.8, 1.8])
     force_panel(force, data.shown)
     c = PARAMETERS.controller
     kinds = (("K_fp", c.kf, style.SERIES[0]), ("K_fi", c.ki, style.SERIES[1]), ("K_fd", c.kd, style.OK))
@@ -106,23 +103,6 @@ def plot(data: Data) -> Figure:
     style.legend(gains)
     for axis in (force, gains):
         axis.axvline(TURN, color=style.INK, linewidth=1, linestyle=":")
-    dots_panel(
-        dots,
-        {"foam into\nrubber": data.turned, **data.tuned},
-        lambda f: f.settled,
-        lambda f: f.follows,
-        LIMIT,
-    )
-    dots.set(
-        ylabel="RMS error [N]",
-        title="outside the steps; a dot follows, a cross does not; small: the gains of the start, left alone; "
-        "dashed: the limit",
-    )
-    for at, runs in enumerate(data.fixed.values(), start=1):
-        spot = at + np.linspace(-0.22, 0.22, len(runs))
-        dots.plot(spot, [f.settled for f in runs], "o", color=style.MEASURED, markersize=2.5, zorder=1)
-    every = [f.settled for runs in (*data.tuned.values(), data.turned) for f in runs]
-    dots.set_ylim(0.0, max(4.0, 1.1 * float(np.nanmax(every))))
     return drawing
 
 
@@ -154,11 +134,11 @@ def _shares(data: Data, name: str) -> list[float]:
     return [a.settled / b.settled for a, b in zip(data.tuned[name], data.fixed[name], strict=True)]
 
 
-def _count_following(found: Mapping[str, Sequence[Tracking]]) -> int:
-    return sum(map(following, found.values()))
+def _count_following(tracked: Mapping[str, Sequence[Tracking]]) -> int:
+    return sum(map(following, tracked.values()))
 
 
-def _how_many_follow(found: Mapping[str, Sequence[Tracking]]) -> str:
+def _how_many_follow(tracked: Mapping[str, Sequence[Tracking]]) -> str:
     return "; ".join(
-        f"{on_one_line(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in found.items()
+        f"{on_one_line(n)} {sum(f.follows for f in v)} of {len(v)} follow" for n, v in tracked.items()
     )

@@ -13,8 +13,8 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import Biquad
 from palpate_thesis.claims import ThesisClaim, claim
+from palpate_thesis.drawing import Axes, Figure
 from palpate_thesis.least_squares.press_runs import conditions, nearer
-from palpate_thesis.look import Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "3.5"
@@ -80,7 +80,7 @@ def _spectrum(record: Record) -> Array:
 
 
 def _frequency() -> Array:
-    """Of the spectra's lines [Hz]."""
+    """Frequencies of the spectra's lines [Hz]."""
     return np.arange(SEGMENT // 2 + 1, dtype=float) * (1000.0 / SEGMENT)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.look import Figure
+from palpate_thesis.drawing import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "3.7"

@@ -11,9 +11,9 @@ from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
+from palpate_thesis.drawing import STATED, Axes, Figure
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.panels import set_title
-from palpate_thesis.look import STATED, Axes, Figure
 from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 NUMBER = "4.2"
@@ -57,10 +57,10 @@ def run(runs: Runs) -> Data:
     short = {"run.press": 0.5, "run.duration": 20.0}
     thresholds = {f: with_values(foam, {"approach.switch": f, **short}) for f in THRESHOLDS}
     return Data(
-        shown={name: _around(runs.one(e)) for name, e in PARAMETERS.items()},
-        switches=runs.by_name(PARAMETERS, switch_of),
-        by_threshold=runs.by_name(thresholds, switch_of),
-        varied=runs.by_name(press_runs.conditions(foam), switch_of, VARIED_SEEDS),
+        shown={name: _around(runs.record(e)) for name, e in PARAMETERS.items()},
+        switches=runs.by_name(PARAMETERS, measure_switch),
+        by_threshold=runs.by_name(thresholds, measure_switch),
+        varied=runs.by_name(press_runs.conditions(foam), measure_switch, VARIED_SEEDS),
     )
 
 
@@ -74,8 +74,8 @@ def _around(record: Record) -> tuple[Array, Array]:
     return t[shown], record["force_measured"][shown]
 
 
-def switch_of(record: Record) -> Switch:
-    """The change-over of a run."""
+def measure_switch(record: Record) -> Switch:
+    """Change-over of a run from position to hybrid control."""
     force = record["force_measured"]
     lost = bool((record["phase"] == LOST).any())
     return Switch(record["force"][_start(record)], lost, float(force[-1000:].mean()), float(force.max()))
@@ -84,7 +84,7 @@ def switch_of(record: Record) -> Switch:
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The switch is clean, and 5 N is a threshold that noise does not reach."""
     fails = press_runs.failing(data.varied, lambda s: s.clean)
-    early = max((f for f, some in data.by_threshold.items() if _false(some) > 0.0), default=0.0)
+    early = max((f for f, switches in data.by_threshold.items() if _false(switches) > 0.0), default=0.0)
     enough = min((f for f in data.by_threshold if f > early), default=CHOSEN)
     chosen, listing = data.by_threshold[CHOSEN], data.by_threshold[THRESHOLDS[0]]
     return [
@@ -106,9 +106,9 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     ]
 
 
-def _false(some: Sequence[Switch]) -> float:
-    """Share of the runs that were switched before anything was touched."""
-    return sum(s.true_force <= 0.0 for s in some) / len(some)
+def _false(switches: Sequence[Switch]) -> float:
+    """Fraction of the runs that switched before the surface was touched."""
+    return sum(s.true_force <= 0.0 for s in switches) / len(switches)
 
 
 def plot(data: Data) -> Figure:
@@ -134,11 +134,15 @@ def _force(axis: Axes, data: Data) -> None:
 
 def _thresholds(axis: Axes, data: Data) -> None:
     set_title(axis, "b", "Thresholds, foam; above: share of the runs that noise switched in free motion")
-    for f, some in data.by_threshold.items():
+    for f, switches in data.by_threshold.items():
         axis.plot(
-            np.full(len(some), f), [s.true_force for s in some], "o", color=style.SERIES[0], markersize=3.5
+            np.full(len(switches), f),
+            [s.true_force for s in switches],
+            "o",
+            color=style.SERIES[0],
+            markersize=3.5,
         )
-        axis.annotate(f"{100 * _false(some):.0f} %", (f, 5.6), ha="center", color=style.FAIL)
+        axis.annotate(f"{100 * _false(switches):.0f} %", (f, 5.6), ha="center", color=style.FAIL)
     axis.plot([0.0, 5.5], [0.0, 5.5], color=style.MEASURED, linewidth=0.9, linestyle="--")
     axis.set(
         xlabel="threshold of the measured force [N]", ylabel="true force at the switch [N]", ylim=(-0.5, 6.3)

@@ -1,4 +1,4 @@
-"""Figure 4.3: the loop of the hybrid controller's block diagram, and how stiff a surface it bears."""
+"""Figure 4.3: the loop of the hybrid controller's block diagram, and the stiffest surface on which it is stable."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -13,11 +13,9 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.signals.filters import butterworth2
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import SHORT, rougher
-from palpate_thesis.force_control.panels import across, panels
+from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
 from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.look import LIMIT_LINE, Axes, Figure
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import SHORT, VARIED_SEEDS, Runs, rougher
 
 TICK = 1e-3
 """[s]"""
@@ -69,17 +67,17 @@ class LoopParameters(NamedTuple):
         n, line = 5, int(self.late / TICK) + 1
         share = self.late / TICK + 1 - line
         s1, s2, total = n + line, n + line + 1, n + line + 2
-        one = np.eye(total + 1)
-        past = [np.pad(c, (0, total + 1 - n)), *one[n : n + line]]
+        unit = np.eye(total + 1)
+        past = [np.pad(c, (0, total + 1 - n)), *unit[n : n + line]]
         smooth = butterworth2(self.smoothing, 1.0 / TICK)
         reading = (1.0 - share) * past[line - 1] + share * past[line]
-        measured = smooth.b0 * reading + one[s1]
+        measured = smooth.b0 * reading + unit[s1]
         F = np.zeros((len(stiffness), total + 1, total + 1))
         F[:, :n, :n] = A
         F[:, n : n + line] = past[:line]
-        F[:, s1] = smooth.b1 * reading - smooth.a1 * measured + one[s2]
+        F[:, s1] = smooth.b1 * reading - smooth.a1 * measured + unit[s2]
         F[:, s2] = smooth.b2 * reading - smooth.a2 * measured
-        F[:, total] = one[total] - self.ki * measured
+        F[:, total] = unit[total] - self.ki * measured
         F[:, :n] += b[:, :, None] * (F[:, total] - self.kf * measured)[:, None, :]
         return F
 
@@ -111,7 +109,7 @@ def _analog(cutoff: float) -> tuple[Array, Array, Array]:
 
 
 def _exponential(A: Array) -> Array:
-    """exp of each matrix, by Taylor's series and squaring; scipy's takes its time over many small ones."""
+    """exp of each matrix, by Taylor's series and squaring; faster than scipy's over many small matrices."""
     halvings = 12
     small = A / 2.0**halvings
     total = term = np.broadcast_to(np.eye(A.shape[-1]), A.shape)
@@ -129,10 +127,10 @@ TIP = 8.2
 """Effective mass of the arm along x at the wall, rotors included [kg]."""
 GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rubber)": (0.25, 0.0015)}
 STUDY = {(60.0, 1.0): 12e3, (60.0, 0.25): 31e3, (480.0, 1.0): 95e3, (480.0, 0.25): 410e3}
-"""Limits [N/m] that an earlier study of ours found, by damping [N s/m] and K_fp."""
+"""Limits of an earlier study of ours [N/m], by damping [N s/m] and K_fp."""
 NEAR = 0.15
 BELOW, ABOVE = 0.8, 1.25
-"""Shares of the limit at which the whole arm has to be stable, and unstable."""
+"""Fractions of the limit at which the whole arm has to be stable, and unstable."""
 SHAKES = 1.0
 """Standard deviation of the true force in the third second of a press that counts as unstable [N]."""
 FREE, FREE_SIDE = 0.02, {"wall.side_friction": 0.0}
@@ -140,7 +138,6 @@ STIFFER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 """Multiples of the limit that the arm with its friction is put on."""
 DAMPINGS = np.geomspace(20.0, 1000.0, 18)
 CUTOFFS = np.geomspace(8.0, 300.0, 16)
-KFS, KIS = np.linspace(0.1, 2.0, 15), np.linspace(0.0, 0.006, 11)
 SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
 """As chosen for the bench: damping [N s/m], stiffness [N/m]."""
 
@@ -153,14 +150,13 @@ class Data(NamedTuple):
     limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
     curves: dict[str, Array]  # by gains, over DAMPINGS [N/m]
     filtered: dict[str, Array]  # by gains, over CUTOFFS, on the damping of the foam [N/m]
-    gains: Array  # over KIS and KFS, damping 60 [N/m]
     below: dict[Case, list[bool]]  # whether the arm was stable, a run each
     above: dict[Case, list[bool]]
     rough: dict[Case, list[float]]  # largest multiple of the limit that the arm bore with its friction
 
 
 def run(runs: Runs) -> Data:
-    """The linear loop over damping, gains and cut-off; the whole arm next to its limits."""
+    """The linear loop over damping and cut-off; the whole arm next to its limits."""
     limits = {(b, kf): loop(kf, ki, b).limit() for b, kf, ki in _cases()}
     return Data(
         limits,
@@ -169,7 +165,6 @@ def run(runs: Runs) -> Data:
             name: np.array([loop(*g, 200.0, smoothing=c).limit() for c in CUTOFFS])
             for name, g in GAINS.items()
         },
-        np.array([[loop(kf, ki, 60.0).limit() for kf in KFS] for ki in KIS]),
         _stable(runs, limits, BELOW),
         _stable(runs, limits, ABOVE),
         _rough(runs, limits),
@@ -178,18 +173,18 @@ def run(runs: Runs) -> Data:
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
-    told = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
+    limits = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
     slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
-    kept = {c: sum(data.below[c]) for c in data.below}
+    stable = {c: sum(data.below[c]) for c in data.below}
     lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
-    holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in kept)
+    holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in stable)
     n = len(next(iter(data.below.values())))
     friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
     return [
         claim(
             "force-loop-stable",
             all((abs(data.limits[c] / k - 1.0) <= NEAR for c, k in STUDY.items())),
-            limits=told,
+            limits=limits,
             near=NEAR,
             tip=TIP,
             needed=_least_damping(data),
@@ -198,7 +193,7 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             "force-loop-stable.whole-arm",
             holds,
             below=BELOW,
-            stable=", ".join(map(str, kept.values())),
+            stable=", ".join(map(str, stable.values())),
             runs=n,
             above=ABOVE,
             lost=", ".join(map(str, lost.values())),
@@ -218,23 +213,10 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """Limits against damping and cut-off, and over the gains."""
-    drawing, grid = panels([3.4, 2.6], 2, 11.0)
+    """Limits against damping and cut-off."""
+    drawing, grid = panels([3.4], 2, 11.0)
     _damping_panel(grid[0][0], data)
     _cutoff_panel(grid[0][1], data)
-    wide = across(grid[1])
-    limits = np.log10(data.gains / 1e3)
-    shown = wide.contourf(KFS, 1e3 * KIS, limits, levels=12, cmap="YlGnBu")
-    bar = drawing.colorbar(shown, ax=wide, pad=0.01)
-    lowest, highest = limits.min(), limits.max()
-    ticks = [k for k in (5, 10, 20, 50, 100, 200) if lowest <= np.log10(k) <= highest]
-    bar.set_ticks([float(np.log10(k)) for k in ticks], labels=[f"{k}" for k in ticks])
-    bar.set_label("stable up to [kN/m]")
-    for name, (kf, ki) in GAINS.items():
-        wide.plot(kf, 1e3 * ki, "o", color=style.SERIES[1], markersize=6)
-        wide.annotate(name.split("(")[1].rstrip(")"), (kf, 1e3 * ki), (6, 4), textcoords="offset points")
-    wide.set(xlabel="K_fp", ylabel="K_fi [1e-3 per sample]")
-    wide.set_title("over both gains, damping 60 N s/m; dots: the thesis' gains")
     return drawing
 
 
@@ -244,8 +226,8 @@ def _damping_panel(axis: Axes, data: Data) -> None:
         axis.loglog(DAMPINGS, data.curves[name] / 1e3, color=color, label=name)
         for case, limit in data.limits.items():
             if case[1] == kf:
-                for share, found in ((BELOW, data.below), (ABOVE, data.above)):
-                    stable = often(found[case])
+                for share, runs in ((BELOW, data.below), (ABOVE, data.above)):
+                    stable = often(runs[case])
                     face = color if stable else "white"
                     axis.plot(
                         case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6
@@ -302,7 +284,7 @@ def press_of(case: tuple[float, float, float], stiffness: float, friction: float
 
 
 def stays_quiet(record: Record) -> bool:
-    """Whether contact is kept and the true force rests from two seconds on."""
+    """True if contact is kept and the true force rests from two seconds on."""
     late = since_contact(record) >= 2.0
     return losses(record) == 0 and bool(late.any()) and float(record["force"][late].std()) <= SHAKES
 

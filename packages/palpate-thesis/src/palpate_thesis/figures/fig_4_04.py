@@ -11,7 +11,7 @@ from palpate.bench.summary import CONTACT
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
-from palpate_thesis.look import Figure
+from palpate_thesis.drawing import Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "4.4"
@@ -32,7 +32,7 @@ class Data(NamedTuple):
 
 def run(runs: Runs) -> Data:
     """One steady press a seed."""
-    t, sampled, filtered = _steady(runs.one(PARAMETERS))
+    t, sampled, filtered = _steady(runs.record(PARAMETERS))
     ranges = runs.over_seeds(PARAMETERS, half_ranges)
     return Data(t, sampled, filtered, [r[0] for r in ranges], [r[1] for r in ranges])
 

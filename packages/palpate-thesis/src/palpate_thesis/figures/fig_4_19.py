@@ -11,27 +11,25 @@ from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import losses
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.following import SHARE
+from palpate.studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import SHORT, SURFACES, friction_and_pose, rougher, stops_holding
-from palpate_thesis.force_control.disturbances import Disturbance, desired_pose, run_with
-from palpate_thesis.force_control.panels import across, dots_panel, panels
+from palpate_thesis.drawing import Axes, Figure, panels
+from palpate_thesis.force_control.interventions import Disturbance, desired_pose, run_with
 from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.least_squares.panels import calm_limits
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import SHORT, SURFACES, VARIED_SEEDS, Runs, friction_and_pose, rougher, stops_holding
 
 COUPLED = {"controller": {"kind": "proportional-integral", "kf": 1.0, "ki": 3.0}}
 """(4.13) with the thesis' gains on foam: 0.003 per sample is 3 per second."""
 STEPS, JUMPS = (2.5, 5.0), (1.2, 6.2)
-"""When the force steps, and when y jumps, after contact [s]; y at 10 N, where motor 2 has torque to spare."""
+"""Times after contact at which the force steps, and at which y jumps [s]: at 10 N, where motor 2 has torque left."""
 JUMP = 0.005
 """Of the desired y, there and back [m]."""
 PRINTED = {"controller.form": "printed", "controller.kf": 1.0}
 
 
 class Stray(NamedTuple):
-    """How far one loop's steps carry the other; means over the steps of the largest within a second."""
+    """Stray of one loop after steps of the other: largest within a second, mean over the steps."""
 
     y: float  # after a step of force [mm]
     phi: float  # likewise [deg]
@@ -48,7 +46,7 @@ class CoupledAndDecoupled(NamedTuple):
 
     @property
     def angle(self) -> float:
-        """How far the tip turns under the decoupled law, over that under the coupled one."""
+        """Stray of the angle under the decoupled law, over that under the coupled one."""
         return self.decoupled.phi / self.coupled.phi
 
     @property
@@ -57,8 +55,8 @@ class CoupledAndDecoupled(NamedTuple):
         return self.decoupled.y / self.coupled.y
 
 
-def pair_of(case: tuple[Experiment, int, Mapping[str, Any]]) -> CoupledAndDecoupled:
-    """Both laws in a world, with a seed, after K_e was identified there; changes of the decoupled law, if any."""
+def compare_laws(case: tuple[Experiment, int, Mapping[str, Any]]) -> CoupledAndDecoupled:
+    """Run both laws in a world after K_e was identified there, with changes of the decoupled law, if any."""
     world, seed, law = case
     stiffness = identify_stiffness(world, seed)
     used = stiffness * law.get("wrong", 1.0)
@@ -92,7 +90,7 @@ def press_with_jumps(experiment: Experiment, seed: int) -> Record:
 
 
 def stray(record: Record) -> Stray:
-    """How far the record's steps of force and jumps of y carry the other loop."""
+    """Stray of each loop after the steps of force and the jumps of y in a record."""
     t, force = since_contact(record), record["force"]
     begun = record["t"][0] - t[0]
     y = [furthest(t, record["y"], at) for at in STEPS]
@@ -104,7 +102,7 @@ def stray(record: Record) -> Stray:
 
 
 def furthest(t: Array, signal: Array, at: float) -> float:
-    """How far the signal strays within a second, from its mean over the tenth of a second before."""
+    """Largest distance of a signal within a second from its mean over the tenth of a second before."""
     before = signal[(t >= at - 0.1) & (t < at - 5e-7)].mean()
     return float(np.abs(signal[(t >= at - 5e-7) & (t < at + 1.0)] - before).max())
 
@@ -115,7 +113,7 @@ PARAMETERS = with_values(
 )
 FREE = {**rougher(PARAMETERS, 0.02), "wall.side_friction": 0.0}
 HALF = 0.5
-"""Largest share of what the coupled law lets through."""
+"""Maximum stray relative to that of the coupled law."""
 
 SIGNALS = {"force": 1.0, "y": 1e3, "phi": float(np.degrees(1.0))}
 """Drawn columns, and their factors to N, mm and degrees."""
@@ -133,13 +131,13 @@ class Data(NamedTuple):
 
 def run(runs: Runs) -> Data:
     """Both laws in each world, after the stiffness was identified there."""
-    nominal = runs.map(pair_of, [(PARAMETERS, seed, {}) for seed in runs.seeds])
+    nominal = runs.map(compare_laws, [(PARAMETERS, seed, {}) for seed in runs.seeds])
     printed = runs.map(
         as_printed, [(pair, PARAMETERS, seed) for pair, seed in zip(nominal, runs.seeds, strict=True)]
     )
     seeds = runs.seeds[:VARIED_SEEDS]
     cases = {name: [(e, seed, law) for seed in seeds] for name, (e, law) in _variations().items()}
-    varied = {"as\nchosen": nominal, **runs.map_each(pair_of, cases)}
+    varied = {"as\nchosen": nominal, **runs.map_each(compare_laws, cases)}
     k = nominal[0].stiffness
     traces = [_traces(PARAMETERS, runs.seeds[0], k), _traces(with_values(PARAMETERS, FREE), runs.seeds[0], k)]
     return Data(traces, nominal, printed, varied)
@@ -158,9 +156,11 @@ MEASURES: Mapping[str, Callable[[CoupledAndDecoupled], float]] = {
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """As printed all has to hold at once; corrected, each direction by itself."""
+    """As printed, all has to hold at once; corrected, each direction by itself."""
     pairs = {"": data.nominal, "_free": data.varied["hardly any\nfriction"]}
-    numbers = {n + kind: [m(p) for p in some] for kind, some in pairs.items() for n, m in MEASURES.items()}
+    numbers = {
+        n + kind: [m(p) for p in nominal] for kind, nominal in pairs.items() for n, m in MEASURES.items()
+    }
     limits = {"jump": 1e3 * JUMP, "share": SHARE}
     printed = claim(
         "decoupled-control",
@@ -174,47 +174,41 @@ def check(data: Data) -> Sequence[ThesisClaim]:
         *(
             claim(
                 f"decoupled-control.{part}",
-                often(map(kept, data.nominal)),
-                where=stops_holding(data.varied, kept),
+                often(map(holds, data.nominal)),
+                where=stops_holding(data.varied, holds),
                 **numbers,
                 **limits,
             )
-            for part, kept in parts.items()
+            for part, holds in parts.items()
         ),
     ]
 
 
 def plot(data: Data) -> Figure:
-    """Three signals in two worlds, and the angle's stray in all worlds."""
-    drawing, grid = panels([2.3, 1.6, 1.9, 2.0], 2, 11.0)
+    """Three signals in two worlds."""
+    drawing, grid = panels([2.3, 1.6, 1.9], 2, 11.0)
     for column, traces in enumerate(data.traces):
-        _column([row[column] for row in grid[:3]], traces)
+        _column([row[column] for row in grid], traces)
     for axis, title in zip(grid[0], ("friction as chosen", "hardly any friction"), strict=True):
         axis.set_title(title)
     for (axis, _), label in zip(grid, ("true force [N]", "y [mm]", "angle [°]"), strict=False):
         axis.set_ylabel(label)
     handles, labels = grid[0][0].get_legend_handles_labels()
     drawing.legend(handles, labels, loc="outside upper right", ncols=4)
-    dots = across(grid[3])
-    dots_panel(dots, data.varied, lambda p: 100 * p.angle, angle_kept, 100 * HALF)
-    dots.set(
-        ylabel="share [%]",
-        title="the angle's stray after a step of force, corrected against coupled; each dot a run; dashed: half",
-    )
     return drawing
 
 
 def _column(axes: Sequence[Axes], traces: Mapping[str, Record]) -> None:
     colors = dict(zip(LAWS, style.SERIES[:3], strict=True))
     for name in reversed(LAWS):
-        one, pale = traces[name], name == LAWS[2]
+        trace, pale = traces[name], name == LAWS[2]
         options: dict[str, Any] = {
             "color": colors[name],
             "linewidth": 0.7 if pale else 1.1,
             "alpha": 0.35 if pale else 1.0,
         }
         for axis, (signal, scale) in zip(axes, SIGNALS.items(), strict=True):
-            axis.plot(one["t"], scale * one[signal], label=name, **options)
+            axis.plot(trace["t"], scale * trace[signal], label=name, **options)
     shown = traces[LAWS[0]]
     axes[0].plot(shown["t"], shown["force_desired"], **style.KNOWN, label="desired")
     for axis, signal in zip(axes[1:], ("y", "phi"), strict=True):
@@ -228,7 +222,7 @@ def _column(axes: Sequence[Axes], traces: Mapping[str, Record]) -> None:
 
 
 def angle_kept(pair: CoupledAndDecoupled) -> bool:
-    """Whether contact is kept and the angle strays at most half as far as under (4.13)."""
+    """True if contact is kept and the angle strays at most half as far as under (4.13)."""
     return pair.decoupled.lost == 0 and pair.angle <= HALF
 
 
@@ -237,7 +231,7 @@ def _side_kept(pair: CoupledAndDecoupled) -> bool:
 
 
 def force_kept(pair: CoupledAndDecoupled) -> bool:
-    """Whether contact is kept and the force strays little."""
+    """True if contact is kept and the force strays little."""
     return pair.decoupled.lost == 0 and pair.decoupled.force <= SHARE
 
 

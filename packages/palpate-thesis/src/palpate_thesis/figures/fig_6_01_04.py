@@ -10,11 +10,10 @@ import numpy as np
 from palpate.arrays import Array, Mask
 from palpate.bench import Experiment
 from palpate.records import Record
-from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
+from palpate_thesis.drawing import STATED, Figure
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
-from palpate_thesis.look import STATED, Axes, Figure
 from palpate_thesis.runs import VARIED_SEEDS, Runs
 
 COVARIANCES = 10.0 ** np.arange(2, 13)
@@ -31,20 +30,9 @@ class Data(NamedTuple):
     """Data and criteria of a figure of the first seconds."""
 
     shown: dict[str, Record]  # one press of each surface
-    found: dict[str, list[PressEstimates]]  # over the seeds
+    presses: dict[str, list[PressEstimates]]  # of each surface, over the seeds
     started: dict[str, dict[tuple[str, str], Array]]  # time to settle by K(0) and shape; of M, B, K by P(0)
     varied: dict[str, list[PressEstimates]]  # of the first surface
-
-
-def run(runs: Runs, surfaces: Mapping[str, Experiment]) -> Data:
-    """One press a seed on each surface; starting values and conditions varied."""
-    first = next(iter(surfaces.values()))
-    return Data(
-        shown={name: press_runs.contact(runs.one(e)) for name, e in surfaces.items()},
-        found=runs.by_name(surfaces, press_runs.numbers_of),
-        started={name: _settle_by_start(runs, e) for name, e in surfaces.items()},
-        varied=press_runs.sweep(runs, press_runs.conditions(first)),
-    )
 
 
 def _settle_by_start(runs: Runs, experiment: Experiment) -> dict[tuple[str, str], Array]:
@@ -52,7 +40,7 @@ def _settle_by_start(runs: Runs, experiment: Experiment) -> dict[tuple[str, str]
     (each,) = runs.by_name(
         {"": experiment}, lambda record: _by_start(press_runs.contact(record)), VARIED_SEEDS
     ).values()
-    return {key: np.median([one[key] for one in each], axis=0) for key in each[0]}
+    return {key: np.median([settling[key] for settling in each], axis=0) for key in each[0]}
 
 
 def _by_start(press: Record) -> dict[tuple[str, str], Array]:
@@ -73,8 +61,8 @@ def _by_start(press: Record) -> dict[tuple[str, str], Array]:
 
 
 def _settling_claim(data: Data, surface: str, id_: str, limit: float, key: str) -> ThesisClaim:
-    times = {name: [getattr(f, f"settled_{key}") for f in some] for name, some in data.found.items()}
-    others = [name for name in data.found if name != surface]
+    times = {name: [getattr(f, f"settled_{key}") for f in presses] for name, presses in data.presses.items()}
+    others = [name for name in data.presses if name != surface]
     fails = press_runs.failing(data.varied, lambda f: bool(getattr(f, f"settled_{key}") <= limit))
     jump, later = _drift(data.shown[surface], limit)
     return claim(
@@ -130,73 +118,6 @@ def _drift(press: Record, limit: float) -> tuple[float, float]:
     return float(np.ptp(values[:split])), float(np.ptp(values[split:]))
 
 
-def plot(data: Data, limit: float) -> Figure:
-    """The thesis' six panels; under them the time to settle, by starting values and by conditions."""
-    drawing, axes = panels.grid(4)
-    panels.six(axes, data.shown, "thesis", (0.0, press_runs.FIRST))
-    _scales(axes, data.shown)
-    for axis in axes[:6]:
-        axis.axvline(limit, **STATED)
-    _starts(axes[6], data, limit)
-    _conditions(axes[7], data, limit)
-    return drawing
-
-
-def _scales(axes: list[Axes], presses: Mapping[str, Record]) -> None:
-    some = list(presses.values())
-    panels.calm_limits(axes[4], *map(panels.calm_ratio, some))
-    for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
-        curves = [scale * panels.calm(p, f"{key}_thesis", press_runs.FIRST) for p in some]
-        panels.calm_limits(axis, *curves)
-        inset = axis.inset_axes((0.52, 0.52, 0.46, 0.46))
-        for name, p in presses.items():
-            early = press_runs.between(p, 0.0, 0.3)
-            line = scale * p[f"{key}_thesis"][early]
-            inset.plot(p["t"][early], line, color=panels.COLORS[name], linewidth=1.0)
-        panels.calm_limits(inset, *(scale * panels.calm(p, f"{key}_thesis", 0.3) for p in some))
-        inset.spines[:].set(visible=True, color=style.LINE)
-        inset.tick_params(labelsize=6.5)
-        inset.set_xlim(0.0, 0.3)
-
-
-def _starts(axis: Axes, data: Data, limit: float) -> None:
-    panels.set_title(axis, "g", "Time until $K_e$ stays within 10 %, by P(0) and $K_e(0)$")
-    for name, by_start in data.started.items():
-        for (start, shape), times in by_start.items():
-            mark, alpha, kind = ("o", 1.0, "") if shape == next(iter(SHAPES)) else ("s", 0.4, ", scaled")
-            axis.plot(
-                COVARIANCES,
-                np.where(np.isfinite(times[:, 2]), times[:, 2], np.nan),
-                {"2e5": "-", "2e4": "--"}[start],
-                marker=mark,
-                markersize=3.5,
-                color=panels.COLORS[name],
-                alpha=alpha,
-                linewidth=1.1,
-                label=f"K(0) {start}{kind}" if name == next(iter(data.started)) else None,
-            )
-    axis.axhline(limit, **STATED)
-    axis.set(xscale="log", yscale="log", xlabel="p in P(0); no dot: $K_e$ never right", ylabel="time [s]")
-    axis.legend()
-
-
-def _conditions(axis: Axes, data: Data, limit: float) -> None:
-    panels.set_title(axis, "h", f"Time to settle under varied conditions, {next(iter(data.found))}")
-    nominal = {"as chosen": next(iter(data.found.values()))}
-    colors = {"$K_e$": style.K, "$B_e$": style.B, "$M_e$": style.M}
-    groups = {
-        f"${key}_e$": {
-            name: [getattr(f, f"settled_{key}") for f in some]
-            for name, some in {**nominal, **data.varied}.items()
-        }
-        for key in "KBM"
-    }
-    panels.dots(axis, groups, colors)
-    axis.axvline(limit, **STATED)
-    axis.set(xscale="log", xlabel="time [s]")
-    axis.legend()
-
-
 @dataclass(frozen=True, eq=False)
 class LeastSquaresFirstSeconds:
     """The figure of one surface."""
@@ -208,16 +129,32 @@ class LeastSquaresFirstSeconds:
     limit: float  # time within which all is settled [s]
 
     def run(self, runs: Runs) -> Data:
-        """One press a seed on each surface."""
-        return run(runs, self.PARAMETERS)
+        """One press a seed on each surface; starting values and conditions varied."""
+        surfaces = self.PARAMETERS
+        first = next(iter(surfaces.values()))
+        return Data(
+            shown={name: press_runs.contact(runs.record(e)) for name, e in surfaces.items()},
+            presses=runs.by_name(surfaces, press_runs.press_estimates),
+            started={name: _settle_by_start(runs, e) for name, e in surfaces.items()},
+            varied=press_runs.sweep(runs, press_runs.conditions(first)),
+        )
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:
         """K, B and M one by one: settled for good within the limit?"""
         return [_settling_claim(data, self.surface, self.claim, self.limit, key) for key in "KBM"]
 
     def plot(self, data: Data) -> Figure:
-        """The six panels, and the time to settle."""
-        return plot(data, self.limit)
+        """The thesis' six panels, with the limit of the time to settle."""
+        drawing, axes = panels.grid(3)
+        panels.six(axes, data.shown, "thesis", (0.0, press_runs.FIRST))
+        presses = list(data.shown.values())
+        panels.calm_limits(axes[4], *map(panels.calm_ratio, presses))
+        for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
+            curves = [scale * panels.calm(p, f"{key}_thesis", press_runs.FIRST) for p in presses]
+            panels.calm_limits(axis, *curves)
+        for axis in axes:
+            axis.axvline(self.limit, **STATED)
+        return drawing
 
 
 FOAM = LeastSquaresFirstSeconds("6.1", press_runs.FOAMS, "plain foam", "least-squares-foam-settles", 0.12)

@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.bench import Experiment, with_values
-from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim
+from palpate_thesis.drawing import ZERO, Figure
 from palpate_thesis.figures import fig_6_02_05 as later
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates
-from palpate_thesis.look import ZERO, Axes, Figure
 from palpate_thesis.runs import Runs
 
 NUMBER = "6.3"
@@ -58,14 +57,14 @@ class Data(NamedTuple):
 
     @property
     def table(self) -> dict[str, list[bool]]:
-        """Of each foam, which of `SHOWS` it does."""
+        """Truth of each sentence in `SHOWS`, by foam."""
         return {name: [bool(shows(f)) for shows in SHOWS.values()] for name, f in self.foams.items()}
 
 
 def run(runs: Runs) -> Data:
     """One press a seed on both foams; one on each of the others."""
-    foams = runs.by_name(PARAMETERS, press_runs.numbers_of, 1)
-    return Data(later.run(runs, press_runs.FOAMS, vary=1), {name: found[0] for name, found in foams.items()})
+    foams = runs.by_name(PARAMETERS, press_runs.press_estimates, 1)
+    return Data(later.run(runs, press_runs.FOAMS), {name: presses[0] for name, presses in foams.items()})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -108,7 +107,7 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
     numbers = {"both": _count(data, *both), "all": _count(data, *both, "B > 0")}
     numbers |= {key: _count(data, shown) for key, (_, shown, _) in raw.items()}
     return [
-        later.found_claim(
+        later.press_claim(
             data.later, f"least-squares-raw-signals.{key}", measure, SHOWS[shown], unit, **numbers
         )
         for key, (unit, shown, measure) in raw.items()
@@ -116,8 +115,8 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """The six panels from raw signals; the signs over all foams, and what each foam shows."""
-    drawing, axes = panels.grid(5)
+    """The six panels from raw signals."""
+    drawing, axes = panels.grid(3)
     shown = data.later.shown
     panels.six(axes, shown, "raw", (0.0, press_runs.FIRST))
     panels.calm_limits(axes[4], *(panels.calm_ratio(p, "force_sampled") for p in shown.values()))
@@ -127,41 +126,4 @@ def plot(data: Data) -> Figure:
         ]
         panels.calm_limits(axis, np.zeros(1), *curves)
         axis.axhline(0.0, **ZERO)
-    for axis in axes[6:]:
-        axis.remove()
-    _signs(drawing.add_subplot(5, 2, (7, 9)), data)
-    _table(drawing.add_subplot(5, 2, (8, 10)), data)
     return drawing
-
-
-def _signs(axis: Axes, data: Data) -> None:
-    panels.set_title(axis, "g", "Raw signals: signs on all foams")
-    for label, names, color in (
-        ("without memory", [n for n in data.foams if n.startswith("B ")], style.SERIES[0]),
-        ("relaxing", [n for n in data.foams if not n.startswith("B ")], style.SERIES[1]),
-    ):
-        B, M = ([getattr(data.foams[n], key) for n in names] for key in ("B_raw", "M_raw"))
-        axis.plot(B, M, "o", color=color, markersize=4, label=label)
-    axis.axhline(0.0, **ZERO)
-    axis.axvline(0.0, **ZERO)
-    axis.set_xscale("symlog", linthresh=50.0)
-    axis.set_xticks([-100.0, 0.0, 100.0, 1000.0], ["-100", "0", "100", "1000"])
-    (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
-    left = min(left, -60.0)
-    axis.fill_between([left, 0.0], bottom, 0.0, color=style.FAIL, alpha=0.10, linewidth=0.0)
-    axis.set(xlabel="$B_e$ [N s/m]", ylabel="$M_e$ [kg]", xlim=(left, right), ylim=(bottom, top))
-    axis.grid(visible=True, color=style.GRID, linewidth=0.8)
-    axis.legend()
-
-
-def _table(axis: Axes, data: Data) -> None:
-    panels.set_title(axis, "h", "What each foam shows")
-    table = np.array(list(data.table.values()), dtype=float)
-    axis.imshow(table, aspect="auto", cmap="Blues", vmin=-0.15, vmax=1.25)
-    axis.set_xticks(range(len(SHOWS)), list(SHOWS), rotation=40, ha="right")
-    axis.set_yticks(range(len(data.foams)), list(data.foams), fontsize=5)
-    axis.set_xticks(np.arange(len(SHOWS)) - 0.5, minor=True)
-    axis.set_yticks(np.arange(len(data.foams)) - 0.5, minor=True)
-    axis.grid(which="minor", color="white", linewidth=1.0)
-    axis.tick_params(length=0, which="both")
-    axis.set_xlabel("seen in figures 6.1 to 6.3")

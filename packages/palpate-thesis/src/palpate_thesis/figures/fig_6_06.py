@@ -8,8 +8,8 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.drawing import Axes, Figure
 from palpate_thesis.least_squares import panels
-from palpate_thesis.look import Axes, Figure
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.network import NetworkAnswer, NetworkPress
 from palpate_thesis.runs import Runs
@@ -31,44 +31,46 @@ class Data(NamedTuple):
 
     press: NetworkPress
     curves: dict[float, Array]  # K, B, M and error by rate, of the first press and start
-    found: dict[float, dict[float, list[NetworkAnswer]]]  # by amplitude and rate, a press and start a seed
+    answers: dict[float, dict[float, list[NetworkAnswer]]]  # by amplitude and rate, one press a seed
     varied: dict[str, dict[float, list[NetworkAnswer]]]  # by condition and rate
     amplitude: float  # of the network as chosen [N]
 
 
 def run(runs: Runs) -> Data:
     """One press a seed, learned at every rate and several amplitudes; conditions with two noise seeds each."""
-    some = network.presses(runs, PARAMETERS, "foam")
-    own = network.network_of(runs)
+    presses = network.presses(runs, PARAMETERS, "foam")
+    chosen = network.chosen_network(runs)
     starts = network.starts(runs)
-    curves = {rate: network.learn(some[0], own._replace(rate=rate), starts[0])[1] for rate in SHOWN}
-    choices = [own._replace(amplitude=a, rate=rate) for a in (own.amplitude, *OTHERS) for rate in RATES]
-    found: dict[float, dict[float, list[NetworkAnswer]]] = {}
-    for choice, answers in network.sweep(runs, some, choices).items():
-        found.setdefault(choice.amplitude, {})[choice.rate] = answers
+    curves = {rate: network.learn(presses[0], chosen._replace(rate=rate), starts[0])[1] for rate in SHOWN}
+    choices = [chosen._replace(amplitude=a, rate=rate) for a in (chosen.amplitude, *OTHERS) for rate in RATES]
+    by_amplitude: dict[float, dict[float, list[NetworkAnswer]]] = {}
+    for choice, answers in network.sweep(runs, presses, choices).items():
+        by_amplitude.setdefault(choice.amplitude, {})[choice.rate] = answers
     conditions = network.varied_presses(runs, PARAMETERS, "foam")
     varied = {
-        name: {rate: network.answers(runs, few, own._replace(rate=rate), starts[:FEW]) for rate in SMALLER}
+        name: {rate: network.answers(runs, few, chosen._replace(rate=rate), starts[:FEW]) for rate in SMALLER}
         for name, few in conditions.items()
     }
-    return Data(some[0], curves, found, varied, own.amplitude)
+    return Data(presses[0], curves, by_amplitude, varied, chosen.amplitude)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
     """Smaller takes longer; too large never converges."""
-    found = data.found[data.amplitude]
-    return [_slower(data, found), _too_large(data, found)]
+    by_rate = data.answers[data.amplitude]
+    return [_slower(data, by_rate), _too_large(data, by_rate)]
 
 
-def _slower(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
-    times = [f"{rate:g}: {spread([a.error_gone for a in found[rate]], 's', 2)}" for rate in SMALLER]
-    tried = data.varied | {f"output amplitude {a:g} N": data.found[a] for a in OTHERS}
-    bad = [name for name, by_rate in tried.items() if not often(slower_throughout(by_rate))]
+def _slower(data: Data, by_rate: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
+    times = [f"{rate:g}: {spread([a.error_gone for a in by_rate[rate]], 's', 2)}" for rate in SMALLER]
+    tried = data.varied | {f"output amplitude {a:g} N": data.answers[a] for a in OTHERS}
+    bad = [name for name, answers in tried.items() if not often(slower_throughout(answers))]
     limits = f"It does not hold with: {', '.join(bad)}." if bad else "It holds under all of them."
-    nearest = min(found, key=lambda rate: abs(float(np.median([a.error_gone for a in found[rate]])) - 0.6))
+    nearest = min(
+        by_rate, key=lambda rate: abs(float(np.median([a.error_gone for a in by_rate[rate]])) - 0.6)
+    )
     return claim(
         "network-learning-rate.slower",
-        often(slower_throughout(found)),
+        often(slower_throughout(by_rate)),
         times="; ".join(times),
         gone=network.GONE,
         nearest=nearest,
@@ -78,14 +80,14 @@ def _slower(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> Thesi
     )
 
 
-def _too_large(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
-    first = {a: stuck_from(by_rate) for a, by_rate in data.found.items()}
-    told = ", ".join(f"{rate:g} at {a:g} N" for a, rate in first.items() if np.isfinite(rate))
-    largest = found[RATES[-1]]
+def _too_large(data: Data, by_rate: Mapping[float, Sequence[NetworkAnswer]]) -> ThesisClaim:
+    first = {a: stuck_from(by_rate) for a, by_rate in data.answers.items()}
+    stuck_rates = ", ".join(f"{rate:g} at {a:g} N" for a, rate in first.items() if np.isfinite(rate))
+    largest = by_rate[RATES[-1]]
     return claim(
         "network-learning-rate.too-large",
         bool(np.isfinite(first[data.amplitude])),
-        stuck=told or "none that was tried",
+        stuck=stuck_rates or "none that was tried",
         largest=RATES[-1],
         runs=sum(map(stuck, largest)),
         of=len(largest),
@@ -94,14 +96,14 @@ def _too_large(data: Data, found: Mapping[float, Sequence[NetworkAnswer]]) -> Th
 
 
 def slower_throughout(by_rate: Mapping[float, Sequence[NetworkAnswer]]) -> list[bool]:
-    """For each run, whether every smaller rate takes longer."""
+    """For each run, True if every smaller rate takes longer."""
     times = np.array([[a.error_gone for a in by_rate[rate]] for rate in SMALLER])
     finite = np.where(np.isfinite(times), times, 1e3)
     return [bool(ok) for ok in np.all(np.diff(finite, axis=0) > 0.0, axis=0)]
 
 
 def stuck(answer: NetworkAnswer) -> bool:
-    """Whether the error is still there at the end."""
+    """True if the error is not gone at the end."""
     return not np.isfinite(answer.error_gone)
 
 
@@ -129,7 +131,7 @@ def plot(data: Data) -> Figure:
     for axis, (letter, (title, label)) in zip(axes, PANELS.items(), strict=True):
         panels.set_title(axis, letter, title)
         axis.set_ylabel(label)
-    for (amplitude, by_rate), color in zip(data.found.items(), style.SERIES, strict=False):
+    for (amplitude, by_rate), color in zip(data.answers.items(), style.SERIES, strict=False):
         _times(axes[3], by_rate, f"{amplitude:g} N", color)
     axes[3].axhline(network.PRESS, color=style.INK, linewidth=0.6)
     axes[3].set(xscale="log", yscale="log", xlabel="learning rate; cross: not within the 4 s")
@@ -152,7 +154,7 @@ def _curves(axes: list[Axes], data: Data) -> None:
 
 
 def _times(axis: Axes, by_rate: Mapping[float, Sequence[NetworkAnswer]], label: str, color: str) -> None:
-    times = np.array([[a.error_gone for a in found] for found in by_rate.values()])
+    times = np.array([[a.error_gone for a in by_rate] for by_rate in by_rate.values()])
     rates = np.repeat(np.array(list(by_rate))[:, None], times.shape[1], axis=1)
     done = np.isfinite(times)
     axis.plot(rates[done], times[done], ".", color=color, markersize=4, alpha=0.5)

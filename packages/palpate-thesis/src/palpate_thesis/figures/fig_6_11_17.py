@@ -9,21 +9,19 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
-from palpate_studies.metrics.following import LIMIT
+from palpate.studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import stops_holding
+from palpate_thesis.drawing import LIMIT_LINE, Figure, force_panel, panels
 from palpate_thesis.force_control import tracking
-from palpate_thesis.force_control.panels import following_panel, force_panel, panels
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracked, Tracking, describe, since_contact, track
-from palpate_thesis.look import LIMIT_LINE, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import Runs, stops_holding
 
 JUDGED = (10.0, 15.0)
 SLOW_RATE = {"controller.learning_rate": 1e-5}
 CYCLE = 5.0
-"""The desired force repeats itself [s]."""
+"""Period of the desired force [s]."""
 SMOOTHED = 0.25
-"""Over which deviations are averaged [s]."""
+"""Time over which deviations are averaged [s]."""
 Window = tuple[float, float]
 
 
@@ -34,22 +32,22 @@ class Steps:
     NUMBER: str
     id: str  # of its claim
     PARAMETERS: Experiment
-    shown: Window = (9.5, 13.5)  # from when to when after contact [s]
+    shown: Window = (9.5, 13.5)  # time after contact [s]
     judged: Window = JUDGED
-    follows: bool = True  # what the thesis says of it
+    follows: bool = True  # statement of the thesis
 
     def run(self, runs: Runs) -> Tracked:
         """All seeds, drawn and judged, and the variations."""
         return track(runs, self.PARAMETERS, self.shown, self.judged)
 
     def check(self, data: Tracked) -> Sequence[ThesisClaim]:
-        """By the same limits for every desired force, the force follows, or does not."""
+        """The force has to follow, or not to follow, by the same limits for every desired force."""
         return [
             claim(
                 self.id,
                 often(map(self._as_said, data.nominal)),
                 described=describe(data.nominal),
-                limited=100 * float(np.median([one.saturated for one in data.nominal])),
+                limited=100 * float(np.median([run.saturated for run in data.nominal])),
                 follows=FOLLOWS,
                 following=tracking.FOLLOWING,
                 where=stops_holding(data.varied, self._as_said),
@@ -57,14 +55,13 @@ class Steps:
         ]
 
     def plot(self, data: Tracked) -> Figure:
-        """The slot, and the runs."""
-        drawing, ((force,), (dots,)) = panels([3.2, 2.0])
+        """The force in the slot."""
+        drawing, ((force,),) = panels([3.2])
         force_panel(force, data.shown)
-        following_panel(dots, data.varied)
         return drawing
 
-    def _as_said(self, one: Tracking) -> bool:
-        return one.follows is self.follows
+    def _as_said(self, run: Tracking) -> bool:
+        return run.follows is self.follows
 
 
 class Adapting(NamedTuple):
@@ -73,7 +70,7 @@ class Adapting(NamedTuple):
     tracked: Tracked
     t: Array
     away: Array  # of the first seed: from the settled cycle, smoothed [N]
-    adapted: list[float]  # when the force has come to stay near it, one a seed [s]
+    adapted: list[float]  # time from which the force stays near it, one a seed [s]
 
 
 class FromTheStart(Steps):
@@ -83,7 +80,7 @@ class FromTheStart(Steps):
         """Four cycles; the last two are the reference of the first."""
         away = runs.over_seeds(self.PARAMETERS, away_from_settled)
         t = np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64)
-        return Adapting(super().run(runs), t, away[0], [adapted_at(one) for one in away])
+        return Adapting(super().run(runs), t, away[0], [adapted_at(distance) for distance in away])
 
     def check(self, data: Adapting) -> Sequence[ThesisClaim]:  # type: ignore[override]
         """The force has to follow from the start; and adapting has to take from 2.5 to 7.5 s."""
@@ -94,10 +91,9 @@ class FromTheStart(Steps):
         ]
 
     def plot(self, data: Adapting) -> Figure:  # type: ignore[override]
-        """The beginning, the runs, and the way to the settled cycle."""
-        drawing, ((force,), (dots,), (away,)) = panels([3.2, 2.0, 1.5])
+        """The beginning, and the way to the settled cycle."""
+        drawing, ((force,), (away,)) = panels([3.2, 1.5])
         force_panel(force, data.tracked.shown)
-        following_panel(dots, data.tracked.varied)
         shown = data.t < self.shown[1]
         away.plot(data.t[shown], data.away[shown])
         away.axhline(LIMIT, **LIMIT_LINE)
@@ -117,7 +113,7 @@ def away_from_settled(record: Record) -> Array:
 
 
 def adapted_at(away: Array) -> float:
-    """When the distance has come below the limit for good [s]."""
+    """Time from which the distance stays below the limit [s]."""
     beyond = np.nonzero(away > LIMIT)[0]
     return SMOOTHED + (float(beyond[-1]) * 1e-3 if len(beyond) else 0.0)
 

@@ -10,12 +10,11 @@ from palpate.bench import with_values
 from palpate.bench.summary import CONTACT, LOST
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.following import LIMIT
-from palpate_studies.metrics.window import SETTLE, rms
+from palpate.studies.metrics.following import LIMIT
+from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.conditions import RELAXING_FOAM
+from palpate_thesis.drawing import LIMIT_LINE, Figure, force_panel, panels
 from palpate_thesis.figures.fig_6_11_17 import CYCLE, SLOW_RATE
-from palpate_thesis.force_control.panels import force_panel, panels
 from palpate_thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
@@ -26,8 +25,7 @@ from palpate_thesis.force_control.tracking import (
     slot,
     tracking,
 )
-from palpate_thesis.look import LIMIT_LINE, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import RELAXING_FOAM, Runs
 
 NUMBER = "6.14"
 PARAMETERS = with_values(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
@@ -39,10 +37,10 @@ OTHERS: Mapping[str, Mapping[str, Any]] = {
 
 
 class CycleErrors(NamedTuple):
-    """The error of each cycle outside the steps [N], up to the first loss of contact."""
+    """Error of each cycle outside the steps [N], up to the first loss of contact."""
 
     error: Array  # (cycles,)
-    lost: float | None  # when [s]
+    lost: float | None  # time of the loss [s]
 
 
 class Data(NamedTuple):
@@ -55,10 +53,10 @@ class Data(NamedTuple):
 
 def run(runs: Runs) -> Data:
     """190 s of contact; on the other foam and with the plain integral controller as well."""
-    both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), course_of(record)))
+    both = runs.over_seeds(PARAMETERS, lambda record: (tracking(*JUDGED)(record), cycle_errors(record)))
     nominal, courses = zip(*both, strict=True)
-    others = runs.by_name({n: with_values(PARAMETERS, by) for n, by in OTHERS.items()}, course_of, 2)
-    return Data(slot(runs.one(PARAMETERS), *SHOWN), [*nominal], {"foam": [*courses], **others})
+    others = runs.by_name({n: with_values(PARAMETERS, by) for n, by in OTHERS.items()}, cycle_errors, 2)
+    return Data(slot(runs.record(PARAMETERS), *SHOWN), [*nominal], {"foam": [*courses], **others})
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
@@ -86,12 +84,12 @@ def plot(data: Data) -> Figure:
     """Six seconds after three minutes, and the course of the error."""
     drawing, ((force,), (course,)) = panels([3.2, 2.4])
     force_panel(force, data.shown)
-    for (name, found), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
-        for i, one in enumerate(found):
-            t = CYCLE * (np.arange(len(one.error)) + 0.5)
-            course.plot(t, one.error, color=color, linewidth=1, alpha=0.7, label=name if i == 0 else None)
-            if one.lost is not None and len(t):
-                course.plot(t[-1], one.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
+    for (name, runs), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
+        for i, run in enumerate(runs):
+            t = CYCLE * (np.arange(len(run.error)) + 0.5)
+            course.plot(t, run.error, color=color, linewidth=1, alpha=0.7, label=name if i == 0 else None)
+            if run.lost is not None and len(t):
+                course.plot(t[-1], run.error[-1], "x", color=color, markersize=9, markeredgewidth=2)
     course.axhline(LIMIT, **LIMIT_LINE, label="limit of following")
     course.set(xlabel="time since contact [s]", ylabel="RMS error outside steps [N]")
     course.set(xlim=(0.0, None), ylim=(0.0, None))
@@ -99,13 +97,13 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def course_of(record: Record) -> CycleErrors:
-    """The error of each whole cycle up to the first loss of contact."""
+def cycle_errors(record: Record) -> CycleErrors:
+    """Error of each whole cycle up to the first loss of contact."""
     t, phase = since_contact(record), record["phase"]
-    gone = np.nonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT))[0]
-    end = float(t[gone[0]]) if len(gone) else float(t[-1]) + 1e-3
+    losses = np.nonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT))[0]
+    end = float(t[losses[0]]) if len(losses) else float(t[-1]) + 1e-3
     error = record["force"] - record["force_desired"]
     settled = (t >= 0.0) & (np.mod(t + 5e-7, 2.5) >= SETTLE)
     starts = CYCLE * np.arange(int((end + 1e-6) // CYCLE))
     values = [rms(error[settled & (t >= a) & (t < a + CYCLE)]) for a in starts]
-    return CycleErrors(np.array(values), end if len(gone) else None)
+    return CycleErrors(np.array(values), end if len(losses) else None)

@@ -8,13 +8,11 @@ import numpy as np
 from palpate.bench import load, with_values
 from palpate.records import Record
 from palpate.report import style
-from palpate_studies.metrics.window import rms
+from palpate.studies.metrics.window import rms
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.conditions import by_condition, rougher
-from palpate_thesis.force_control.panels import dots_panel, panels
+from palpate_thesis.drawing import Axes, Figure, panels
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
-from palpate_thesis.look import Axes, Figure
-from palpate_thesis.runs import Runs
+from palpate_thesis.runs import Runs, by_condition, rougher
 
 NUMBER = "6.15"
 PARAMETERS = with_values(load("foam-neural"), {"run.press": 15.0})
@@ -22,7 +20,7 @@ SHOWN, JUDGED = (0.0, 15.0), (10.0, 15.0)
 VISIBLE = (0.5e-3, np.radians(0.2))
 """From where errors of y [m] and of the angle [rad] are not zero: some hundred times what an encoder resolves."""
 SHARE = 0.25
-"""A cause whose removal takes this share off the error matters."""
+"""Least relative reduction of the error by which a removed cause counts."""
 STIFF = {"kp": 1600.0, "kv": 160.0}
 CAUSES: Mapping[str, Mapping[str, Any]] = {
     "no sticking\nto the foam": {"wall.side_friction": 0.0},
@@ -55,14 +53,16 @@ class Data(NamedTuple):
 def run(runs: Runs) -> Data:
     """The whole approach and fifteen seconds of contact; then with one cause changed at a time."""
     worlds = {name: with_values(PARAMETERS, by) for name, by in {"as\nchosen": {}, **CAUSES}.items()}
-    varied = by_condition(runs, worlds, lambda e, seed: errors_of(runs.one(e, seed)), {"as\nchosen"})
-    return Data(slot(runs.one(PARAMETERS), *SHOWN), varied)
+    varied = by_condition(
+        runs, worlds, lambda e, seed: measure_free_errors(runs.record(e, seed)), {"as\nchosen"}
+    )
+    return Data(slot(runs.record(PARAMETERS), *SHOWN), varied)
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """Whether the errors are there, and whether the thesis' two reasons are."""
+    """The errors, and the two reasons that the thesis gives."""
     nominal, free = data.varied["as\nchosen"], data.varied["no sticking\nto the foam"]
-    middle = {name: np.median([e.y for e in found]) for name, found in data.varied.items()}
+    middle = {name: np.median([e.y for e in errors]) for name, errors in data.varied.items()}
     taken = 1.0 - middle["no sticking\nto the foam"] / middle["as\nchosen"]
     numbers = {"nominal": nominal, "visible": 1e3 * VISIBLE[0]}
     return [
@@ -83,9 +83,8 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 def plot(data: Data) -> Figure:
     """The four signals of the thesis' figure, and the causes."""
-    drawing, ((desired,), (force,), (y,), (phi,), (dots,)) = panels([0.9, 1.3, 1.0, 1.0, 1.7])
-    shown = data.shown
-    t = shown["t"]
+    drawing, ((desired,), (force,), (y,), (phi,)) = panels([0.9, 1.3, 1.0, 1.0])
+    shown, t = data.shown, data.shown["t"]
     _signal(desired, t, shown["force_desired"], "(a) desired\nforce [N]", style.INK)
     _signal(force, t, shown["force_measured"], "(b) measured\nforce [N]", style.MEASURED)
     force.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
@@ -94,11 +93,6 @@ def plot(data: Data) -> Figure:
     for axis in (y, phi):
         axis.axhline(0.0, **style.KNOWN)
     phi.set_xlabel("time since contact [s]")
-    dots_panel(dots, data.varied, lambda e: 1e3 * e.y, visible, 1e3 * VISIBLE[0])
-    dots.set(
-        ylabel="RMS of y [mm]",
-        title="10 to 15 s after contact, a dot: y and angle are visibly not zero; a cross: not; dashed: visible",
-    )
     return drawing
 
 
@@ -108,11 +102,11 @@ def _signal(axis: Axes, t: Any, values: Any, label: str, color: str) -> None:
 
 
 def visible(e: Errors) -> bool:
-    """Whether both errors are."""
+    """True if both errors are visible."""
     return e.y > VISIBLE[0] and e.phi > VISIBLE[1]
 
 
-def errors_of(record: Record) -> Errors:
+def measure_free_errors(record: Record) -> Errors:
     """The errors of a run of fifteen seconds of contact."""
     t = since_contact(record)
     first = int(np.argmax(t >= 0.0))

@@ -1,4 +1,4 @@
-"""Common parts of the force-control figures: experiments, criterion of following, varied conditions."""
+"""Experiments of force control, the criterion of following, and varied conditions."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
@@ -9,12 +9,11 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT, losses
 from palpate.records import Record
-from palpate_studies.metrics import Window
-from palpate_studies.metrics.following import LIMIT, SHARE, interval_error
-from palpate_studies.metrics.window import SETTLE, rms
+from palpate.studies.metrics import Window
+from palpate.studies.metrics.following import LIMIT, SHARE, interval_error
+from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import often, spread
-from palpate_thesis.conditions import RELAXING_FOAM, SHORT, friction_and_pose
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import RELAXING_FOAM, SHORT, VARIED_SEEDS, Runs, friction_and_pose
 
 T = TypeVar("T")
 
@@ -31,22 +30,22 @@ RUBBER = with_values(load("rubber-neural"), SHORT)
 
 
 class Tracking(NamedTuple):
-    """How the true force kept to the desired one within a window."""
+    """Tracking error of the true force within a window."""
 
     rms: float  # of the error, steps included [N]
-    settled: float  # of the error outside the first half second after each step [N]
-    off: float  # largest mean error in the last second of an interval, as a share of the desired force
-    saturated: float  # share of the time that motor 2 is at its limit
-    lost: int  # how often contact was lost, from the start on
+    settled: float  # RMS of the error outside the first half second after each step [N]
+    off: float  # largest mean error in the last second of an interval, as a fraction of the desired force
+    saturated: float  # fraction of the time that motor 2 is at its limit
+    lost: int  # losses of contact since the start
 
     @property
     def kept(self) -> bool:
-        """Whether contact was kept and the run came to its end."""
+        """True if contact was kept and the run came to its end."""
         return self.lost == 0 and bool(np.isfinite(self.rms))
 
     @property
     def follows(self) -> bool:
-        """Whether all that `FOLLOWING` asks for holds."""
+        """True if the criterion `FOLLOWING` is met."""
         return self.lost == 0 and self.settled <= LIMIT and self.off <= SHARE
 
 
@@ -60,46 +59,47 @@ def since_contact(record: Record) -> Array:
 
 
 def tracking(start: float, end: float) -> Callable[[Record], Tracking]:
-    """Measures a record from `start` to `end` after contact [s]."""
+    """Function that measures a record from `start` to `end` after contact [s]."""
 
     def measure(record: Record) -> Tracking:
-        look = Window(record, (start, end))
-        if not look.touched:
+        window = Window(record, (start, end))
+        if not window.touched:
             return NEVER
-        if not len(look.error):
+        if not len(window.error):
             return Tracking(np.nan, np.nan, np.nan, np.nan, losses(record))
-        off, saturated = interval_error(look), float(look["saturated2"].mean())
+        off, saturated = interval_error(window), float(window["saturated2"].mean())
         off = np.nan if off is None else off
-        return Tracking(rms(look.error), rms(look.after_steps), off, saturated, losses(record))
+        return Tracking(rms(window.error), rms(window.after_steps), off, saturated, losses(record))
 
     return measure
 
 
-def following(found: Sequence[Tracking]) -> bool:
-    """Whether enough runs follow."""
-    return often(f.follows for f in found)
+def following(runs: Sequence[Tracking]) -> bool:
+    """True if enough runs follow."""
+    return often(run.follows for run in runs)
 
 
-def describe(found: Sequence[Tracking]) -> str:
-    """The measured column of a claim."""
-    worst = spread([100 * f.off for f in found], "%", 2)
-    text = f"RMS {spread([f.settled for f in found], 'N')} outside the steps, interval ends off by {worst}"
-    lost = sum(f.lost > 0 for f in found)
-    return f"{text}; {sum(f.follows for f in found)} of {len(found)} runs follow" + (
+def describe(runs: Sequence[Tracking]) -> str:
+    """Tracking errors of the runs in words, for the measured value of a claim."""
+    worst = spread([100 * run.off for run in runs], "%", 2)
+    settled = spread([run.settled for run in runs], "N")
+    follow = f"{sum(run.follows for run in runs)} of {len(runs)} runs follow"
+    lost = sum(run.lost > 0 for run in runs)
+    return f"RMS {settled} outside the steps, interval ends off by {worst}; {follow}" + (
         f", {lost} lost contact" if lost else ""
     )
 
 
 def slot(record: Record, start: float = 0.0, end: float = np.inf) -> Record:
-    """A record from `start` to `end` after contact [s], its clock at zero at the first contact."""
+    """Part of a record from `start` to `end` after contact [s]; its time starts at the first contact."""
     t = since_contact(record)
-    shown = (t >= start) & (t < end)
-    columns = {name: column[shown] for name, column in record.columns.items()}
-    return Record({**columns, "t": t[shown]}, record.units, record.meta)
+    rows = (t >= start) & (t < end)
+    columns = {name: column[rows] for name, column in record.columns.items()}
+    return Record({**columns, "t": t[rows]}, record.units, record.meta)
 
 
 def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
-    """The experiment with other friction, at other poses, on the other foam, from other weights, as in the listing."""
+    """The experiment with other friction, poses, foam and weights, and with values of the listing."""
     e = experiment
     by = friction_and_pose(e)
     if e.surface == FOAM.surface:
@@ -116,12 +116,12 @@ def variations(experiment: Experiment, seed: int) -> dict[str, Experiment]:
 def robustness(
     runs: Runs, experiment: Experiment, nominal: Sequence[T], measure: Callable[[Record], T]
 ) -> dict[str, list[T]]:
-    """`measure` of each variation, the nominal case first."""
+    """`measure` of each run by variation, the nominal case first."""
     cases: dict[str, list[tuple[Experiment, int]]] = {}
     for seed in runs.seeds[:VARIED_SEEDS]:
         for name, e in variations(experiment, seed).items():
             cases.setdefault(name, []).append((e, seed))
-    return {"as\nchosen": list(nominal), **runs.map_each(lambda case: measure(runs.one(*case)), cases)}
+    return {"as\nchosen": list(nominal), **runs.map_each(lambda case: measure(runs.record(*case)), cases)}
 
 
 class Tracked(NamedTuple):
@@ -146,5 +146,5 @@ def track(
     measure = tracking(*judged)
     nominal = runs.over_seeds(experiment, measure)
     return Tracked(
-        slot(runs.one(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
+        slot(runs.record(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
     )

@@ -1,16 +1,15 @@
 """The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.records import Record
 from palpate.report import style
+from palpate_thesis.drawing import Axes, Figure
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.least_squares.press_runs import between
-from palpate_thesis.look import Axes, Figure
 
 COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
 PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
@@ -24,7 +23,7 @@ NAMES = {
 }
 """Of the six panels, (a) to (f), and their y axes."""
 CALM = 0.03
-"""Seconds after the change-over from which values set the scale of a panel; before, they go anywhere."""
+"""Time after the change-over from which values set the scale of a panel; before, they are transients [s]."""
 
 
 def grid(rows: int) -> tuple[Figure, list[Axes]]:
@@ -33,12 +32,12 @@ def grid(rows: int) -> tuple[Figure, list[Axes]]:
 
 
 def set_title(axis: Axes, letter: str, text: str) -> None:
-    """A panel's letter and name above it."""
+    """Write letter and name above a panel."""
     axis.set_title(f"({letter}) {text}")
 
 
 def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple[float, float]) -> None:
-    """Force, displacement, their ratio; M, B, K of one front-end; a line for each surface.
+    """Draw force, displacement, their ratio, and M, B, K of one front-end, with a line for each surface.
 
     The thesis' letters, in its order read down the columns: (a)-(c) left, (d)-(f) right.
     """
@@ -57,47 +56,34 @@ def six(axes: list[Axes], presses: Mapping[str, Record], front: str, slot: tuple
 def _lines(
     left: list[Axes], right: list[Axes], press: Record, front: str, slot: tuple[float, float], name: str
 ) -> None:
-    shown = between(press, *slot)
-    t, color = press["t"][shown], COLORS[name]
-    x = press["displacement"][shown]
-    force = press["force_sampled" if front == "raw" else "force_measured"][shown]
+    rows = between(press, *slot)
+    t, color = press["t"][rows], COLORS[name]
+    x = press["displacement"][rows]
+    force = press["force_sampled" if front == "raw" else "force_measured"][rows]
     far = np.where(np.abs(x) > 2e-5, x, np.nan)
     left[0].plot(t, force, color=color, linewidth=0.7, label=name)
     left[1].plot(t, 1e3 * x, color=color, linewidth=1.1)
     left[2].plot(t, 1e-3 * force / far, color=color, linewidth=0.7)
     for axis, (key, (_, scale)) in zip(right, PARAMETERS.items(), strict=True):
-        axis.plot(t, scale * press[f"{key}_{front}"][shown], color=color, linewidth=1.1)
+        axis.plot(t, scale * press[f"{key}_{front}"][rows], color=color, linewidth=1.1)
 
 
 def calm_limits(axis: Axes, *curves: Array, margin: float = 0.25) -> None:
-    """The panel's scale from curves without their first moments; a press that ended before has none."""
-    seen = [c for c in curves if np.isfinite(c).any()]
-    if not seen:
+    """Set the scale of a panel from curves without their first moments; without a finite value it stays."""
+    finite = [c for c in curves if np.isfinite(c).any()]
+    if not finite:
         return
-    low = min(float(np.nanmin(c)) for c in seen)
-    high = max(float(np.nanmax(c)) for c in seen)
+    low = min(float(np.nanmin(c)) for c in finite)
+    high = max(float(np.nanmax(c)) for c in finite)
     room = margin * max(high - low, 1e-9)
     axis.set_ylim(low - room, high + room)
 
 
 def calm_ratio(press: Record, force: str = "force_measured") -> Array:
-    """f/x of the first slot without its first moments [kN/m]."""
+    """f/x in the first slot after `CALM` [kN/m]."""
     return 1e-3 * calm(press, force, press_runs.FIRST) / calm(press, "displacement", press_runs.FIRST)
 
 
 def calm(press: Record, column: str, stop: float) -> Array:
-    """A column between its first moments and `stop`."""
+    """A column from `CALM` to `stop` [s]."""
     return press[column][between(press, CALM, stop)]
-
-
-def dots(axis: Axes, groups: Mapping[str, Mapping[str, list[float]]], colors: Mapping[str, str]) -> None:
-    """For each named row, the values of each named group as dots on a line."""
-    rows = list(dict.fromkeys(name for group in groups.values() for name in group))
-    for shift, (label, group) in enumerate(groups.items()):
-        offset = 0.22 * (shift - (len(groups) - 1) / 2)
-        for i, name in enumerate(rows):
-            values = group.get(name, [])
-            mark: Any = {"color": colors[label], "markersize": 3.5, "label": None if i else label}
-            axis.plot(values, np.full(len(values), i + offset), "o", **mark)
-    axis.set_yticks(range(len(rows)), rows)
-    axis.invert_yaxis()

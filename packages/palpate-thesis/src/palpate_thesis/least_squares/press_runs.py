@@ -1,4 +1,4 @@
-"""Common parts of the least-squares figures: presses, their measures, varied conditions."""
+"""Presses for the least-squares figures, their estimates, and varied conditions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
@@ -9,8 +9,7 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.conditions import move_wall, rougher
-from palpate_thesis.runs import VARIED_SEEDS, Runs
+from palpate_thesis.runs import VARIED_SEEDS, Runs, move_wall, rougher
 
 T = TypeVar("T")
 
@@ -23,13 +22,13 @@ SLOT = (6.0, 8.0)
 
 
 def own_damping(surface: Mapping[str, Any]) -> float:
-    """A surface's own B [N s/m]: at 20 N where it grows with the depth; of one that relaxes, its dashpot's."""
+    """Damping of a surface [N s/m]: at 20 N if it grows with the depth; of a relaxing one, that of its dashpot."""
     damping = float(surface["damping"])
     return damping * 20.0 / float(surface["stiffness"]) if surface["kind"] == "hunt-crossley" else damping
 
 
 def nearer(experiment: Experiment) -> Experiment:
-    """The same press after a shorter way in the same steps: the way to the surface costs most of a run's time."""
+    """The press with a shorter approach in steps of the same size: the approach takes most of a run's time."""
     wall = experiment.wall.x
     return with_values(
         experiment,
@@ -50,7 +49,7 @@ COLUMNS = (
 
 
 def contact(record: Record) -> Record:
-    """The first press of a run: the columns that least squares deals with, the clock at zero at the change-over."""
+    """First press of a run: the columns for least squares, with time zero at the change-over to hybrid control."""
     pressing = record["phase"] == CONTACT
     start = int(np.argmax(pressing))
     later = np.flatnonzero(~pressing[start:])
@@ -61,18 +60,18 @@ def contact(record: Record) -> Record:
 
 
 def between(press: Record, start: float, stop: float) -> Mask:
-    """Which samples of a press lie in a slot of time [s]."""
+    """Mask of the samples of a press in a time slot [s]."""
     return (press["t"] >= start) & (press["t"] < stop)
 
 
 def at(press: Record, column: str, time: float) -> float:
-    """A column's value `time` seconds after the change-over; not a number where the press was shorter."""
+    """Value of a column `time` seconds after the change-over; NaN if the press was shorter."""
     i = round(time * 1000)
     return float(press[column][i]) if i < len(press) else float("nan")
 
 
 def ratio(press: Record, slot: tuple[float, float] = SLOT) -> float:
-    """Mean force over mean displacement in a slot [N/m]: the thesis' "f/x"."""
+    """Mean force over mean displacement in a time slot [N/m]: the thesis' "f/x"."""
     inside = between(press, *slot)
     if not inside.any():
         return float("nan")
@@ -80,9 +79,9 @@ def ratio(press: Record, slot: tuple[float, float] = SLOT) -> float:
 
 
 def settled_after(values: Array, end: float = FIRST, band: float = 0.10, tick: float = 1e-3) -> float:
-    """Time from which values stay within `band` of what they are at `end` [s]."""
-    shown = values[: round(end / tick)]
-    outside = np.flatnonzero(np.abs(shown - shown[-1]) > band * abs(shown[-1]))
+    """Time from which values stay within `band` of their value at `end` [s]."""
+    values = values[: round(end / tick)]
+    outside = np.flatnonzero(np.abs(values - values[-1]) > band * abs(values[-1]))
     return (float(outside[-1]) + 1.0) * tick if len(outside) else 0.0
 
 
@@ -107,7 +106,7 @@ def trajectory(phi: Array, y: Array, start: Sequence[float], covariance: Sequenc
 
 
 def thesis_signals(press: Record) -> tuple[Array, Array]:
-    """Regressor (a, v, x) and force as the thesis' own estimator sees them."""
+    """Regressor (a, v, x) and force of the thesis' estimator."""
     phi = np.column_stack([press["ax_measured"], press["vx_raw"], press["displacement"]])
     return phi, press["force_measured"]
 
@@ -129,10 +128,10 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
 
 
 class PressEstimates(NamedTuple):
-    """Results of one press."""
+    """Least-squares estimates of one press."""
 
     ratio: float  # f/x in the later slot [N/m]
-    M: float  # estimates at the end of the later slot
+    M: float  # at the end of the later slot, as B and K
     B: float
     K: float
     M_raw: float
@@ -141,22 +140,22 @@ class PressEstimates(NamedTuple):
     settled_M: float  # [s]
     settled_B: float
     settled_K: float
-    early_apart: float  # K at 4 s against f/x of the second before it, as a share
-    true_B: float  # of the surface; of one that relaxes, its dashpot's, of one that stiffens, that at 20 N [N s/m]
+    early_apart: float  # relative difference of K at 4 s and f/x of the second before
+    true_B: float  # damping of the surface: see `own_damping` [N s/m]
 
     @property
     def apart(self) -> float:
-        """K against f/x, as a share of f/x."""
+        """Relative difference of K and f/x."""
         return self.K / self.ratio - 1.0
 
     @property
     def apart_raw(self) -> float:
-        """The same of K from raw signals."""
+        """Relative difference of K from raw signals and f/x."""
         return self.K_raw / self.ratio - 1.0
 
 
-def numbers_of(record: Record) -> PressEstimates:
-    """The numbers of one run."""
+def press_estimates(record: Record) -> PressEstimates:
+    """Estimates of the first press of a run."""
     press = contact(record)
     end = SLOT[1] - 0.002
     values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
@@ -168,22 +167,22 @@ def numbers_of(record: Record) -> PressEstimates:
 
 
 def sweep(runs: Runs, experiments: Mapping[str, Experiment]) -> dict[str, list[PressEstimates]]:
-    """Results of the presses of each experiment, over the first few seeds."""
-    return runs.by_name(experiments, numbers_of, VARIED_SEEDS)
+    """Estimates of the presses of each experiment, over the first few seeds."""
+    return runs.by_name(experiments, press_estimates, VARIED_SEEDS)
 
 
 def median(values: Sequence[float] | Array) -> float:
-    """The middle one, without those that have no value."""
+    """Median of the values that are numbers."""
     return float(np.nanmedian(np.asarray(values, dtype=float)))
 
 
-def failing(answers: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> list[str]:
-    """The names of the varied conditions under which a claim does not hold for most of the seeds."""
-    return [name for name, some in answers.items() if 2 * sum(map(holds, some)) <= len(some)]
+def failing(results: Mapping[str, Sequence[T]], holds: Callable[[T], bool]) -> list[str]:
+    """Names of the varied conditions under which a claim does not hold for most of the seeds."""
+    return [name for name, presses in results.items() if 2 * sum(map(holds, presses)) <= len(presses)]
 
 
 def where_it_fails(fails: Sequence[str], among: int) -> str:
-    """In words, where a claim stops holding."""
+    """Sentence with the varied conditions under which a claim does not hold."""
     if not fails:
         return f"It holds under all {among} varied conditions (friction, pose, the surface's M and B)."
     if len(fails) == among:

@@ -16,8 +16,8 @@ TIME = (0.3, 0.9)
 SMALL = 1.0
 """Upper limit of a small mass [kg]."""
 FOAM_BAND, RUBBER_BAND = 0.06, 0.15
-"""How far K may be from f/x, as a share of it: "almost same" is said of less than 6 % in sec. 6.1; on rubber the
-thesis' own are 10 % apart."""
+"""Maximum relative difference of K and f/x. Section 6.1 says "almost same" of less than 6 %; on rubber the thesis' own
+values are 10 % apart."""
 
 
 class Grounds(NamedTuple):
@@ -28,8 +28,8 @@ class Grounds(NamedTuple):
         nominal: every start on the press of every noise seed.
         swept: variations of the network's unstated parameters.
         varied: friction, pose, surface.
-        perfect: what K would come out as, over f/x, if the network knew the surface without error.
-        starts: how many there are for each noise seed in `nominal`, in order.
+        perfect: K over f/x of a network that knows the surface without error.
+        starts: number of starts for each noise seed in `nominal`.
     """
 
     surface: str
@@ -41,7 +41,7 @@ class Grounds(NamedTuple):
 
 
 class ClaimPart(NamedTuple):
-    """One statement about one coefficient, or about the error: its number in one run, and whether it is true there."""
+    """A statement about a coefficient or the error: its number in one run, and the condition for its truth."""
 
     suffix: str
     value: Callable[[NetworkAnswer], float]
@@ -101,7 +101,7 @@ def _numbers(grounds: Grounds, values: Sequence[float]) -> dict[str, Any]:
         if law in grounds.varied
     ]
     by_start = np.reshape(values, (-1, grounds.starts))
-    times = {c.amplitude: some for c, some in grounds.swept.items() if c == NetworkChoice(c.amplitude)}
+    times = {c.amplitude: answers for c, answers in grounds.swept.items() if c == NetworkChoice(c.amplitude)}
     gone = (f"{np.median([x.error_gone for x in s]):.2g} s at {a:g} N" for a, s in times.items())
     middle = {
         k: float(np.median([getattr(a, k) for a in nominal])) for k in ("error_gone", "at_zero", "K", "ratio")
@@ -149,18 +149,18 @@ def describe_spread(values: Sequence[float], unit: str, starts: int) -> str:
 
 
 def enough(answers: Sequence[NetworkAnswer], part: ClaimPart) -> bool:
-    """Whether a claim holds in enough of the runs."""
+    """True if a claim holds in enough of the runs."""
     return share(answers, part) >= ENOUGH
 
 
 def share(answers: Sequence[NetworkAnswer], part: ClaimPart) -> float:
-    """Share of the runs in which a claim holds."""
+    """Fraction of the runs in which a claim holds."""
     return sum(map(part.holds, answers)) / len(answers)
 
 
 def where(grounds: Grounds, part: ClaimPart) -> str:
-    """A sentence: over which part of the sweep a claim holds."""
-    good = [choice for choice, some in grounds.swept.items() if enough(some, part)]
+    """Sentence with the part of the sweep in which a claim holds."""
+    good = [choice for choice, answers in grounds.swept.items() if enough(answers, part)]
     among = f"{len(grounds.swept)} combinations of output amplitude, initial weights and thresholds"
     if not good:
         return f"It holds for none of {among}."
@@ -179,8 +179,8 @@ def _region(good: Sequence[NetworkChoice]) -> str:
 
 
 def under(grounds: Grounds, part: ClaimPart) -> str:
-    """A sentence: under which varied conditions the networks as chosen agree with the claim."""
-    good = [name for name, some in grounds.varied.items() if enough(some, part)]
+    """Sentence with the varied conditions under which the networks as chosen agree with the claim."""
+    good = [name for name, answers in grounds.varied.items() if enough(answers, part)]
     bad = [name for name in grounds.varied if name not in good]
     if not bad:
         return "As chosen, it holds under every varied condition too (friction, pose, surface)."
@@ -190,8 +190,8 @@ def under(grounds: Grounds, part: ClaimPart) -> str:
 
 
 def _jointly(grounds: Grounds, parts: Sequence[ClaimPart]) -> str:
-    """A sentence: whether any one network satisfies all parts."""
-    most = max(sum(enough(some, p) for p in parts) for some in grounds.swept.values())
+    """Sentence with the most parts that one network satisfies."""
+    most = max(sum(enough(answers, p) for p in parts) for answers in grounds.swept.values())
     if most == len(parts):
         return f"Some combination shows all {most} parts of the claim at once."
     return f"No combination shows more than {most} of the {len(parts)} parts of the claim at once."

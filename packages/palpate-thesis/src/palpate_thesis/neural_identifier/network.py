@@ -1,4 +1,4 @@
-"""Common parts of the neural-identifier figures: presses, the networks that learn from them, their answers."""
+"""Presses for the neural identifier, networks that learn from them, and their answers."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -112,7 +112,7 @@ class NetworkChoice(NamedTuple):
         )
 
 
-def network_of(runs: Runs) -> NetworkChoice:
+def chosen_network(runs: Runs) -> NetworkChoice:
     """The network of the runs' laboratory."""
     return NetworkChoice(runs.laboratory.amplitude, runs.laboratory.weights)
 
@@ -154,8 +154,8 @@ def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAns
     probe, answers = learn(press, choice, start)
     K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
     k, b, m = (press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
-    asked = probe.probe()
-    last = asked.force_at_zero, tangent(probe, press.rest), bool(asked.warnings)
+    probed = probe.probe()
+    last = probed.force_at_zero, tangent(probe, press.rest), bool(probed.warnings)
     squares_B, gone = float(press.squares[-1, 1]), error_gone(answers[:, 3])
     return NetworkAnswer(K, B, M, press.ratio, squares_B, k, b, m, gone, *last)
 
@@ -184,19 +184,21 @@ def error_gone(error: Array) -> float:
 
 
 def answers(
-    runs: Runs, some: Sequence[NetworkPress], choice: NetworkChoice, from_: Sequence[int] | None = None
+    runs: Runs, contacts: Sequence[NetworkPress], choice: NetworkChoice, from_: Sequence[int] | None = None
 ) -> list[NetworkAnswer]:
     """Every start on every press."""
-    cases = [(press, choice, start) for press in some for start in (starts(runs) if from_ is None else from_)]
+    cases = [
+        (press, choice, start) for press in contacts for start in (starts(runs) if from_ is None else from_)
+    ]
     return runs.map(lambda case: answer(*case), cases)
 
 
 def sweep(
-    runs: Runs, some: Sequence[NetworkPress], choices: Sequence[NetworkChoice] = tuple(SWEEP)
+    runs: Runs, contacts: Sequence[NetworkPress], choices: Sequence[NetworkChoice] = tuple(SWEEP)
 ) -> dict[NetworkChoice, list[NetworkAnswer]]:
     """For each choice as many answers as there are presses, each of them with a start of its own if there are many."""
-    own = starts(runs)
-    first = [(press, i if len(own) > 1 else own[0]) for i, press in enumerate(some)]
+    own_starts = starts(runs)
+    first = [(press, i if len(own_starts) > 1 else own_starts[0]) for i, press in enumerate(contacts)]
     cases = {choice: [(press, choice, start) for press, start in first] for choice in choices}
     return runs.map_each(lambda case: answer(*case), cases)
 
@@ -213,9 +215,9 @@ def answers_under_conditions(
     runs: Runs, experiment: Experiment, surface: str
 ) -> dict[str, list[NetworkAnswer]]:
     """Answers of networks as chosen under each condition."""
-    some = varied_presses(runs, experiment, surface)
-    own = starts(runs)[:VARIED_STARTS]
-    return {name: answers(runs, few, network_of(runs), own) for name, few in some.items()}
+    varied = varied_presses(runs, experiment, surface)
+    few_starts = starts(runs)[:VARIED_STARTS]
+    return {name: answers(runs, few, chosen_network(runs), few_starts) for name, few in varied.items()}
 
 
 def varied_presses(runs: Runs, experiment: Experiment, surface: str) -> Mapping[str, list[NetworkPress]]:

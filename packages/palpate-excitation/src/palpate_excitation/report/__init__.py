@@ -1,1 +1,0 @@
-"""A force to ask for: its figure, its table, its files."""

@@ -1,1 +1,0 @@
-"""How a study's figures and its page are drawn."""

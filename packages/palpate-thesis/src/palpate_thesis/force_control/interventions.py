@@ -1,0 +1,191 @@
+"""Runs whose state is looked at or changed between ticks: the network's weights, the surface, the desired pose."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from palpate._vector import Vec3
+from palpate.arrays import Array
+from palpate.bench import Experiment, build
+from palpate.bench.force_input import COLUMNS
+from palpate.bench.plant import Loop, LoopState
+from palpate.bench.summary import CONTACT, DIVERGED, DONE, LOST
+from palpate.controllers import alone
+from palpate.controllers.neural import NeuralState
+from palpate.environments import KelvinVoigt, join
+from palpate.records import Record
+
+LOOK = 1000
+"""Ticks between two looks at the weights, unless others are given."""
+COLUMN = {name: i for i, name in enumerate(COLUMNS)}
+
+
+class WeightsAtMoment(NamedTuple):
+    """State of the controller, and the rows since the previous look."""
+
+    t: float  # since contact [s]
+    rows: Array  # of the ticks in contact since the previous look, shape (n, columns)
+    neural: NeuralState | None  # None of any other controller
+
+
+def watch(
+    experiment: Experiment,
+    seed: int,
+    duration: float,
+    look: Callable[[WeightsAtMoment], None],
+    waiting: Callable[[], None] | None = None,
+    every: int = LOOK,
+) -> float | None:
+    """Run like `Bench.run`, from the same random numbers, without a record, until contact is lost.
+
+    Args:
+        experiment: any; `look` is called in contact.
+        seed: of the noise.
+        duration: of contact [s].
+        look: called between ticks of contact with the controller's own weights: it may change them, and has to copy
+            what it stores.
+        waiting: called when the loop has to be compiled first.
+        every: ticks between two looks.
+
+    Returns:
+        Time from contact to its loss [s]; None if it was not lost, NaN if there was none.
+    """
+    march = build(experiment).simulation(seed, waiting=waiting)
+    while march.ticks * march.loop.tick < experiment.run.duration + duration:
+        rows = march.advance(every)
+        if march.contact is None:
+            continue
+        phase = rows[:, COLUMN["phase"]]
+        lost = (phase == LOST) | ~np.isfinite(rows).all(axis=1)
+        if lost.any():
+            return (march.ticks - every + int(np.argmax(lost)) - march.contact) * march.loop.tick
+        _, state = alone(march.loop.controller, march.state.controller)
+        neural = state if isinstance(state, NeuralState) else None
+        look(WeightsAtMoment(march.since_contact, rows[phase == CONTACT], neural))
+        if march.since_contact >= duration:
+            return None
+    return None if march.contact is not None else float("nan")
+
+
+WEIGHT_COLUMNS = {"poses": slice(1, 7), "motor 1's torque": slice(7, 8), "all torques": slice(7, 10)}
+"""Columns of the hidden weights of the 9-12-3 network, by their inputs."""
+HOLD_INTERVAL = 20
+"""Ticks after which weights that are held at zero are set back."""
+
+
+def layers(state: NeuralState) -> tuple[Array, Array]:
+    """Weights of the hidden and of the output layer of the 9-12-3 network, shapes (12, 10) and (3, 13); views."""
+    w = state.network.weights
+    return w[:120].reshape(12, 10), w[120:].reshape(3, 13)
+
+
+def hold(columns: slice) -> Callable[[WeightsAtMoment], None]:
+    """A look that sets these columns of the hidden weights to zero."""
+
+    def look(moment: WeightsAtMoment) -> None:
+        if moment.neural is not None:
+            layers(moment.neural)[0][:, columns] = 0.0
+
+    return look
+
+
+CONTACT_LOOK = 100
+"""Ticks between two looks for the first contact."""
+
+Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
+
+
+class Disturbance(NamedTuple):
+    """A change between two ticks.
+
+    Args:
+        at: time since the first contact [s], at least a tenth of a second.
+        change: returns the changed loop and state, of the same types, so that nothing is compiled again.
+    """
+
+    at: float
+    change: Change
+
+
+def run_with(experiment: Experiment, seed: int, disturbances: Sequence[Disturbance]) -> Record:
+    """Run like `Bench.run`, from the same random numbers, for `press` seconds of contact, with the disturbances.
+
+    Args:
+        experiment: any; it runs on after losses of contact.
+        seed: of the noise.
+        disturbances: in the order of their times.
+
+    Returns:
+        Rows up to the end, or to the first that is not finite; ``meta["disturbances"]`` has the times [s].
+    """
+    bench = build(experiment)
+    tick, march = bench.loop.tick, bench.simulation(seed)
+    rows = [march.advance(CONTACT_LOOK)]
+    while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
+        rows.append(march.advance(CONTACT_LOOK))
+    contact = march.ticks if march.contact is None else march.contact
+    for at, change in [(t.at, t.change) for t in disturbances] + [(experiment.run.press, None)]:
+        remaining = contact + round(at / tick) - march.ticks
+        if remaining > 0 and _finite(rows):
+            rows.append(march.advance(remaining))
+        if change is not None:
+            march.loop, march.state = change(march.loop, march.state)
+    table = np.concatenate(rows)
+    finite = np.isfinite(table).all(axis=1)
+    table = table if finite.all() else table[: int(np.argmin(finite))]
+    columns = {name: table[:, i].copy() for i, name in enumerate(COLUMNS)}
+    times = [contact * tick + disturbance.at for disturbance in disturbances]
+    end = DONE if finite.all() else DIVERGED
+    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "end": end, "disturbances": times})
+
+
+def _finite(rows: Sequence[np.ndarray]) -> bool:
+    return bool(np.isfinite(rows[-1]).all())
+
+
+def other_surface(surface: KelvinVoigt) -> Change:
+    """Replace the surface under the tip, at the depth at which the new spring carries the present force."""
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        arm: Any = loop.plant.arm
+        tip = arm.pose(state.plant.q).x
+        deep = state.felt.normal / surface.stiffness
+        plant = loop.plant._replace(surface=join(surface), wall=tip - deep)
+        touched = state.plant.surface._replace(deflection=deep, internal=0.0)
+        return loop._replace(plant=plant), state._replace(plant=state.plant._replace(surface=touched))
+
+    return change
+
+
+def surface_back(by: float) -> Change:
+    """Retract the surface by a distance [m]."""
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        return loop._replace(plant=loop.plant._replace(wall=loop.plant.wall + by)), state
+
+    return change
+
+
+def desired_pose(by: Vec3) -> Change:
+    """Let the desired pose jump [m, m, rad], as the arm sees it.
+
+    A task has one pose. So the arm is moved by the opposite of the jump at an unchanged rate, and the controller's
+    memory of the previous tick with it: the error then develops as after a jump of the desired pose.
+    """
+
+    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
+        arm: Any = loop.plant.arm
+        motion: Any = loop.conditioning.motion
+        q = state.plant.q
+        there = arm.inverse(arm.pose(q) - by, 1.0 if q.y >= 0.0 else -1.0)
+        past, by_q = state.conditioning, there - q
+        settled = motion.start_at(by_q.z)
+        past = past._replace(
+            q=past.q + by_q,
+            x=past.x - by,
+            angle=type(past.angle)(past.angle.s1 + settled.s1, past.angle.s2 + settled.s2),
+        )
+        return loop, state._replace(plant=state.plant._replace(q=there), conditioning=past)
+
+    return change

@@ -1,0 +1,1 @@
+"""Search for the laboratory in which the thesis' sentences hold."""

@@ -1,0 +1,240 @@
+"""LaboratorySearch for the laboratory in which most of the thesis' sentences hold at once; resumable."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from palpate.errors import InputError
+from palpate.files import MADE, check_place, kept_folder, with_author, write_json, write_text
+from palpate.studies.plan import Sobol
+from palpate.studies.run_one import map_unordered
+from palpate_thesis.inference.sentences import Sentence, halves, sentences, true_ids
+from palpate_thesis.inference.trial import Trial
+from palpate_thesis.laboratory import BENCH, UNKNOWNS, Laboratory, laboratory_at, laboratory_text
+from palpate_thesis.runs import sources_digest
+
+Fractions = tuple[float, ...]
+"""A point of the search: for each unknown the fraction of its prior below the value, 0 to 1."""
+STATE, INFERRED = "laboratory.json", "inferred.toml"
+GENERATION = 16
+"""Laboratories tried before parents are chosen again; fixed, so that no result depends on the number of threads."""
+PRIOR_FRACTION = 0.25
+"""Fraction of the tries that are drawn from the prior, before children of the best are tried."""
+PARENTS, RANK_SCALE = 25, 2.5
+"""Number of the best laboratories that have children, and the scale of the exponential distribution of their rank."""
+MAX_REDRAWN = 4
+"""Maximum unknowns in which a child differs from its parent."""
+CANDIDATES = 3
+"""Best laboratories of the search that are judged over all seeds."""
+SEEDS, FULL_STEPS = tuple(range(10)), 20
+"""Seeds of the noise, and steps of the physics in a tick, of a judgement: those of the figures."""
+
+
+class TriedLaboratory(msgspec.Struct, frozen=True):
+    """A point of the search and the sentences that held there, by their names."""
+
+    fractions: Fractions
+    true: tuple[str, ...]
+
+
+class SearchState(msgspec.Struct):
+    """Content of the state file.
+
+    Args:
+        stamp: identity of the search.
+        tried: laboratories in the order of their numbers.
+        judged: number of `SEEDS` in which each sentence held, by the values of a laboratory.
+    """
+
+    stamp: str
+    tried: list[TriedLaboratory] = []
+    judged: dict[str, dict[str, int]] = {}
+
+
+@dataclass(frozen=True)
+class JudgedLaboratory:
+    """A laboratory and the number of `SEEDS` in which each sentence held, by the sentence's name."""
+
+    laboratory: Laboratory
+    held: Mapping[str, int]
+
+    def count_true(self, among: Iterable[Sentence]) -> int:
+        """Number of sentences that hold by their claims' own rules."""
+        return sum(s.is_true(self.held[s.id], len(SEEDS)) for s in among)
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The best laboratory of a search and the hand-chosen bench, both over all seeds."""
+
+    tried: int
+    bench: JudgedLaboratory
+    inferred: JudgedLaboratory
+
+    @property
+    def laboratories(self) -> dict[str, JudgedLaboratory]:
+        """Both laboratories by name."""
+        return {"hand-chosen bench": self.bench, "inferred": self.inferred}
+
+    def as_json(self) -> dict[str, Any]:
+        """Results as the numbers of --json."""
+        return {
+            "tried": self.tried,
+            "true": {
+                name: {half: {"true": lab.count_true(of), "of": len(of)} for half, of in halves().items()}
+                for name, lab in self.laboratories.items()
+            },
+            "laboratories": {name: lab.laboratory.numbers() for name, lab in self.laboratories.items()},
+            "sentences": {
+                s.id: {name: lab.held[s.id] for name, lab in self.laboratories.items()} for s in sentences()
+            },
+        }
+
+
+@dataclass(frozen=True)
+class LaboratorySearch:
+    """Settings of a search.
+
+    Args:
+        folder: for the state and the inferred laboratory.
+        command: command line that is written into the laboratory.
+        tries: number of laboratories; rounded up to whole generations.
+        seed: of everything drawn.
+        half: True to search by the sentences of the calibration half alone.
+        threads: number of threads.
+        progress: called with the name of the work, the number done and the total.
+    """
+
+    folder: Path
+    command: str
+    tries: int
+    seed: int = 1
+    half: bool = False
+    threads: int = 1
+    progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None
+
+    @property
+    def sentences(self) -> tuple[Sentence, ...]:
+        """Sentences of the thesis that decide the search."""
+        return tuple(s for s in sentences() if s.searched and (s.calibrates or not self.half))
+
+    def run(self, *, replace: bool = False) -> SearchResult:
+        """LaboratorySearch on from the state of the folder, and write the best laboratory.
+
+        Raises:
+            InputError: the folder holds another search or something else, and `replace` is off.
+        """
+        with kept_folder(self.folder, STATE, replace=replace):
+            state = self._load()
+            self._save(state)
+            while len(state.tried) < self.tries:
+                state.tried += self._try_generation(self.propose(state.tried), len(state.tried))
+                self._save(state)
+            best = [laboratory_at(point) for point in find_best(state.tried)]
+            bench, *judged = [self._judge(state, laboratory) for laboratory in (BENCH, *best)]
+            wanted = halves()["calibration" if self.half else "all"]
+            inferred = max(judged, key=lambda lab: lab.count_true(wanted))
+            self._write(inferred)
+            return SearchResult(len(state.tried), bench, inferred)
+
+    def propose(self, tried: Sequence[TriedLaboratory]) -> list[Fractions]:
+        """Points of the next generation: from the prior at first, then children of the best."""
+        done = len(tried)
+        if done < PRIOR_FRACTION * self.tries:
+            sobol = Sobol(len(UNKNOWNS), self.seed)
+            return [tuple(sobol.point(number)) for number in range(done, done + GENERATION)]
+        parents = sorted(tried, key=lambda laboratory: -len(laboratory.true))[:PARENTS]
+        rng = np.random.default_rng([self.seed, done])
+        return [_make_child(parents, rng) for _ in range(GENERATION)]
+
+    def _try_generation(self, points: Sequence[Fractions], first: int) -> list[TriedLaboratory]:
+        """Try the points with a noise of their own each; the runs under way stop with the caller."""
+        stop = threading.Event()
+
+        def attempt(number: int) -> tuple[int, TriedLaboratory]:
+            point = points[number - first]
+            trial = Trial(laboratory_at(point), number, stopped=stop.is_set)
+            return number, TriedLaboratory(point, true_ids(trial, self.sentences))
+
+        results: dict[int, TriedLaboratory] = {}
+        try:
+            for number, result in map_unordered(attempt, range(first, first + len(points)), self.threads):
+                results[number] = result
+                self.progress("laboratories", first + len(results), max(self.tries, first + len(points)))
+        finally:
+            stop.set()
+        return [results[number] for number in sorted(results)]
+
+    def _judge(self, state: SearchState, laboratory: Laboratory) -> JudgedLaboratory:
+        key = str(laboratory.numbers())
+        if key not in state.judged:
+            state.judged[key] = dict(self._count_seeds(laboratory))
+            self._save(state)
+        return JudgedLaboratory(laboratory, Counter(state.judged[key]))
+
+    def _count_seeds(self, laboratory: Laboratory) -> Counter[str]:
+        """Number of seeds in which each sentence holds."""
+
+        def attempt(seed: int) -> tuple[str, ...]:
+            return true_ids(Trial(laboratory, seed, FULL_STEPS, stop.is_set), sentences())
+
+        stop = threading.Event()
+        held: Counter[str] = Counter()
+        try:
+            for done, ids in enumerate(map_unordered(attempt, SEEDS, self.threads), 1):
+                held.update(ids)
+                self.progress("a laboratory over all seeds", done, len(SEEDS))
+        finally:
+            stop.set()
+        return held
+
+    def _load(self) -> SearchState:
+        path = self.folder / STATE
+        stamp = f"{sources_digest()} tries {self.tries} seed {self.seed} half {self.half}"
+        if not path.exists():
+            return SearchState(stamp)
+        check_place(path)
+        try:
+            state = msgspec.json.decode(path.read_bytes(), type=SearchState)
+        except (OSError, msgspec.DecodeError) as error:
+            raise InputError(
+                f"{path} is damaged ({error}); remove it, and the search starts again"
+            ) from error
+        if state.stamp != stamp:
+            raise InputError(
+                f"{path} is of another search, or of other sources; choose another --out, or add --replace to "
+                "start again"
+            )
+        return state
+
+    def _save(self, state: SearchState) -> None:
+        write_json(self.folder / STATE, with_author(msgspec.to_builtins(state)))
+
+    def _write(self, inferred: JudgedLaboratory) -> None:
+        about = f"{len(sentences())} sentences of the thesis; {inferred.count_true(sentences())} hold."
+        text = laboratory_text(inferred.laboratory, about, self.command)
+        write_text(self.folder / INFERRED, f"{MADE} laboratory --laboratory\n{text}")
+
+
+def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:
+    """Points with most true sentences; of equal ones the earliest."""
+    ranked = sorted(tried, key=lambda laboratory: -len(laboratory.true))
+    return [laboratory.fractions for laboratory in ranked[:CANDIDATES]]
+
+
+def _make_child(parents: Sequence[TriedLaboratory], rng: np.random.Generator) -> Fractions:
+    """A parent, chosen by its rank, with a few unknowns drawn anew from the prior."""
+    rank = min(int(rng.exponential(RANK_SCALE)), len(parents) - 1)
+    point = list(parents[rank].fractions)
+    count = int(rng.integers(1, MAX_REDRAWN + 1))
+    for i in rng.choice(len(point), count, replace=False):
+        point[i] = float(rng.random())
+    return tuple(point)

@@ -1,0 +1,279 @@
+"""A laboratory: values of the parameters that the thesis does not state, and their effect on an experiment."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib import resources
+from typing import Any, Literal
+
+from palpate.bench import Experiment, with_values
+from palpate.bench.toml_parts import TomlFiles
+from palpate.controllers.neural import NeuralController
+from palpate.environments import KelvinVoigtSurface
+from palpate.errors import InputError, unknown
+from palpate.files import read_toml
+
+FILES = TomlFiles("laboratory", "a", "palpate_thesis", ("laboratories",))
+KEYS = {"about", "command", "unknowns"}
+LINEAR, RELAXING, STIFFENING = 0.0, 1.0, 2.0
+"""Laws of the foam: spring and damper, standard linear solid, Hunt and Crossley."""
+LISTING = -1.0
+"""Controller weights that are those of the listing; other values are seeds of random weights."""
+SWITCH, DESIRED = 5.0, 20.0
+"""Forces between which a stiffness is a secant; a damping is given at the second [N]."""
+FOAM_LIMIT = 15000.0
+"""A linear surface of the bench below this stiffness is foam, above it rubber [N/m]."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter that the thesis does not state.
+
+    Args:
+        name: field of `Laboratory`.
+        unit: of its values; "" for a number without one.
+        prior: distribution of its values: even, even in the logarithm, one of a few with equal probability, or a seed.
+        low, high: range; of a choice, the first and the last value.
+        reason: of the range.
+        choices: possible values, if they are a few.
+    """
+
+    name: str
+    unit: str
+    prior: Literal["even", "log-even", "one of", "any seed"]
+    low: float
+    high: float
+    reason: str
+    choices: tuple[float, ...] = ()
+
+    def quantile(self, fraction: float) -> float:
+        """The value below which this fraction of the prior lies, 0 to 1."""
+        if self.prior == "log-even":
+            return math.exp((1.0 - fraction) * math.log(self.low) + fraction * math.log(self.high))
+        if self.prior == "even":
+            return (1.0 - fraction) * self.low + fraction * self.high
+        values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
+        return float(values[min(int(fraction * len(values)), len(values) - 1)])
+
+    def check(self, value: Any, where: str) -> float:
+        """Return a value as a number.
+
+        Raises:
+            InputError: it is no number, or out of range.
+        """
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError(f"{where}: {self.name} must be a number, got {value!r}")
+        if value in self.choices or (not self.choices and self.low <= value <= self.high):
+            return float(value)
+        wanted = f"one of {list(self.choices)}" if self.choices else f"between {self.low:g} and {self.high:g}"
+        raise InputError(f"{where}: {self.name} must be {wanted} {self.unit}".rstrip() + f", got {value:g}")
+
+
+def _read_unknowns() -> tuple[Unknown, ...]:
+    text = (resources.files("palpate_thesis") / "unknowns.toml").read_text("utf-8")
+    unknowns = []
+    for name, row in tomllib.loads(text).items():
+        choices = tuple(row.get("choices", ()))
+        low, high = row.get("range", (*choices[:1], *choices[-1:]))
+        unknowns.append(Unknown(name, row.get("unit", ""), row["prior"], low, high, row["reason"], choices))
+    return tuple(unknowns)
+
+
+UNKNOWNS = _read_unknowns()
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """Values of the unknowns, with the units and ranges of unknowns.toml; the defaults are the hand-chosen bench.
+
+    All values are relative to the bench: what a figure varies, such as half the friction or a nearer wall, is varied
+    about the laboratory's own value. If `start` is None, the figures try several seeds of the identifier's weights.
+    """
+
+    friction: float = 1.0
+    stiction: float = 1.2
+    presliding: float = 1.0
+    asymmetry: float = 0.0
+    foam_law: float = LINEAR
+    foam_stiffness: float = 5200.0
+    foam_damping: float = 200.0
+    foam_mass: float = 0.1
+    foam_branch: float = 1.0
+    foam_branch_time: float = 0.1
+    foam_exponent: float = 1.5
+    rubber_stiffness: float = 34500.0
+    rubber_damping: float = 480.0
+    rubber_mass: float = 0.05
+    sticking: float = 0.7
+    noise: float = 0.6
+    beyond: float = 0.0
+    roughness: float = 0.0
+    covariance: float = 1e10
+    initial_stiffness: float = 2e5
+    amplitude: float = 40.0
+    weights: float = 0.5
+    start: float | None = None
+    controller_weights: float = LISTING
+    wall: float = 0.465
+    motor2: float = 2.5
+    arm_stiffness: float = math.inf
+    arm_frequency: float = 100.0
+    arm_damping: float = 0.02
+    restart: float = 5.0
+
+    @property
+    def is_bench(self) -> bool:
+        """True of the hand-chosen bench."""
+        return self == BENCH
+
+    def numbers(self) -> dict[str, float]:
+        """Finite values by name."""
+        return {k: v for k, v in asdict(self).items() if v is not None and math.isfinite(v)}
+
+    def adapt(self, experiment: Experiment) -> Experiment:
+        """The experiment as this laboratory would have run it."""
+        if self.is_bench:
+            return experiment
+        parts = (self._friction, self._place, self._sensor, self._identification, self._controller)
+        changes = {key: value for part in parts for key, value in part(experiment).items()}
+        if isinstance(experiment.surface, KelvinVoigtSurface):  # other laws are tried by figures on purpose
+            changes["surface"] = self._surface(experiment.surface)
+        return with_values(experiment, changes)
+
+    def _friction(self, e: Experiment) -> dict[str, Any]:
+        f = e.friction
+        level = tuple(self.friction * c for c in f.coulomb)
+        ratio = self.stiction / BENCH.stiction
+        static = tuple(
+            max(1.0, ratio * s / c) * a for s, c, a in zip(f.static, f.coulomb, level, strict=True)
+        )
+        stiffer = self.friction * self.presliding
+        damping = self.friction * math.sqrt(self.presliding)
+        return {
+            "friction.coulomb": level,
+            "friction.static": static,
+            "friction.bristle_stiffness": tuple(stiffer * v for v in f.bristle_stiffness),
+            "friction.bristle_damping": tuple(damping * v for v in f.bristle_damping),
+            "friction.asymmetry": self.asymmetry,
+        }
+
+    def _place(self, e: Experiment) -> dict[str, Any]:
+        offset, (x, y, phi) = self.wall - BENCH.wall, e.robot.start
+        first, second, third = e.robot.torque_limits
+        place: dict[str, Any] = {
+            "wall.x": e.wall.x + offset,
+            "robot.start": (x + offset, y, phi),
+            "approach.first": e.approach.first + offset,
+            "wall.side_friction": e.wall.side_friction * self.sticking / BENCH.sticking,
+            "robot.torque_limits": (first, second * self.motor2 / BENCH.motor2, third),
+        }
+        if math.isfinite(self.arm_stiffness):
+            place["elastic"] = {
+                "stiffness": self.arm_stiffness,
+                "frequency": self.arm_frequency,
+                "damping": self.arm_damping,
+            }
+        return place
+
+    def _sensor(self, e: Experiment) -> dict[str, Any]:
+        return {
+            "force_sensor.noise": e.force_sensor.noise * self.noise / BENCH.noise,
+            "force_sensor.beyond": self.beyond,
+            "force_sensor.roughness": self.roughness,
+        }
+
+    def _identification(self, e: Experiment) -> dict[str, Any]:
+        mass, damping, _ = e.identification.initial
+        return {
+            "identification.covariance": e.identification.covariance * self.covariance / BENCH.covariance,
+            "identification.initial": (mass, damping, self.initial_stiffness),
+        }
+
+    def _controller(self, e: Experiment) -> dict[str, Any]:
+        changes: dict[str, Any] = {"force.restart": self.restart} if e.force.restart > 0.0 else {}
+        has_listed_weights = isinstance(e.controller, NeuralController) and e.controller.weights == "thesis"
+        if has_listed_weights and self.controller_weights != LISTING:
+            changes["controller.weights"] = "random"
+            changes["controller.weights_seed"] = int(self.controller_weights)
+        return changes
+
+    def _surface(self, surface: KelvinVoigtSurface) -> dict[str, Any]:
+        """The foam or the rubber of this laboratory, varied as `surface` is varied from the bench's."""
+        name = "foam" if surface.stiffness < FOAM_LIMIT else "rubber"
+        linear: dict[str, Any] = {"kind": "kelvin-voigt"}
+        for key in ("stiffness", "damping", "mass"):
+            own, of_bench = (getattr(lab, f"{name}_{key}") for lab in (self, BENCH))
+            linear[key] = own * getattr(surface, key) / of_bench
+        if name == "rubber" or self.foam_law == LINEAR:
+            return linear
+        if self.foam_law == STIFFENING:
+            return stiffening(linear["stiffness"], linear["damping"], linear["mass"], self.foam_exponent)
+        return {
+            **linear,
+            "kind": "standard-linear-solid",
+            "branch_stiffness": self.foam_branch * linear["stiffness"],
+            "branch_time": self.foam_branch_time,
+        }
+
+
+BENCH = Laboratory()
+
+
+def stiffening(secant: float, damping: float, mass: float, exponent: float) -> dict[str, Any]:
+    """The Hunt-Crossley surface with this secant from 5 to 20 N [N/m] and this damping at 20 N [N s/m]."""
+    spread = DESIRED ** (1.0 / exponent) - SWITCH ** (1.0 / exponent)
+    stiffness = (spread * secant / (DESIRED - SWITCH)) ** exponent
+    return {
+        "kind": "hunt-crossley",
+        "stiffness": stiffness,
+        "damping": damping * stiffness / DESIRED,
+        "exponent": exponent,
+        "mass": mass,
+    }
+
+
+def laboratory_at(fractions: Sequence[float]) -> Laboratory:
+    """The laboratory at these fractions of the priors, 0 to 1, in the order of `UNKNOWNS`."""
+    return Laboratory(**{u.name: u.quantile(f) for u, f in zip(UNKNOWNS, fractions, strict=True)})
+
+
+def load_laboratory(name: str) -> Laboratory:
+    """A laboratory by its name ("bench" or "inferred"), or from a TOML file.
+
+    Raises:
+        InputError: no such laboratory or file, TOML that does not parse, an unknown key, a value out of range.
+    """
+    if name == "bench":
+        return BENCH
+    tables = read_toml(FILES.source(name), name)
+    strange = sorted(set(tables) - KEYS)
+    if strange:
+        raise InputError(f"{name}: unknown key {strange[0]!r}; a laboratory has {', '.join(sorted(KEYS))}")
+    values: Any = tables.get("unknowns")
+    if not isinstance(values, dict):
+        raise InputError(f"{name}: no table [unknowns]; a laboratory has its values there")
+    return laboratory_from(values, name)
+
+
+def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
+    """A laboratory from named values; the others are the bench's.
+
+    Raises:
+        InputError: a name that is no unknown, a value that is no number or out of its range.
+    """
+    by_name = {unknown.name: unknown for unknown in UNKNOWNS}
+    for name in values:
+        if name not in by_name:
+            raise InputError(f"{where}: {unknown('unknown of the laboratory', name, tuple(by_name))}")
+    return Laboratory(**{name: by_name[name].check(value, where) for name, value in values.items()})
+
+
+def laboratory_text(laboratory: Laboratory, about: str, command: str) -> str:
+    """A laboratory as a TOML file that `load_laboratory` reads."""
+    values = [f"{name} = {value!r}" for name, value in laboratory.numbers().items()]
+    head = [f"about = {json.dumps(about)}", f"command = {json.dumps(command)}"]
+    return "\n".join([*head, "", "[unknowns]", *values]) + "\n"

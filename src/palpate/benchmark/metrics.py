@@ -1,0 +1,183 @@
+"""Metrics of force control, from the force and the desired force of one run.
+
+The quantities are those that NISTIR 8097 (Falco, Marvel, Norcross, Van Wyk: Benchmarking Robot Force Control
+Capabilities, 2016) and the tree of robots (Nature Machine Intelligence, 2025, doi 10.1038/s42256-025-00995-y) ask for;
+the definitions are those below, made so that one record gives one number.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.arrays import Array
+from palpate.bench.summary import BAND, settling_time
+from palpate.benchmark.plan import LINES, PERIOD, STEP_HEIGHT, SWAY, SWAYS, ForcePlan
+
+MAX_OVERSHOOT = 0.1
+"""Largest overshoot of a touch that passes, over the desired force."""
+FIRM_CONTACT = 0.5
+"""Force over the desired one from which a loss of contact counts."""
+
+
+@dataclass(frozen=True)
+class TouchMetrics:
+    """The transition from free motion to contact.
+
+    Args:
+        settling: from the first contact until the force stays within 5 % of F_d [s]; None if it does not.
+        overshoot: largest force over F_d, less 1.
+        bounces: losses of contact between the first contact and half of F_d.
+        lost: losses of contact after that.
+        error: mean of the force less F_d over the last second [N].
+        deviation: standard deviation of the force over the last second [N].
+    """
+
+    settling: float | None
+    overshoot: float
+    bounces: int
+    lost: int
+    error: float
+    deviation: float
+
+    @property
+    def passed(self) -> bool:
+        """True if the force settled, was at most 10 % over, and kept contact."""
+        return self.settling is not None and self.overshoot <= MAX_OVERSHOOT and not self.lost
+
+
+def touch(force: Array, desired: float, rate: float) -> TouchMetrics:
+    """Metrics of a touch.
+
+    Args:
+        force: on the surface [N], shape (n,), from free motion on.
+        desired: F_d [N].
+        rate: of the rows [Hz].
+    """
+    contact = force > 0.0
+    last_second = force[-round(rate) :]
+    if not np.isfinite(force).all():
+        return TouchMetrics(None, math.inf, 0, 0, math.nan, math.nan)
+    if not contact.any():
+        return TouchMetrics(None, 0.0, 0, 0, -desired, math.nan)
+    start = int(np.argmax(contact))
+    firm = force > FIRM_CONTACT * desired
+    first_firm = int(np.argmax(firm)) if firm.any() else len(force)
+    ends = np.flatnonzero(contact[:-1] & ~contact[1:])
+    return TouchMetrics(
+        _settling(force[start:], desired, rate),
+        float(force.max() / desired - 1.0),
+        int((ends < first_firm).sum()),
+        int((ends >= first_firm).sum()),
+        float(last_second.mean() - desired),
+        float(last_second.std()),
+    )
+
+
+def _settling(force: Array, desired: float, rate: float) -> float | None:
+    return settling_time(np.arange(len(force)) / rate, np.abs(force - desired) > BAND * desired)
+
+
+@dataclass(frozen=True)
+class StepMetrics:
+    """A step of the desired force in contact.
+
+    Args:
+        rise: from 10 to 90 % of the step [s]; None if it never came there.
+        settling: until the force stays within 5 % of the new F_d [s]; None if it does not.
+        overshoot: beyond the new F_d, over the step.
+    """
+
+    rise: float | None
+    settling: float | None
+    overshoot: float
+
+
+def step(force: Array, before: float, after: float, rate: float) -> StepMetrics:
+    """Metrics of a step.
+
+    Args:
+        force: from the step on [N], shape (n,).
+        before: F_d before it [N].
+        after: F_d after it [N].
+        rate: of the rows [Hz].
+    """
+    progress = (force - before) / (after - before)
+    reached = [progress >= level for level in (0.1, 0.9)]
+    rise = None
+    if all(rows.any() for rows in reached):
+        start, end = (int(np.argmax(rows)) for rows in reached)
+        rise = (end - start) / rate
+    return StepMetrics(rise, _settling(force, after, rate), max(float(progress.max()) - 1.0, 0.0))
+
+
+def response(force: Array, desired: Array, lines: tuple[int, ...], periods: int) -> Array:
+    """Complex ratio of force to desired force at lines of a periodic signal, shape (lines,).
+
+    Args:
+        force: over a whole number of periods [N], shape (n,).
+        desired: likewise [N], shape (n,).
+        lines: frequencies in units of one over the period.
+        periods: in n.
+    """
+    at = periods * np.array(lines)
+    return np.fft.rfft(force)[at] / np.fft.rfft(desired)[at]
+
+
+def bandwidth(frequency: Array, ratio: Array) -> float | None:
+    """Lowest frequency at which |ratio| falls to 1/sqrt(2) [Hz], logarithmic between lines; None above the last."""
+    size = np.abs(ratio)
+    below = np.flatnonzero(size < math.sqrt(0.5))
+    if not len(below):
+        return None
+    k = int(below[0])
+    if k == 0:
+        return float(frequency[0])
+    low, high = np.log(size[k - 1 : k + 1])
+    fraction = (low - 0.5 * math.log(0.5)) / (low - high)
+    return float(frequency[k - 1] * (frequency[k] / frequency[k - 1]) ** fraction)
+
+
+@dataclass(frozen=True)
+class RunMetrics:
+    """Metrics of one run of the plan, and of one with a moving surface.
+
+    Args:
+        touch: the first contact.
+        up, down: the steps.
+        bandwidth: of force over desired force [Hz]; None beyond the plan's highest frequency.
+        resonance: largest size of that ratio.
+        disturbance: rms error while the surface moves, over the one of a tip that rests.
+    """
+
+    touch: TouchMetrics
+    up: StepMetrics
+    down: StepMetrics
+    bandwidth: float | None
+    resonance: float
+    disturbance: float
+
+
+def run_metrics(plan: ForcePlan, force: Array, moving: Array, at_rest: float) -> RunMetrics:
+    """Metrics of a run.
+
+    Args:
+        plan: of the desired force.
+        force: on the surface in a run of it [N], shape (n,).
+        moving: the same while the surface moves and F_d is constant [N], shape (m,).
+        at_rest: amplitude of the force that this motion causes on a tip that rests [N].
+    """
+    first, second, third, _ = plan.starts
+    high = (1.0 + STEP_HEIGHT) * plan.force
+    begin = third + plan.ticks(PERIOD)
+    periods = (len(force) - begin) // plan.ticks(PERIOD)
+    ratio = response(force[begin:], plan.desired_force()[begin:], LINES, periods)
+    last = moving[-plan.ticks(SWAYS / SWAY) :]
+    return RunMetrics(
+        touch(force[:first], plan.force, plan.rate),
+        step(force[first:second], plan.force, high, plan.rate),
+        step(force[second:third], high, plan.force, plan.rate),
+        bandwidth(np.array(LINES) / PERIOD, ratio),
+        float(np.abs(ratio).max()),
+        float(np.sqrt(np.mean((last - plan.force) ** 2)) / (at_rest / math.sqrt(2.0))),
+    )

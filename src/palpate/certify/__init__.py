@@ -1,0 +1,1 @@
+"""Stability of force loops: certificates of tuned gains, and their independent check."""

@@ -1,1 +1,0 @@
-"""Estimators: from a problem and a model to a fit."""
