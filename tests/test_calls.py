@@ -2,6 +2,7 @@
 
 import re
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import polars as pl
 import pytest
 
 import palpate
+from palpate.identification.options import OPTION_NAMES
 
 LOG = Path(__file__).parents[1] / "examples/data/press.csv"
 COLUMNS = {"time": "time_s", "position": "position_mm:mm", "force": "force_N:N"}
@@ -83,8 +85,15 @@ def test_a_lag_may_be_a_pair(record):
     assert palpate.identify(record, lag=(5e-3, 1e-3)) == palpate.identify(record, lag=5e-3, lag_std=1e-3)
 
 
+def test_each_option_is_a_parameter_that_an_editor_completes():
+    known = set(signature(palpate.identify).parameters)
+    assert {*OPTION_NAMES} <= known
+    assert {"time", "position", "force", "rate", "start", "end", "missing", "delimiter"} <= known
+
+
 def test_parameters_by_name(record):
     found = palpate.identify(record)
+    assert {"K", "B", "M", "plot"} <= {*dir(found)}
     assert found.K is found.parameters["K"]
     with pytest.raises(AttributeError, match="no 'E'; its parameters are K, B, M"):
         found.E  # noqa: B018

@@ -15,6 +15,7 @@ from palpate.identification import pool as pool_found
 from palpate.identification.options import OPTION_NAMES
 from palpate.logs import read_log as read
 from palpate.records import Record
+from palpate.signals.low_pass import LowPass
 from palpate.text import in_python
 
 _READ = {name for name, own in signature(read).parameters.items() if own.kind is own.KEYWORD_ONLY}
@@ -23,19 +24,68 @@ _WORDS = {"model", "force_filter", "bonded"}
 _PAIRS = {"mass", "series_mass"}
 
 
-def identify(source: Record | Any, **options: Any) -> Identification:
+# More than seven arguments: each option by its name, so that an editor and a notebook complete it.
+def identify(
+    source: Record | Any,
+    *,
+    time: str | None = None,
+    position: str | None = None,
+    force: str | None = None,
+    rate: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    missing: Sequence[str | float] | None = None,
+    delimiter: str | None = None,
+    model: str | None = None,
+    lag: float | tuple[float, float] | None = None,
+    lag_std: float | None = None,
+    force_filter: str | LowPass | None = None,
+    mass: tuple[float, float] | None = None,
+    calibration: float | None = None,
+    series_stiffness: float | None = None,
+    series_std: float | None = None,
+    series_mass: tuple[float, float] | None = None,
+    bonded: bool | None = None,
+    force_sign: int | None = None,
+    cutoff: float | None = None,
+    tolerance: float | None = None,
+    **columns: Any,
+) -> Identification:
     """Find what a probe touched, and how far to trust it.
 
     `palpate.identify("press.csv", time="time_s", position="position_mm:mm", force="force_N:N", lag=(5e-3, 1e-3))`
 
     Args:
         source: a `Record`; or a log that `palpate.read_log` reads: a path, a DataFrame, an Arrow table.
-        options: of `palpate.identification.options.Options` (lag, force_filter, mass, ...), and for a log those of
-            `palpate.read_log`, its columns among them. A lag may be a pair, its value and its standard deviation [s].
+        time: column of a log, a name or `NAME:UNIT`.
+        position: likewise.
+        force: likewise.
+        rate: rows per second of a log without a time [1/s].
+        start: leave out the rows before it, in seconds from the first row [s].
+        end: leave out the rows from it on, likewise [s].
+        missing: values that mean "no reading".
+        delimiter: between two cells of a text file.
+        model: kelvin-voigt, kelvin-voigt-mass, standard-linear-solid, hunt-crossley or quasi-linear-viscoelastic;
+            chosen if not given.
+        lag: how much later the force is read than the position [s]; or that and its standard deviation.
+        lag_std: standard deviation of the lag [s].
+        force_filter: the force sensor's low-pass, as "butterworth3:120", or "none".
+        mass: prior of the mass and its standard deviation [kg]; 0 fixes it.
+        calibration: relative standard deviation of the scales of force and position together.
+        series_stiffness: between the position sensor and the surface [N/m].
+        series_std: its standard deviation [N/m].
+        series_mass: mass between that stiffness and the surface, and its standard deviation [kg].
+        bonded: True if the probe is fixed to the surface, False if not.
+        force_sign: 1 if the force grows as the probe presses, -1 if it falls.
+        cutoff: of the filter chain [Hz].
+        tolerance: largest half-width of an identified parameter's interval, as a fraction of its value.
+        columns: further columns and options of `palpate.read_log`.
 
     Raises:
         InputError: the log or an option is wrong, in one line.
     """
+    given = {name: value for name, value in locals().items() if name not in {"source", "columns"}}
+    options = {name: value for name, value in given.items() if value is not None} | columns
     with _in_python():
         if isinstance(source, str | Path) and not {*options} - _OPTIONS:
             return identify_log_file(source, **_split(options, columns=True)[1])

@@ -70,8 +70,12 @@ class Result(Compared):
     def __str__(self) -> str:
         return str(lazy.report().text(self))
 
+    def __dir__(self) -> list[str]:
+        """Attributes, the identified parameters (`K`, `B`, ...) among them, for completion."""
+        return [*super().__dir__(), *getattr(self, "parameters", ())]
+
     def _repr_html_(self) -> str:
-        """HTML for a notebook; nothing in it runs, whatever the names in a log are."""
+        """HTML for a notebook, with the picture; nothing in it runs, whatever the names in a log are."""
         return str(lazy.report().html(self))
 
     def plot(self, path: str | Path | None = None) -> Any:

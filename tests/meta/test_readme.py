@@ -144,6 +144,22 @@ def test_the_log_of_the_readme_is_identified(root, capsys, monkeypatch, tmp_path
     assert "K" in capsys.readouterr().out
 
 
+def test_the_readme_shows_what_the_demo_prints(program, root, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (shown,) = blocks(root, "README.md", "text")
+    assert "palpate demo" in commands(root, "README.md", "palpate")
+    ran = program("demo")
+    assert ran.returncode == 0
+    assert [line.rstrip() for line in ran.stdout.splitlines()][
+        : len(shown.splitlines())
+    ] == shown.splitlines()
+    (tmp_path / "press.csv").write_text("a log of somebody else")
+    ran = program("demo")
+    assert ran.returncode == 2
+    assert "not the demo's" in ran.stderr
+    assert (tmp_path / "press.csv").read_text() == "a log of somebody else"
+
+
 def test_the_readme_shows_in_the_checkout():
     """Every link and picture is a file beside it, and the pictures are few and small."""
     targets = re.findall(r"\]\(([^)#]+)[^)]*\)", (ROOT / "README.md").read_text(encoding="utf-8"))

@@ -115,7 +115,10 @@ def test_a_distribution_installs_alone_and_its_commands_start(wheels, libraries,
     modules = [path.relative_to(folder / "src").as_posix() for path in (folder / "src").glob("*/__init__.py")]
     run(python, "-c", f"import {modules[0].split('/')[0]}", cwd=empty)
     if own["name"] == "palpate":
-        shutil.copy(ROOT / "examples/data/press.csv", empty)
-        columns = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
-        assert "N/m" in run(program, "identify", "press.csv", *columns, cwd=empty)
+        printed = run(program, "demo", cwd=empty)
+        assert "✓ identified" in printed
+        shown = [line.split()[1:] for line in printed.splitlines() if line.startswith("  palpate ")]
+        assert [words[0] for words in shown] == ["identify", "tune", "press"]
+        for words in shown:
+            run(program, *words, cwd=empty)
         assert "foam-hybrid" in run(program, "run", "--list", cwd=empty)

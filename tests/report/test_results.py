@@ -50,8 +50,9 @@ class Tags(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
-        self.open.append(tag)
         self.seen.add(tag)
+        if tag != "img":  # it has no end
+            self.open.append(tag)
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
@@ -104,7 +105,21 @@ def test_a_notebook_gets_a_table_and_nothing_that_runs(request, name):
     html = request.getfixturevalue(name)._repr_html_()
     tags = Tags(html)
     assert not tags.open
-    assert tags.seen == {"div", "p", "b", "table", "tr", "th", "td"}
+    assert tags.seen == {"div", "p", "b", "table", "tr", "th", "td", "img"}
+    assert html.count('<img src="data:image/svg+xml;base64,') == 1
+
+
+def test_a_notebook_gets_the_answer_without_its_picture(found):
+    html = replace(found, traces=None)._repr_html_()
+    assert "identified" in html
+    assert "no picture: this identification holds no traces" in html
+
+
+def test_text_is_whole_in_the_kernel_of_a_notebook(found, monkeypatch):
+    """There rich would show each line as an output of its own, and the text would be empty."""
+    outside = str(found)
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    assert str(found) == outside
 
 
 def test_names_of_a_stranger_are_shown_and_do_nothing(found, tmp_path):

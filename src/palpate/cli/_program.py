@@ -35,6 +35,7 @@ EXPANDED: ContextVar[tuple[str, ...]] = ContextVar("EXPANDED", default=())
 # In the order of the help. Each is a function of its own name in the module of its own name,
 # and returns its exit code. The line is repeated here so that the help imports none of them.
 COMMANDS = {
+    "demo": "Identify a log that comes with palpate, and say what to type next.",
     "identify": "Identify the touched surface from a log: stiffness, damping, mass.",
     "payload": "Identify a tool from a log of free motion: mass, centre, the sensor's bias.",
     "topics": "List the signals of a log: topics, variables, columns.",
@@ -58,7 +59,7 @@ COMMANDS = {
 
 _PROGRAM = Group("The program itself", sort_key=5)
 GROUPS = {
-    Group("From a log", sort_key=1): ("identify", "payload", "topics", "excite", "map"),
+    Group("From a log", sort_key=1): ("demo", "identify", "payload", "topics", "excite", "map"),
     Group("Force loop", sort_key=2): ("tune", "certify", "press", "slide"),
     Group("Simulate", sort_key=3): ("export", "run", "live", "study", "checks"),
     Group("Thesis and references", sort_key=4): ("benchmark", "laboratory", "references", "thesis"),

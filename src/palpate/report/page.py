@@ -189,11 +189,11 @@ def answer_page(
 
 def answer_html(answer: Answer) -> str:
     """The answer for a notebook: sentence, tables and notes, escaped and without a script."""
-    parts = [f"<p><b>{_safe(_head(answer))}</b></p>"]
+    parts = [f"<p><b>{safe(_head(answer))}</b></p>"]
     for table in answer.tables:
         rows = [_html_row(table.head, "th"), *(_html_row(row, "td") for row in table.rows)]
         parts.append(f"<table>{''.join(rows)}</table>")
-    return f"<div>{''.join([*parts, *(f'<p>{_safe(note)}</p>' for note in answer.notes)])}</div>"
+    return f"<div>{''.join([*parts, *(f'<p>{safe(note)}</p>' for note in answer.notes)])}</div>"
 
 
 def _head(answer: Answer) -> str:
@@ -201,9 +201,10 @@ def _head(answer: Answer) -> str:
 
 
 def _html_row(cells: Sequence[str], tag: str) -> str:
-    inside = "".join(f'<{tag} style="text-align:left">{_safe(cell)}</{tag}>' for cell in cells)
+    inside = "".join(f'<{tag} style="text-align:left">{safe(cell)}</{tag}>' for cell in cells)
     return f"<tr>{inside}</tr>"
 
 
-def _safe(text: str) -> str:
+def safe(text: str) -> str:
+    """The text for HTML: escaped, nothing invisible in it."""
     return escape(printable(text), quote=True)

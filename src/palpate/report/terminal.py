@@ -86,8 +86,15 @@ def answer_text(answer: Answer) -> str:
     from rich.console import Console
 
     file = StringIO()
+    # In a notebook's kernel, rich would show each line as an output of its own and write none into the file.
     console = Console(
-        file=file, width=_NOTEBOOK_WIDTH, no_color=True, markup=False, emoji=False, highlight=False
+        file=file,
+        width=_NOTEBOOK_WIDTH,
+        force_jupyter=False,
+        no_color=True,
+        markup=False,
+        emoji=False,
+        highlight=False,
     )
     show_answer(answer, console)
     return printable("\n".join(line.rstrip() for line in file.getvalue().rstrip().splitlines()))

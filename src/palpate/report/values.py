@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.files import check_place, write_text
 from palpate.report import style
-from palpate.report.page import answer_html
+from palpate.report.page import answer_html, data_address, safe
 from palpate.report.terminal import answer_text
 from palpate.signals.types import NORMAL
 from palpate.text import in_python, printable
@@ -55,8 +55,17 @@ def text(result: Any) -> str:
 
 
 def html(result: Any) -> str:
-    """The result's sentence and tables for a notebook, escaped and without a script."""
-    return in_python(answer_html(_view_module(result).build_answer(result)))
+    """The result's sentence, tables and picture for a notebook, escaped and without a script.
+
+    The answer depends on no picture: where none can be drawn, the reason stands in its place.
+    """
+    view = _view_module(result)
+    try:
+        source = data_address(style.svg(view.draw(result)), "image/svg+xml")
+        picture = f'<img src="{source}" alt="{safe(line(result))}" style="max-width: 100%">'
+    except Exception as error:  # noqa: BLE001 - a drawing fails in as many ways as there are logs
+        picture = f"<p>no picture: {safe(in_python(str(error)))}</p>"
+    return in_python(answer_html(view.build_answer(result))) + picture
 
 
 def plot(result: Any, path: Path | None) -> Figure:
