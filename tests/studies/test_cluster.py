@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import subprocess
 import threading
 import time
@@ -61,6 +62,21 @@ def test_two_workers_make_the_table_that_threads_make_and_one_may_die(cluster, t
     assert on(cluster.address, tmp_path / "one") == here
     killer.join()
     assert cluster.workers[0].wait() != 0
+
+
+@pytest.mark.long
+def test_the_runs_of_a_frozen_worker_are_sent_again(tmp_path, here):
+    with local_cluster(tmp_path, workers=2) as running:
+        frozen = running.workers[0]
+        killer = threading.Timer(0.3, lambda: frozen.send_signal(signal.SIGSTOP))
+        killer.start()
+        begin = time.monotonic()
+        try:
+            assert on(running.address, tmp_path / "out") == here
+            assert time.monotonic() - begin < 60.0
+        finally:
+            killer.join()
+            frozen.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.long

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import pickle
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
@@ -21,6 +22,11 @@ MAX_SENT = 1000
 """Tasks at the cluster at most: enough for hundreds of workers, little memory."""
 PATIENCE = 30.0
 """Time within which a cluster must have a worker [s]."""
+QUIET, QUIET_FACTOR = 5.0, 3.0
+"""Time without a result [s], and its multiple of the longest one before, after which a task that a worker has is sent
+again: the worker may be frozen. A task gives the same result wherever it runs, and the first one counts."""
+POLL = 0.01
+"""Time between two looks for a result [s]."""
 CONNECT = 10.0
 """Time within which a scheduler must answer [s]."""
 
@@ -129,19 +135,31 @@ class Cluster:
         Raises:
             InputError: the scheduler went away, or the workers cannot do it.
         """
-        waiting = iter(items)
-        sent: dict[Any, A] = {}
+        waiting = enumerate(items)
+        unfinished: dict[int, A] = {}
+        sent: dict[Any, int] = {}
 
-        def send(item: A) -> Any:
-            future = self._client.submit(work, item, pure=False)
-            sent[future] = item
-            return future
+        def send(tasks: Iterable[tuple[int, A]]) -> list[Any]:
+            futures = []
+            for number, item in tasks:
+                future = self._client.submit(work, item, pure=False)
+                unfinished[number], sent[future] = item, number
+                futures.append(future)
+            return futures
 
         try:
-            first = [send(item) for item in islice(waiting, MAX_SENT)]
-            completed = self._dask.as_completed(first, loop=self._client.loop)
-            for future in completed:
-                item = sent.pop(future)
+            completed = self._dask.as_completed(send(islice(waiting, MAX_SENT)), loop=self._client.loop)
+            longest = 0.0
+            while unfinished:
+                begin = time.monotonic()
+                limit = max(QUIET, QUIET_FACTOR * longest)
+                _wait(completed, limit, lambda: completed.update(send(list(unfinished.items()))))
+                longest = max(longest, time.monotonic() - begin)
+                future = next(completed)
+                number = sent.pop(future)
+                if number not in unfinished:  # a task that was sent twice
+                    continue
+                item = unfinished.pop(number)
                 try:
                     result: B = future.result()
                 except self._dask.KilledWorker as error:
@@ -149,8 +167,7 @@ class Cluster:
                         raise
                     result = killed(item, _first_line(error))
                 yield result
-                for following in islice(waiting, 1):
-                    completed.add(send(following))
+                completed.update(send(islice(waiting, 1)))
         except InputError:
             raise
         except Exception as error:
@@ -161,6 +178,16 @@ class Cluster:
         finally:
             if sent and self._client.status == "running":
                 self._client.cancel(list(sent), force=True)
+
+
+def _wait(completed: Any, limit: float, send_again: Callable[[], None]) -> None:
+    """Wait for a result; after each time without one [s], ever longer ones, the tasks are sent again."""
+    begin = time.monotonic()
+    while not completed.has_ready():
+        if time.monotonic() - begin > limit:
+            send_again()
+            limit *= QUIET_FACTOR
+        time.sleep(POLL)
 
 
 def _killed_row(packed: PackedJob, error: str) -> Row:
