@@ -103,7 +103,7 @@ def test_layers_within_the_cap_stay_below_the_bound(seed):
 
 BROKEN = {
     "the speed is not limited": ({}, None),
-    "the sensor shows half of the force": ({"sensor": lambda force: 0.5 * force}, 60.0),
+    "the sensor shows a quarter of the force": ({"sensor": lambda force: 0.25 * force}, 60.0),
     "the surface comes towards the tip": ({"carried": 0.1}, 60.0),
 }
 
