@@ -225,6 +225,7 @@ def gains_for(
     *,
     cap: float | None = None,
     theta: float | None = None,
+    limit: float | None = None,
     force_max: float | None = None,
 ) -> Gains:
     """The law's gains for an arm that presses with a force.
@@ -234,8 +235,8 @@ def gains_for(
         force: F_d, the smallest that will be asked for [N].
         cap: stiffest surface that there may be, K + B/theta [N/m]; the arm's limit if left out.
         theta: whole lag of the loop [s]; the arm's own if left out.
-        force_max: F_max, which the force shall not exceed, and above which a reading makes the tip withdraw [N]; the
-            sensor's full scale is that reading if left out.
+        limit: force above which the tip withdraws [N]; F_max, or else the sensor's full scale, if left out.
+        force_max: F_max, which the force shall not exceed [N]; none if left out.
 
     Raises:
         InputError: numbers that no loop can be tuned for.
@@ -253,7 +254,7 @@ def gains_for(
         )
     return Gains(
         arm=arm, force=force, theta=theta, cap=cap, relief=_known_relief(_any_noise(arm), theta),
-        force_limit=arm.sensor.full_scale if force_max is None else force_max, force_max=force_max,
+        force_limit=limit or force_max or arm.sensor.full_scale, force_max=force_max,
         approach=approach, level=free_motion_level(arm, force),
     )  # fmt: skip
 
