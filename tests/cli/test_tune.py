@@ -263,7 +263,10 @@ def test_straight_from_a_log(capsys, root):
             ("--stiffness", "1e2:1e4", "--stiffness-cap", "1e3", "--arm", "ur5e", "--force", "20"),
             "below what",
         ),
-        (("--stiffness", "1e2:1e6", "--peak", "20.5", "--arm", "ur5e", "--force", "20"), "no approach speed"),
+        (
+            ("--stiffness", "1e2:1e6", "--force-max", "20.5", "--arm", "ur5e", "--force", "20"),
+            "must be above 22.4 N",
+        ),
         (("--stiffness", "1e2:1e4", "--arm", "ur5e", "--force", "20", "--out", "g.json"), "toml"),
         (("missing.json", "--arm", "ur5e", "--force", "20"), "missing.json"),
         (("x.json", "--stiffness", "1:2", "--arm", "ur5e", "--force", "20"), "not both"),

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 from palpate.cli import _streams
 from palpate.cli.options.common import PluginOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, WireOptions
+from palpate.cli.options.values import si
 from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop
+from palpate.force.gains import check_same_force_max, reading_error
 from palpate.press.engines import mass_note
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise, tool_notes
 from palpate.wires.opening import open_wire, wire_class_name
@@ -59,9 +61,9 @@ def press_over(
     if options.record is not None and options.record.exists():
         raise InputError(f"{options.record} exists; choose another place for --record")
     assert request.gains is not None
-    order = check_order(
-        ForceLoop.load(request.gains, options.certificate), replace(task, path=path), press_limits
-    )
+    loop = ForceLoop.load(request.gains, options.certificate)
+    check_same_force_max(loop.gains, si(request.force_max))
+    order = check_order(loop, replace(task, path=path), press_limits)
     tool = request.tool
     with PluginOptions().consent(given=wire_class_name(str(options.wire))[0] or ""):
         arm = open_wire(str(options.wire))
@@ -181,6 +183,13 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     task, limits, gains = order.task, order.limits, order.loop.gains
     x, y, z = task.direction
     lowered = f" (lowered by {100.0 * task.probe:g} % three times)" if task.probe else ""
+    behind = (
+        "no F_max: a hard surface behind a soft layer is met at the speed limit; palpate tune --force-max bounds that"
+        if gains.force_max is None
+        else f"if something hard lies behind: at most {gains.force_max:g} N, by a commanded speed of at most"
+        f" {1e3 * gains.speed_at(task.force):.3g} mm/s, while a reading is off by at most"
+        f" {reading_error(gains.arm, task.force):.3g} N"
+    )
     last = 1e3 * (gains.theta + gains.arm.tick)
     path = task.path
     along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
@@ -206,7 +215,7 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
             f"note: a force is as true as its sensor, ± {gains.arm.sensor.accuracy:g} N by its maker"
         )
     dies = f"if this process dies: {arm.watchdog}"
-    return [arms, does, stops, dies, _describe_lying_sensor(gains, limits), record_line, *notes]
+    return [arms, does, behind, stops, dies, _describe_lying_sensor(gains, limits), record_line, *notes]
 
 
 def _describe_lying_sensor(gains: Gains, limits: PressLimits) -> str:

@@ -64,8 +64,9 @@ def tune(
     output.check_new(output.out, ending=".toml")
     from palpate.report.tuning import build_answer
 
-    tuning, loop = _tune(arm, press, surface, columns, found)
-    tuning = replace(tuning, gains=(slide or force.SlideTuningOptions()).tuned_for(tuning.gains))
+    slide = slide or force.SlideTuningOptions()
+    tuning, loop = _tune(arm, press, surface, columns, found, slides=slide.slide)
+    tuning = replace(tuning, gains=slide.tuned_for(tuning.gains))
     written = [output.out] if output.out is not None else []
     for path in written:
         write_text(path, tuning.gains.to_toml())
@@ -82,6 +83,8 @@ def _tune(
     surface: force.SurfaceOptions,
     columns: force.ColumnOptions,
     source: Path | None,
+    *,
+    slides: bool,
 ) -> tuple[Tuning, dict[str, Any] | None]:
     """The tuned loop, and the inner loop that a log identifies, as plain JSON values."""
     from palpate.force import tune as tune_loop
@@ -93,7 +96,7 @@ def _tune(
         press.force.si,
         _known_surface(source, surface, columns),
         cap=si(surface.stiffness_cap),
-        peak=si(press.peak),
+        force_max=press.highest_force(loaded_arm, slides=slides),
         theta=None if theta is None else theta.high,
     )
     return tuning, None if inner is None else inner.to_json() | (

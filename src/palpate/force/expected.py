@@ -46,7 +46,7 @@ def settling_bound(gains: Gains, stiffness: float, damping: float = 0.0) -> floa
         stiffness: K of the surface itself [N/m].
         damping: B [N s/m].
     """
-    travel = gains.force / (stiffness * gains.arm.limits.speed)
+    travel = gains.force / (stiffness * gains.speed)
     rise_time = RISES * rise(gains, stiffness)
     return (
         LAGS * gains.theta

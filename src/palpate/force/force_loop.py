@@ -117,7 +117,17 @@ class PressingLoop(Readable):
                 f"the desired force must be from {least:g} N (8 standard deviations of the noise) to below the force "
                 f"limit of {most:g} N, got {value:g} N"
             )
-        self._desired = value
+        if self.gains.speed_at(value) < self.gains.approach:
+            raise InputError(
+                f"a desired force of {value:g} N leaves no speed that keeps F_max = {self.gains.force_max:g} N; tune "
+                "with a higher --force-max"
+            )
+        if value != self._desired:
+            self._desired = value
+            self._limit_speed()
+
+    def _limit_speed(self) -> None:
+        """Adapt the speed limit to the desired force; a loop without F_max has nothing to adapt."""
 
 
 class ForceLoop(PressingLoop):
@@ -149,7 +159,8 @@ class ForceLoop(PressingLoop):
         self.gains = gains
         self.certificate = certificate
         self._desired = gains.force
-        self._numbers = flatten(gains.cautious())
+        self._limit = np.inf
+        self._limit_speed()
         self._state = np.zeros(STATE + GUARD)
         self.reset()
         self._bind()
@@ -181,8 +192,12 @@ class ForceLoop(PressingLoop):
         Raises:
             InputError: it is below the approach, or no finite number.
         """
-        numbers = self.gains.cautious()
-        self._numbers = flatten(numbers._replace(speed=min(numbers.speed, check_speed(speed, self.gains))))
+        self._limit = check_speed(speed, self.gains)
+        self._limit_speed()
+
+    def _limit_speed(self) -> None:
+        speed = min(self.gains.speed_at(self._desired), self._limit)
+        self._numbers = flatten(self.gains.cautious()._replace(speed=speed))
 
     def update(self, force: float, position: float, missed: float = 0.0) -> float:
         """The speed of the commanded position for this tick [m/s].

@@ -15,7 +15,8 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import as_toml, read_text
-from palpate.force.arm import Arm, PositionLoop, Positive, ServoLoop, Table, from_toml
+from palpate.force.arm import Arm, PositionLoop, Positive, Sensor, ServoLoop, Table, from_toml
+from palpate.force.ceiling import speed_ceiling
 from palpate.force.lag import lag_of, relief_of
 from palpate.force.law import Cautious, gain
 from palpate.force.sampled_loop import filter_of
@@ -87,6 +88,8 @@ class Gains(Table):
     """Largest force that the sensor may show in free motion, either way [N]: below it, whatever the signal, the tip is
     never faster than the approach."""
     alpha: Annotated[float, Meta(gt=0, le=1)] = ALPHA
+    force_max: Positive | None = None
+    """F_max, which the force does not exceed under the assumptions of `palpate.force.ceiling` [N]; none if left out."""
     relief: Annotated[float, Meta(ge=0, le=0.3)] = 0.0
     """rho: share of the lag that a torque arm does not have on a stiff surface, see `relief_of`."""
     law: str = LAW
@@ -107,15 +110,31 @@ class Gains(Table):
                 f"the force limit must lie between the force of {self.force:g} N and the sensor's full scale of "
                 f"{self.arm.sensor.full_scale:g} N, got {self.force_limit:g} N"
             )
-        if self.approach > self.arm.limits.speed:
+        check_force_max(self.arm, self.force, self.force_max)
+        if self.approach > self.speed:
+            ceiling = (
+                "arm's limit" if self.speed == self.arm.limits.speed else f"ceiling of {self.force_max:g} N"
+            )
             raise InputError(
-                f"the approach of {self.approach:g} m/s is faster than the arm's limit of {self.arm.limits.speed:g} m/s"
+                f"the approach of {self.approach:g} m/s is faster than the {ceiling}, {self.speed:g} m/s"
             )
         if self.arm.sensor.sampling < 4.0 / self.theta:
             raise InputError(
                 f"the sensor's {self.arm.sensor.sampling:g} readings a second are fewer than 4 in the loop's lag of "
                 f"{1e3 * self.theta:.3g} ms; use a faster sensor"
             )
+
+    @property
+    def speed(self) -> float:
+        """Largest commanded speed [m/s]: the arm's limit, or what keeps the force F_d below F_max."""
+        return self.speed_at(self.force)
+
+    def speed_at(self, desired: float) -> float:
+        """Largest commanded speed with which a desired force stays below F_max [m/s]; the arm's limit without F_max."""
+        limit = self.arm.limits.speed
+        if self.force_max is None:
+            return limit
+        return min(limit, force_ceiling(self.arm, desired, self.force_max, self.cap, self.theta))
 
     @property
     def seen_cap(self) -> float:
@@ -139,7 +158,7 @@ class Gains(Table):
     @property
     def floor(self) -> float:
         """Lowest K_u that the law uses [N/m]."""
-        return max(_FLOOR_FRACTION * self.alpha * self.force / (self.theta * self.arm.limits.speed), 1.0)
+        return max(_FLOOR_FRACTION * self.alpha * self.force / (self.theta * self.speed), 1.0)
 
     @property
     def bias(self) -> float:
@@ -165,7 +184,7 @@ class Gains(Table):
         numbers: dict[str, Any] = {
             "tick": arm.tick, "theta": self.theta, "alpha": self.alpha, "compliance": self.compliance,
             "relief": self.relief, "lead": servo.lag if servo else 0.0, "inertia": servo.inertia if servo else 0.0,
-            "cap": self.seen_cap, "floor": self.floor, "speed": arm.limits.speed,
+            "cap": self.seen_cap, "floor": self.floor, "speed": self.speed,
             "approach": self.approach, "level": 2.0 * self.level, "bias": self.bias, "drift": self.drift,
             "noise": arm.sensor.noise, "resolution": step,
             "least": max((0.25 * arm.sensor.noise) ** 2, step**2 / 12.0, (_MIN_NOISE_FRACTION * self.force) ** 2),
@@ -178,8 +197,12 @@ class Gains(Table):
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of everything that a proof rests on: arm, rate, lag, law and gain."""
-        known = {key: value for key, value in msgspec.to_builtins(self).items() if key != "slide"}
+        """SHA-256 of everything that a proof of stability rests on: arm, rate, lag, law and gain."""
+        known = {
+            key: value
+            for key, value in msgspec.to_builtins(self).items()
+            if key not in {"slide", "force_max"}
+        }
         return hashlib.sha256(msgspec.json.encode(known)).hexdigest()
 
     def to_toml(self) -> str:
@@ -203,6 +226,7 @@ def gains_for(
     cap: float | None = None,
     theta: float | None = None,
     limit: float | None = None,
+    force_max: float | None = None,
 ) -> Gains:
     """The law's gains for an arm that presses with a force.
 
@@ -211,7 +235,8 @@ def gains_for(
         force: F_d, the smallest that will be asked for [N].
         cap: stiffest surface that there may be, K + B/theta [N/m]; the arm's limit if left out.
         theta: whole lag of the loop [s]; the arm's own if left out.
-        limit: force above which the tip withdraws [N]; the sensor's full scale if left out.
+        limit: force above which the tip withdraws [N]; F_max, or else the sensor's full scale, if left out.
+        force_max: F_max, which the force shall not exceed [N]; none if left out.
 
     Raises:
         InputError: numbers that no loop can be tuned for.
@@ -219,16 +244,76 @@ def gains_for(
     theta = known_lag(arm) if theta is None else theta
     cap = arm.limits.stiffness if cap is None else cap
     approach = approach_speed(arm, force, theta, cap)
+    if force_max is not None:
+        check_force_max(arm, force, force_max)
+        approach = min(approach, force_ceiling(arm, force, force_max, cap, theta))
     if approach < MIN_APPROACH:
         raise InputError(
             f"surfaces of up to {cap:g} N/m allow an approach of {approach:.2g} m/s, which comes nowhere; lower the "
-            "stiffness cap, or press harder"
+            f"stiffness cap, or press harder{'' if force_max is None else ', or raise F_max'}"
         )
     return Gains(
         arm=arm, force=force, theta=theta, cap=cap, relief=_known_relief(_any_noise(arm), theta),
-        force_limit=arm.sensor.full_scale if limit is None else limit,
+        force_limit=limit or force_max or arm.sensor.full_scale, force_max=force_max,
         approach=approach, level=free_motion_level(arm, force),
     )  # fmt: skip
+
+
+_ERROR_DEVIATIONS = 4.0
+"""Standard deviations of the sensor's noise that a reading is taken to be off: beyond, once in 16,000 readings."""
+
+
+def reading_error(arm: Arm, force: float) -> float:
+    """epsilon of F_max [N]: noise, half a step, and the force at rest that may have been taken out as bias."""
+    step = arm.sensor.resolution or 0.0
+    return BIAS_FRACTION * force + _ERROR_DEVIATIONS * arm.sensor.noise + 0.5 * step
+
+
+def force_ceiling(arm: Arm, force: float, force_max: float, cap: float, theta: float) -> float:
+    """Largest commanded speed below which the force cannot exceed F_max [m/s]."""
+    return speed_ceiling(arm, force, force_max, reading_error(arm, force), cap, theta)
+
+
+FORCE_MAX_RATIO = 5.0
+"""F_max over the desired force where none is given."""
+
+
+def usual_force_max(force: float, sensor: Sensor) -> float:
+    """F_max where none is given [N]: the sensor must read it."""
+    return min(FORCE_MAX_RATIO * force, sensor.full_scale)
+
+
+def check_same_force_max(gains: Gains, force_max: float | None) -> None:
+    """Refuse another F_max than the one that gains were tuned for.
+
+    Raises:
+        InputError: it names both.
+    """
+    if force_max is not None and force_max != gains.force_max:
+        known = "no F_max" if gains.force_max is None else f"F_max = {gains.force_max:g} N"
+        raise InputError(
+            f"--force-max is {force_max:g} N, and the gains are for {known}; tune with --force-max {force_max:g}:N"
+        )
+
+
+def check_force_max(arm: Arm, force: float, force_max: float | None) -> None:
+    """Refuse an F_max that no speed keeps, or that the sensor cannot read.
+
+    Raises:
+        InputError: it says what is needed.
+    """
+    if force_max is None:
+        return
+    least = force + reading_error(arm, force)
+    if not force_max > least:
+        raise InputError(
+            f"F_max must be above {least:.4g} N, the force of {force:g} N and what a reading may be off, "
+            f"got {force_max:g} N; raise it, or press more softly"
+        )
+    if force_max > arm.sensor.full_scale:
+        raise InputError(
+            f"F_max must be at most the sensor's full scale of {arm.sensor.full_scale:g} N, got {force_max:g} N"
+        )
 
 
 def free_motion_level(arm: Arm, force: float) -> float:

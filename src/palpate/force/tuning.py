@@ -87,6 +87,22 @@ class Tuning(Result):
         return None
 
     @property
+    def price(self) -> tuple[float, float] | None:
+        """Time that F_max costs on the softest surface [s], and that surface's stiffness [N/m]; None without F_max.
+
+        The command travels to the force at the speed that F_max allows, not at the arm's.
+        """
+        gains, stiffness = self.gains, self.softest
+        if gains.force_max is None:
+            return None
+        return gains.force / stiffness * (1.0 / gains.speed - 1.0 / gains.arm.limits.speed), stiffness
+
+    @property
+    def softest(self) -> float:
+        """The softest surface that is known of [N/m]."""
+        return min(self.known.stiffness[0] if self.known else MIN_STIFFNESS, self.gains.cap)
+
+    @property
     def exact(self) -> tuple[float, float]:
         """The surfaces without damping on which the loop with K_u = cap is stable [N/m]; exact for a position arm."""
         return surface_ends(self.gains.arm, *exact_interval(self.gains))
@@ -128,6 +144,9 @@ class Tuning(Result):
                 "force_limit_N": gains.force_limit,
             },
             "approach_speed_m_s": gains.approach,
+            "speed_m_s": gains.speed,
+            "force_max": gains.force_max,
+            "price_s": None if self.price is None else self.price[0],
             "peak_N": self.peak,
             "peak_bound_N": self.peak_bound,
             "settling_s": _number(max(step.settling for step in self.steps)),
@@ -181,7 +200,7 @@ def tune(
     known: Known | None = None,
     *,
     cap: float | None = None,
-    peak: float | None = None,
+    force_max: float | None = None,
     prove_adapting: bool = True,
     theta: float | None = None,
 ) -> Tuning:
@@ -192,7 +211,7 @@ def tune(
         force: F_d, the smallest that will be asked for [N].
         known: of the surface; the arm's own limit of stiffness if nothing is.
         cap: stiffest surface that there may be, K + B/theta [N/m]; by default what is known, or the arm's limit.
-        peak: highest force that is allowed at the touch [N].
+        force_max: F_max, which the force shall not exceed on layers or after a false touch [N]; see `force.ceiling`.
         prove_adapting: prove the adapting law too, which takes a torque arm some two seconds.
         theta: whole lag of the loop [s]; the arm's own if left out.
 
@@ -204,15 +223,13 @@ def tune(
     known = None if known is None else known.beyond(arm)
     farther = () if known is None or cap is not None else _beyond_log(arm, known, force)
     stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
-    limit = arm.sensor.full_scale if peak is None else min(peak, arm.sensor.full_scale)
-    gains = gains_for(arm, force, cap=stiffest, theta=theta, limit=limit)
+    gains = gains_for(arm, force, cap=stiffest, theta=theta, force_max=force_max)
     soft = min(known.stiffness[0] if known else MIN_STIFFNESS, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
     nothing = Certificate(form=FORM, gains=gains, claims=())
     at = margins(gains, gains.seen_cap)
     tuning = Tuning(gains, known, nothing, steps, at, (*farther, *_warnings(arm, known, at.gain)))
-    _check_peak(tuning, peak)
     tuning = replace(tuning, certificate=certify(gains, adapting=prove_adapting))
     if not tuning.proved and isinstance(arm.inner, PositionLoop) and arm.inner.bandwidth_interval is not None:
         text = (
@@ -287,14 +304,3 @@ def _warnings(arm: Arm, known: Known | None, margin: float) -> list[tuple[str, s
     if known is not None:
         warnings += known.warnings
     return warnings
-
-
-def _check_peak(tuning: Tuning, peak: float | None) -> None:
-    if peak is None or tuning.peak <= peak:
-        return
-    gains = tuning.gains
-    raise InputError(
-        f"no approach speed keeps the peak under {peak:g} N: at {1e3 * gains.approach:.3g} mm/s the press itself "
-        f"overshoots to {tuning.peak:.4g} N; ask for at most {gains.force * peak / tuning.peak:.4g} N, or allow "
-        f"{tuning.peak:.4g} N"
-    )

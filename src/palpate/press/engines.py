@@ -168,13 +168,18 @@ def loop_of(name: str, title: str, mode: str, mass: float) -> Arm:
     return msgspec.structs.replace(arm, title=f"{title}, {mode}s", inner=inner, sensor=sensor)
 
 
-def press_gains(arm: Arm, force: float) -> Gains:
+def press_gains(arm: Arm, force: float, force_max: float | None = None) -> Gains:
     """Gains for a force on any surface up to the arm's stiffness limit, with no relief of the lag and no proof.
+
+    Args:
+        arm: what moves.
+        force: F_d, the smallest that will be asked for [N].
+        force_max: F_max [N]; none if left out.
 
     Raises:
         InputError: a force that the sensor's noise hides, or that it cannot read.
     """
-    return msgspec.structs.replace(gains_for(arm, force), relief=0.0)
+    return msgspec.structs.replace(gains_for(arm, force, force_max=force_max), relief=0.0)
 
 
 def check_mode(gains: Gains, mode: str | None) -> str:

@@ -11,7 +11,7 @@ from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
 from palpate.force.force_loop import ForceLoop
-from palpate.force.gains import Gains, load_gains
+from palpate.force.gains import Gains, check_same_force_max, load_gains, usual_force_max
 from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
 from palpate.press.pressing import Progress, press
@@ -49,6 +49,7 @@ class PressSpec:
         seed: of the noise.
         payload: of `palpate payload`: the arm carries this tool, and its sensor shows what that one did.
         end: hold, to rest in contact after a press that is done; else retreat.
+        force_max: F_max, see `force.ceiling` [N]; that of the gains, else five times the force, if left out.
     """
 
     arm: str
@@ -66,6 +67,7 @@ class PressSpec:
     seed: int = 0
     payload: Payload | None = None
     end: str = "retreat"
+    force_max: float | None = None
 
 
 @dataclass(frozen=True)
@@ -244,13 +246,17 @@ def _gains(spec: PressSpec, arm: SerialArm, place: Place) -> Gains:
         gains = load_gains(spec.gains)
         check_mode(gains, spec.mode)
         _check_sensor(spec, gains.arm.sensor, gains.force_limit)
+        check_same_force_max(gains, spec.force_max)
         return gains
     mode = spec.mode or usual_mode(spec.arm)
     if spec.controller != CAUTIOUS and spec.mode is None:
         mode = "torque"
     loop = loop_of(spec.arm, arm.title, mode, place.mass)
     _check_sensor(spec, loop.sensor, loop.sensor.full_scale)
-    return press_gains(loop, spec.force * (1.0 - spec.probe))
+    force_max = spec.force_max
+    if spec.controller == CAUTIOUS and force_max is None:
+        force_max = usual_force_max(spec.force, loop.sensor)
+    return press_gains(loop, spec.force * (1.0 - spec.probe), force_max)
 
 
 def _check_sensor(spec: PressSpec, sensor: Sensor, max_force: float) -> None:

@@ -36,6 +36,7 @@ def rows(tuning: Tuning) -> list[tuple[str, str]]:
         ("gain on it", f"{1e3 * gains.gain:.4g} mm/s per N"),
         ("approach", f"at most {1e3 * gains.approach:.3g} mm/s"),
         ("peak at touch", _peak(tuning)),
+        ("F_max", _force_max(tuning)),
         ("settling", f"{slowest:.3g} s with known stiffness" if isfinite(slowest) else "-"),
         ("overshoot", f"{100 * tuning.overshoot:.2g} % with known stiffness"),
         ("margins", f"gain {at.gain:.3g}, phase {at.phase:.3g} deg, delay {1e3 * at.delay:.3g} ms"),
@@ -67,6 +68,16 @@ def _stiffening(tuning: Tuning) -> str:
         f"a surface that stiffens in a press by more than {near:.2g} times while the force error is "
         f"{100.0 * STIFFENING_AT[0]:g} %, or {half:.2g} times half-way up, overshoots by over {100.0 * OVERSHOOT:g} %"
     )
+
+
+def _force_max(tuning: Tuning) -> str:
+    """Bound of the force on layers, and its price in time."""
+    gains, price = tuning.gains, tuning.price
+    if price is None:
+        return "none: a hard surface behind a soft layer is met at the arm's speed (--force-max bounds the force)"
+    later = f"it takes {price[0]:.2g} s longer on {quantity(price[1], 'N/m')}"
+    speed = f"{1e3 * gains.speed:.3g} mm/s"
+    return f"at most {gains.force_max:g} N if something hard lies behind, by at most {speed}; {later}"
 
 
 def _peak(tuning: Tuning) -> str:
@@ -132,6 +143,7 @@ def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
         f"overshoot {100 * tuning.overshoot:.2g} %",
     ]
     yield Text(f"First touch: {', '.join(touch)}.")
+    yield Text(f"F_max: {_force_max(tuning)}.")
     delay = f"{1e3 * at.delay:.3g} ms" if isfinite(at.delay) else "any"
     phase = f"{at.phase:.3g}°" if isfinite(at.phase) else "any"
     yield Text(f"Margins on the stiffest surface: gain × {at.gain:.2g}, phase {phase}, delay {delay}.")
@@ -184,7 +196,8 @@ def tuning_sentence(tuning: Tuning) -> str:
     peak = f"The first touch peaks at {quantity(tuning.peak, 'N')}"
     below = f", by proof below {quantity(bound, 'N')}" if bound is not None else ""
     settles = f", and settles within {quantity(slowest, 's')}" if isfinite(slowest) else ""
-    return f"{proved} {peak}{below}{settles}."
+    layers = f" F_max: {_force_max(tuning)}." if tuning.price is not None else ""
+    return f"{proved} {peak}{below}{settles}.{layers}"
 
 
 def _slowest(tuning: Tuning) -> float:

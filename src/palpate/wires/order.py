@@ -201,6 +201,11 @@ def check_order(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
             f"the force limit must lie between the force of {task.force:g} N and the sensor's full scale of"
             f" {gains.arm.sensor.full_scale:g} N, got {limits.force:g} N"
         )
+    if gains.force_max is not None and not limits.force < gains.force_max:
+        raise InputError(
+            f"the force limit must lie below F_max = {gains.force_max:g} N of the gains, got {limits.force:g} N; lower "
+            "it, or tune with a higher --force-max"
+        )
     if not gains.approach <= limits.speed <= gains.arm.limits.speed:
         raise InputError(
             f"the speed limit must lie between the certified approach of {1e3 * gains.approach:.3g} mm/s and the arm's"

@@ -60,8 +60,17 @@ class PressOptions:
 
     force: values.Force
     "Desired force, N; the smallest one if it varies."
-    peak: values.Force | None = None
-    "Highest force allowed at the touch, N."
+    force_max: values.Force | None = None
+    """Highest force that there may be, on layers and after a false touch, N: it limits the speed. Five times the force
+    if not given, and at most what the sensor reads; none for a slide."""
+
+    def highest_force(self, arm: Arm, *, slides: bool) -> float | None:
+        """F_max [N]."""
+        from palpate.force.gains import usual_force_max
+
+        if self.force_max is not None:
+            return self.force_max.si
+        return None if slides else usual_force_max(self.force.si, arm.sensor)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +102,7 @@ class SlideLimits:
 
         from palpate.force.slide_table import Slide
 
-        v, max_speed = self.speed.si, gains.arm.limits.speed
+        v, max_speed = self.speed.si, gains.speed
         if not 0.0 < self.mu_max <= 2.0:
             raise InputError(
                 f"--mu-max must be above 0 and at most 2 (friction never is 0; 0.9 is usual), got {self.mu_max:g}"

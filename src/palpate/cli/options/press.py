@@ -22,6 +22,9 @@ class AskOptions:
 
     force: values.Force | None = None
     "Desired force, N, or with a unit as 20:N."
+    force_max: values.Force | None = None
+    """F_max: the force never exceeds it, on layers and after a false touch, N (docs/force.md states the assumptions).
+    That of the gains; without gains five times the force, and at most what the sensor reads."""
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from where the force is reached on."
     end: Literal["retreat", "hold"] = "retreat"
@@ -114,6 +117,7 @@ class SimulatedOptions:
             seed=self.seed,
             payload=task.tool,
             end=task.end,
+            force_max=si(task.force_max),
         )
 
     @property
