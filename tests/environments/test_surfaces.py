@@ -142,10 +142,3 @@ def test_joined_it_is_the_same(surface):
     assert alone(join(surface)) is surface
     assert join(surface).truth() == surface.truth()
     assert join(surface).mass == surface.mass
-
-
-@each
-def test_truth_names_its_mass_and_stiffness(surface):
-    truth = surface.truth()
-    assert {"K", "M"} <= truth.keys()
-    assert truth["M"] == (surface.mass, "kg")

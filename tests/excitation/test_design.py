@@ -13,7 +13,6 @@ from palpate.excitation import (
     DesignProblem,
     ForceChain,
     HybridLoop,
-    KnownBandwidth,
     Sensors,
     SurfaceRange,
     design,
@@ -31,14 +30,6 @@ PROBLEM = DesignProblem(RANGE, LIMITS, ASKED)
 @pytest.fixture(scope="module")
 def multisine():
     return design(PROBLEM)
-
-
-def test_the_range_is_its_middle_and_its_corners():
-    surfaces = RANGE.surfaces()
-    assert len(surfaces) == 9
-    assert surfaces[0].values == pytest.approx((np.sqrt(24e6), np.sqrt(15e3), np.sqrt(0.03)))
-    assert len(KNOWN.surfaces()) == 1
-    assert len(SurfaceRange((1.0, 2.0), (3.0, 3.0)).surfaces()) == 3
 
 
 @pytest.mark.long
@@ -127,21 +118,6 @@ def test_surfaces_without_a_mass_are_not_asked_for_one():
     assert set(found.predictions[0].half_widths(1.0)) == {"K", "B"}
 
 
-def test_what_is_not_asked_is_estimated_all_the_same():
-    """K alone is found sooner when M is known to be none than when it must be found too."""
-    free = DesignProblem(
-        SurfaceRange((5e3, 5e3), (200.0, 200.0), (0.1, 0.1)), LIMITS, {"K": 0.01}, duration=10.0
-    )
-    none = replace(free, surfaces=SurfaceRange((5e3, 5e3), (200.0, 200.0)))
-    assert design(none).excess <= design(free).excess
-
-
-def test_a_known_bandwidth_stands_for_a_robot():
-    wide = design(replace(PROBLEM, loop=KnownBandwidth(100.0), duration=10.0)).excess
-    narrow = design(replace(PROBLEM, loop=KnownBandwidth(5.0), duration=10.0)).excess
-    assert wide < narrow
-
-
 @pytest.fixture(scope="module")
 def infeasible():
     return design(replace(PROBLEM, precision={"M": 0.1}, duration=4.0))
@@ -158,22 +134,6 @@ def test_what_would_help_is_said_and_true(infeasible):
         assert remedy.enough == (remedy.reached["M"] <= 0.1 * (1 + 1e-6))
     assert any("N to each side" in remedy.change for remedy in found)
     assert any("lag" in remedy.change for remedy in found)
-
-
-@pytest.mark.long
-def test_time_is_a_remedy_where_it_is_one():
-    found = design(replace(PROBLEM, sensors=Sensors(ForceChain()), duration=4.0))
-    longer = remedies(found)[0]
-    assert longer.enough
-    assert longer.change == f"{np.ceil(found.needed):.0f} s instead of 4 s"
-    assert design(replace(found.problem, duration=2 * np.ceil(longer.needed / 2))).feasible
-
-
-@pytest.mark.long
-def test_a_budget_of_change_that_binds_is_named():
-    slow = replace(PROBLEM, surfaces=KNOWN, budget=replace(LIMITS, rate=100.0), duration=4.0)
-    changes = [remedy.change for remedy in remedies(design(slow))]
-    assert any("instead of 100 N/s" in change for change in changes)
 
 
 def test_no_longer_than_the_longest():

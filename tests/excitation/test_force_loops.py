@@ -50,13 +50,6 @@ def test_friction_holds_a_weak_force_back_more_than_a_strong_one():
     assert weak[0, 1] < strong[0, 1] < free[0, 1]
 
 
-def test_the_bandwidth_of_a_robot_is_where_071_is_left():
-    at = 2 * np.pi * np.array([12.0])
-    found = KnownBandwidth(12.0).transfer(at, RUBBER.impedance(at)[None], SLOW)
-    assert np.abs(found).item() == pytest.approx(np.sqrt(0.5))
-    assert KnownBandwidth(12.0).stable(RUBBER)
-
-
 @pytest.mark.parametrize(
     ("gain", "stable"), [(0.0, True), (1.0, True), (2.0, True), (4.0, False), (40.0, False)]
 )

@@ -73,15 +73,6 @@ def test_a_step_made_within_contact_identifies_nothing_of_what_rests():
         assert p.verdict is not Verdict.IDENTIFIED or p.ci95[0] <= 1000 <= p.ci95[1]
 
 
-def test_a_mass_fixed_at_none_beside_a_force_filter():
-    log = pressed(k=5000.0, b=40.0)
-    found = identify(log, lag=0.0, mass=(0.0, 0.0), model="kelvin-voigt-mass")
-    assert abs(found.parameters["M"].value or 0.0) < 1e-6
-    for name, truth in (("K", 5000), ("B", 40)):
-        p = found.parameters[name]
-        assert p.ci95[0] < truth < p.ci95[1]
-
-
 @pytest.mark.parametrize("factor", [1e300, 1e-300, 1e150])
 @pytest.mark.parametrize("channel", ["position", "force"])
 def test_numbers_out_of_this_world_are_an_error_of_one_line(factor, channel):
@@ -209,10 +200,3 @@ def test_the_lag_says_what_it_is(lag, kinds):
     said = identify(LOG, lag=lag).to_json()["lag_s"]
     assert set(said) == {"value", "std", "bound", "kind"}
     assert said["kind"] in kinds
-
-
-def test_no_contact_is_the_same_json():
-    found = identify(record(TIME, 1e-3 * np.sin(TIME), noise(0.05)))
-    said = json.loads(json.dumps(found.to_json()))
-    assert said["working_point"] is None or said["working_point"]["stiffness"]["verdict"] != "identified"
-    assert all(p["value"] is None for p in said["parameters"].values())
