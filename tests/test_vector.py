@@ -134,15 +134,3 @@ def test_sign_and_clip_at_the_edges(value):
     assert sign(value) == np.sign(value)
     assert clip(value, 1.0) == np.clip(value, -1.0, 1.0)
     assert sign(Vec3(value, 0.0, 1.0)).x == np.sign(value)
-
-
-def test_laws_serve_an_arm_of_seven_joints():
-    J, root = RNG.normal(size=(3, 7)), RNG.normal(size=(7, 7))
-    M, a = root @ root.T + 7.0 * np.eye(7), RNG.normal(size=3)
-    qdd = resolve(J, a, M)
-    np.testing.assert_allclose(J @ qdd, a, atol=1e-12)
-    # Least kinetic energy: no other joint acceleration with the same task acceleration has less.
-    null = np.eye(7) - np.linalg.pinv(J) @ J
-    assert np.abs((null @ RNG.normal(size=(7, 50))).T @ M @ qdd).max() < 1e-10
-    # The bare pseudo-inverse is not that one.
-    assert np.abs(null.T @ M @ np.linalg.pinv(J) @ a).max() > 1e-3
