@@ -182,23 +182,6 @@ def test_print_shows_a_file_that_can_be_run(name, capsys):
     assert capsys.readouterr().out == source(name)
 
 
-WRONG = {
-    "TOML": ("[run]", "[run", "not TOML"),
-    "value": ("stiffness = 5200.0", "stiffness = -52.0", "stiffness in [surface] must be a number above 0, got -52.0"),
-    "friction": ("static = [3.6", "static = [0.6", "static in [friction] must be at least coulomb"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("old", "new", "told"), WRONG.values(), ids=WRONG)
-def test_a_wrong_experiment_is_refused_with_its_file_named(mine, capsys, old, new, told):
-    assert old in mine.read_text()
-    mine.write_text(mine.read_text().replace(old, new, 1), encoding="utf-8")
-    line = refused(capsys, "mine.toml", "--out", "results")
-    assert line.startswith("palpate: mine.toml: ")
-    assert told in line
-    nothing_but(mine.parent, "mine.toml")
-
-
 @pytest.mark.parametrize("seed", ["-1", "1.5", "many"])
 def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
     assert "seed" in refused(capsys, "mine.toml", "--seed", seed).lower()

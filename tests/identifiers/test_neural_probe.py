@@ -32,21 +32,6 @@ def test_it_finds_a_spring_damper_and_mass_that_are_well_excited():
     assert found.force_at_zero == 0.0
 
 
-def test_one_sample_at_a_time_is_many_at_once():
-    phi, force = pressing(200)
-    one, many, watched = (NeuralProbe.thesis("foam", seed=4) for _ in range(3))
-    for p, f in zip(phi, force, strict=True):
-        one.update(p, f)
-    many.update_many(phi, force)
-    answers = watched.trajectory(phi, force)
-    for a, b, c in zip(one.layers, many.layers, watched.layers, strict=True):
-        np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(a, c)
-    last = many.probe()
-    assert tuple(answers[-1, :3]) == pytest.approx((last.stiffness, last.damping, last.mass), rel=1e-9)
-    assert one.samples == many.samples == 200
-
-
 def test_a_probe_outside_what_was_learned_is_warned_of():
     phi, force = pressing(500)
     probe = NeuralProbe.thesis("foam")
@@ -86,17 +71,6 @@ def test_watch_takes_a_run_s_contact_only():
     without = Record({**columns, "phase": np.zeros(300)}, dict.fromkeys(columns, "1"))
     with pytest.raises(InputError, match="no contact"):
         watch(without, probe)
-
-
-def test_a_bad_sample_is_named_and_the_rest_kept():
-    phi, force = pressing(10)
-    probe = NeuralProbe.thesis("foam")
-    force[6] = np.nan
-    with pytest.raises(InputError, match="sample 6 is not finite"):
-        probe.update_many(phi, force)
-    assert probe.samples == 6
-    with pytest.raises(InputError, match="shape"):
-        probe.update([1.0, 2.0], 3.0)
 
 
 @pytest.mark.parametrize(
