@@ -189,16 +189,6 @@ def test_two_columns_that_do_not_move_together_are_never_proposed(tmp_path, posi
         palpate.identify_log(path)
 
 
-def test_of_two_forces_the_one_that_follows_is_taken_without_a_guess(tmp_path):
-    noise = np.random.default_rng(0).normal(size=2000)
-    path = save(
-        tmp_path / "a.csv", time_s=TIME, Fx_N=noise, Fz_N=5e3 * MOVED + 0.1 * noise, depth_mm=1e3 * MOVED
-    )
-    proposal = list_log(path).proposal
-    assert not proposal.guesses
-    assert proposal.options == {"time": "time_s", "position": "depth_mm:mm", "force": "Fz_N:N"}
-
-
 def test_an_unknown_option_is_named(root):
     with pytest.raises(InputError, match=r"unknown option 'positon'.*position"):
         palpate.identify_log(root / "examples/data/press.csv", positon="x:mm")

@@ -9,13 +9,11 @@ import pytest
 from palpate import _vector
 from palpate._jit import kernel, law
 from palpate._vector import (
-    ZERO3,
     Mat3,
     Vec3,
     atan2,
     clip,
     cos,
-    diagonal,
     exp,
     outer,
     resolve,
@@ -24,7 +22,6 @@ from palpate._vector import (
     solve,
     sqrt,
     trace,
-    widen,
 )
 
 RNG = np.random.default_rng(11)
@@ -137,24 +134,3 @@ def test_sign_and_clip_at_the_edges(value):
     assert sign(value) == np.sign(value)
     assert clip(value, 1.0) == np.clip(value, -1.0, 1.0)
     assert sign(Vec3(value, 0.0, 1.0)).x == np.sign(value)
-
-
-def test_widen_leaves_a_vector_as_it_is():
-    assert widen(2.0) == Vec3(2.0, 2.0, 2.0)
-    assert widen(ZERO3) is ZERO3
-
-
-def test_diagonal():
-    np.testing.assert_array_equal(diagonal(Vec3(1.0, 2.0, 3.0)), np.diag([1.0, 2.0, 3.0]))
-
-
-def test_laws_serve_an_arm_of_seven_joints():
-    J, root = RNG.normal(size=(3, 7)), RNG.normal(size=(7, 7))
-    M, a = root @ root.T + 7.0 * np.eye(7), RNG.normal(size=3)
-    qdd = resolve(J, a, M)
-    np.testing.assert_allclose(J @ qdd, a, atol=1e-12)
-    # Least kinetic energy: no other joint acceleration with the same task acceleration has less.
-    null = np.eye(7) - np.linalg.pinv(J) @ J
-    assert np.abs((null @ RNG.normal(size=(7, 50))).T @ M @ qdd).max() < 1e-10
-    # The bare pseudo-inverse is not that one.
-    assert np.abs(null.T @ M @ np.linalg.pinv(J) @ a).max() > 1e-3

@@ -1,7 +1,6 @@
 """Presses at constant speed as testing machines and arms make them: whether the tangent at the named force holds.
 
     python benchmarks/identification/plain_presses.py --worlds 60 --repeats 4 --seed 0
-    python benchmarks/identification/plain_presses.py --show 17
 
 A world is a material (spring, Hertz, power law, exponential; elastic, or relaxing as a standard linear solid, a Prony
 series or a power law of time), a motion at constant speed (loading, loading and unloading, unloading, ramp and hold,
@@ -316,40 +315,12 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=4)
     parser.add_argument("--seed", type=int, default=0, help="of the first world")
     parser.add_argument("--workers", type=int, default=min(2, os.cpu_count() or 1))
-    parser.add_argument(
-        "--misses", action="store_true", help="name the worlds that are missed or not answered"
-    )
-    parser.add_argument("--show", help="SEED: one world and its answer")
     asked = parser.parse_args()
-    if asked.show:
-        show(int(asked.show))
-        return
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     jobs = [(seed, asked.repeats) for seed in range(asked.seed, asked.seed + asked.worlds)]
     with ProcessPoolExecutor(asked.workers, get_context("spawn")) as pool:
         every = [(world_of(seed), found) for seed, found in pool.map(repeats_of, jobs)]
-    if asked.misses:
-        for (seed, _), (world, found) in zip(jobs, every, strict=True):
-            bad = [j for j in found if j.what != "answered" or not j.holds]
-            if bad:
-                j = bad[0]
-                kind = f"{world.motion}/{world.law}/{world.times}{' free' if world.free else ''}"
-                print(f"{seed:5} {kind:44} {len(bad)}: {j.what}, {j.value:.5g} ± {j.half:.2g}, {j.truth:.5g}")
     print(*table(every), sep="\n")
-
-
-def show(seed: int) -> None:
-    """One world: how it is made, and what is said."""
-    world = world_of(seed)
-    kind = f"{world.motion}/{world.law}/{world.times}, {'free motion' if world.free else 'no free motion'}"
-    print(
-        f"{kind}, {len(world.time)} rows of {world.rate:.4g} Hz, rest {world.rest:.4g} N, told {world.told}"
-    )
-    print(
-        f"force {world.force.min():.4g} to {world.force.max():.4g} N, noise {world.noise}, digits {world.digits}"
-    )
-    found = identify(world.log(np.random.default_rng([seed, 0])), **world.told)
-    print(found, judged(world, found), sep="\n")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ there are a second, and the slider's time, they do.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -103,18 +102,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--slides", type=int, default=100)
     parser.add_argument("--settle", type=float, default=15.0, help="before it is measured [s]")
-    parser.add_argument("--arm", help="an arm in space instead of foam-hybrid")
-    parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     if chromium() is None:
         sys.exit("there is no Chromium on this machine (Debian: apt-get install chromium)")
-    what = ("--arm", asked.arm) if asked.arm else ("--run", "foam-hybrid")
-    with running(*what, "--seed", 1) as (program, (address,)):
+    with running("--run", "foam-hybrid", "--seed", 1) as (program, (address,)):
         found = measured(address, program.pid, asked.seconds, asked.slides, asked.settle)
     found["load"] = os.getloadavg()[0] / (os.cpu_count() or 1)
-    if asked.json:
-        print(json.dumps(found))
-        return
     shown = f"{found['drawn_of_shown']:.0%} of those the browser showed"
     late = " ".join(f"{found[f'slider_{name}_ms']:7.1f}" for name in ("first", "p50", "p99", "max"))
     cost = f"{found['cost_ms']:7.2f} ms of the processor, {found['script_ms']:.2f} in scripts"

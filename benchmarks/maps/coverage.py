@@ -1,6 +1,6 @@
 """Judge stiffness maps on surfaces that share nothing with the Gaussian process, and print tables of it.
 
-    benchmarks/maps/coverage.py [--worlds 40] [--seed 1] [--parts coverage presses time]
+    benchmarks/maps/coverage.py [--worlds 40] [--seed 1] [--parts coverage presses]
 
 Surfaces: lumps with edges of a probe's width at random places, sizes and depths; smooth lumps; stripes; a random field.
 Each press errs by what it states, times an unknown factor of .7 to 1.5, and by friction of 1 to 6 % that it does not
@@ -10,7 +10,6 @@ state.
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -207,39 +206,17 @@ def presses_for_random(worlds: int, seed: int) -> list[str]:
     return rows
 
 
-def cost() -> str:
-    """Time of 10,000 places and the next press with 100 presses, and of a product of matrices beside it."""
-    rng = np.random.default_rng(0)
-    surface = world("smooth lumps", rng)
-    result = explore(surface, 100, rng, "random")
-    result.process  # noqa: B018 - fits it
-    square, times = rng.normal(size=(1000, 1000)), []
-    for _ in range(60):
-        start, used = time.perf_counter(), time.process_time()
-        result.predict(PLACES)
-        result.next(1)
-        between, own = time.perf_counter(), time.process_time()
-        square @ square
-        times.append((between - start, own - used, time.perf_counter() - between))
-    least, processor, product = np.min(times, axis=0)
-    return (
-        f"10,000 places and the next press, 100 presses: {1e3 * least:.0f} ms, {1e3 * processor:.0f} ms of processor "
-        f"time, {least / product:.1f} times a product of two matrices of 1000 x 1000 (least of 60 each)"
-    )
-
-
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--counts", type=int, nargs="+", default=(30, 100))
-    parser.add_argument("--parts", nargs="+", default=("coverage", "presses", "time"))
+    parser.add_argument("--parts", nargs="+", default=("coverage", "presses"))
     asked = parser.parse_args()
     parts = {
         "coverage": lambda: table(asked.worlds, asked.seed, asked.counts),
         "presses": lambda: presses_for_random(asked.worlds, asked.seed),
-        "time": lambda: [f"{cost()}."],
     }
     for name in asked.parts:
         print(*parts[name](), sep="\n", flush=True)

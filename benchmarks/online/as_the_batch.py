@@ -1,7 +1,7 @@
 """The on-line identifier against `palpate.identify` on the same samples.
 
     python benchmarks/online/as_the_batch.py                # one seed a cell: 100 streams, some minutes
-    python benchmarks/online/as_the_batch.py --seeds 3 --first 100
+    python benchmarks/online/as_the_batch.py --first 100
 
 Streams are those of `streams.py`: each surface with each kind of position and of sensor; then surfaces that become
 another. A parameter that is called identified holds if its 95 % interval has a right value in it; it is confidently
@@ -66,7 +66,7 @@ class Tally:
     def __init__(self) -> None:
         self.n: Counter[str] = Counter()
 
-    def add(self, made: Stream, show: bool) -> None:
+    def add(self, made: Stream) -> None:
         """Judges a stream both ways."""
         found, flips, looks = on_line(made)
         log = batch(made)
@@ -88,19 +88,6 @@ class Tally:
                 n["known"] += 1
                 n["holds"] += holds
                 n["wrong"] += wrong
-                if show and not holds:
-                    print(
-                        f"   off: {name} {found.theta[i]:.5g} +- {half:.3g}, truth {made.truth[name]}",
-                        made.recipe,
-                    )
-        if show:
-            k = log.get("K")
-            print(
-                f"   K {found.theta[2]:8.1f} +- {1.96 * found.std[2]:7.1f} {verdicts['K'][:6]} | batch "
-                + (f"{k.value or np.nan:8.1f} {k.verdict[:6]}" if k else "none")
-                + f" | truth {made.truth['K'][0]:8.1f} flips {flips} {found.rejected}"
-                + f" {made.recipe['motion']} {made.lag_std}"
-            )
 
     def row(self, name: str) -> str:
         """As a row of the table."""
@@ -125,30 +112,25 @@ HEAD = (
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--show", action="store_true")
+    parser.add_argument("--first", type=int, default=0, help="number by which other streams are drawn")
     parser.add_argument("--only", default="", help="a surface, a position or a sensor")
     asked = parser.parse_args()
     tallies: dict[str, Tally] = {}
     cells = [cell for cell in product(SURFACES, POSITIONS, SENSORS) if not asked.only or asked.only in cell]
-    for seed in range(asked.first, asked.first + asked.seeds):
-        for number, (surface, position, sensor) in enumerate(cells):
-            if asked.show:
-                print(surface, position, sensor, flush=True)
-            made = stream(1000 * seed + 7 * number, surface, position, sensor)
-            for name in ("all", surface, position, sensor):
-                tallies.setdefault(name, Tally())
-            own = Tally()
-            own.add(made, asked.show)
-            for name in ("all", surface, position, sensor):
-                tallies[name].n.update(own.n)
-        if not asked.only:
-            for number in range(10):
-                made = stream(
-                    1000 * seed + 900 + number, "spring-damper", "counts 1", "each tick", changes=True
-                )
-                tallies.setdefault("surface changes", Tally()).add(made, asked.show)
+    for number, (surface, position, sensor) in enumerate(cells):
+        made = stream(1000 * asked.first + 7 * number, surface, position, sensor)
+        for name in ("all", surface, position, sensor):
+            tallies.setdefault(name, Tally())
+        own = Tally()
+        own.add(made)
+        for name in ("all", surface, position, sensor):
+            tallies[name].n.update(own.n)
+    if not asked.only:
+        for number in range(10):
+            made = stream(
+                1000 * asked.first + 900 + number, "spring-damper", "counts 1", "each tick", changes=True
+            )
+            tallies.setdefault("surface changes", Tally()).add(made)
     print(HEAD)
     print("|" + "---|" * (HEAD.count("|") - 1))
     for name, tally in tallies.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ NOISE = 0.6  # standard deviation of a force sample [N]
 START = np.zeros(3)
 VAGUE = np.diag([1e6, 1e10, 1e6])  # covariance of B [N s/m], K [N/m] and offset [N] before anything is known
 TOLERANCE = 0.02
-STIFFEST = 62e3  # that the tones below are for [N/m]
 REST = 1e-2  # penetration about which it moves [m]
 TONES = {  # [Hz], [m]: no more than the stiffest lets move within contact and the sensor's range
     "one tone": ((2.0, 3e-4),),
@@ -23,15 +21,13 @@ TONES = {  # [Hz], [m]: no more than the stiffest lets move within contact and t
 }
 
 
-def motion(
-    random: np.random.Generator, kind: str, samples: int, rate: float, scale: float = 1.0
-) -> tuple[Array, Array]:
+def motion(random: np.random.Generator, kind: str, samples: int, rate: float) -> tuple[Array, Array]:
     """Penetration [m] about `REST` and its rate [m/s]: tones whose amplitude, frequency and phase are the seed's."""
     t = np.arange(samples) / rate
     x, v = np.full(samples, REST), np.zeros(samples)
     for frequency, amplitude in TONES[kind]:
         omega = 2 * np.pi * frequency * random.uniform(0.8, 1.2)
-        A, phase = scale * amplitude * random.uniform(0.5, 1.5), random.uniform(0.0, 2 * np.pi)
+        A, phase = amplitude * random.uniform(0.5, 1.5), random.uniform(0.0, 2 * np.pi)
         x += A * np.sin(omega * t + phase)
         v += A * omega * np.cos(omega * t + phase)
     return x, v
@@ -55,17 +51,3 @@ def samples_to_know(K: Array, truth: float) -> int:
     """How many samples it takes until the stiffness is within 2 % and stays there."""
     outside = np.flatnonzero(np.abs(K / truth - 1.0) > TOLERANCE)
     return int(outside[-1]) + 2 if len(outside) else 1
-
-
-def press(
-    estimator: Any, seed: int, B: float, K: float, F: float, samples: int = 3000, rate: float = 1000.0
-) -> int:
-    """Samples that a copy of the estimator needs to know K in a press of its own.
-
-    The force at rest is F, and swings alike whatever the K.
-    """
-    random = np.random.default_rng(seed)
-    x, v = motion(random, "four tones", samples, rate, STIFFEST / K)
-    phi = regressors(x, v)
-    force = phi @ [B, K, F - K * REST] + random.normal(0.0, NOISE, samples)
-    return samples_to_know(followed(copy.deepcopy(estimator), phi, force), K)

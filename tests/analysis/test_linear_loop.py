@@ -19,13 +19,6 @@ def test_there_and_back():
     np.testing.assert_array_equal(vector(state), numbers)
 
 
-def test_arrays_are_not_shared():
-    weights = np.ones(3)
-    (copy,) = rebuilt((weights,), iter([1.0, 2.0, 3.0]))
-    copy[0] = 9.0
-    assert weights[0] == 1.0
-
-
 def test_only_the_controller_that_acts_moves():
     for name, size in (("foam-pi", 3), ("foam-impedance", 1)):
         bench = build(load(name))

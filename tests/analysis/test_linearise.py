@@ -7,11 +7,10 @@ import pytest
 
 from analysis.one_direction import growth
 from analysis.worlds import decoupled, ringing, surface, tip_mass
-from palpate.bench import build, load
+from palpate.bench import load
 from palpate.bench.tables import with_values
 from palpate.errors import InputError
 from palpate.studies.analysis import growth_with, linearise, stable_stiffness
-from palpate.studies.analysis.linear_model import period_of
 
 CASES = [(12e3, 60.0, 1.0, 0.003), (30e3, 60.0, 0.25, 0.0015), (430e3, 480.0, 0.25, 0.0015)]
 
@@ -101,19 +100,6 @@ def test_when_the_sensor_s_clock_starts_does_not_matter():
     late = with_values(base, {"force_sensor.phase": 1.3e-3})
     # A sample is taken at the first physics step after the clock's tick: up to 50 us, 1/150 of the lag.
     assert linearise(late).growth == pytest.approx(linearise(base).growth, abs=2e-6)
-
-
-@pytest.mark.parametrize(("sampling", "period"), [(480, 25), (1000, 1), (500, 2), (400, 5)])
-def test_a_period_is_when_sampling_falls_on_the_ticks_as_before(sampling, period):
-    loop = build(with_values(load("foam-hybrid"), {"force_sensor.sampling": sampling})).loop
-    assert period_of(loop) == period
-
-
-def test_a_sensor_as_fast_as_the_ticks_is_linear_as_well():
-    loop = linearise(with_values(load("foam-hybrid"), {"force_sensor.sampling": 1000}))
-    assert loop.period == 1
-    assert loop.stable
-    assert np.isfinite([mode.frequency for mode in loop.modes]).all()
 
 
 @pytest.mark.parametrize(

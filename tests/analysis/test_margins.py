@@ -28,11 +28,6 @@ def test_the_delay_margin_is_where_the_exact_loop_turns_unstable(foam):
     assert growth_with(foam, late=math.floor(late)) < 1.0 < growth_with(foam, late=math.ceil(late))
 
 
-def test_phase_and_delay_margin_say_the_same_where_they_are_of_one_crossing(foam):
-    found = margins(foam)
-    assert found.phase == pytest.approx(360.0 * found.phase_frequency * found.delay, rel=1e-6)
-
-
 def test_the_loop_s_gain_at_low_frequency_is_its_integrator(foam):
     """An error e becomes ki e a tick, of which the feed-forward takes 1 + kf: L = kf + ki/(j omega tick), slowly."""
     f = 0.01
@@ -49,12 +44,6 @@ def test_a_lag_turns_the_phase_and_nothing_else():
     # One more period of computing, half a period more of holding: 1 ms + 0.5 ms.
     np.testing.assert_allclose(np.degrees(np.angle(before / after)), 360.0 * f * 1.5e-3, rtol=0.05)
     np.testing.assert_allclose(np.abs(after / before), 1.0, rtol=0.01)
-
-
-def test_nearer_to_the_boundary_margins_shrink(foam):
-    near = linearise(surface(100e3, 480.0, 1.0, 0.003))
-    assert 1.0 < margins(near).gain < 1.1
-    assert margins(near).sensitivity > 5.0 > margins(foam).sensitivity
 
 
 def test_an_unstable_loop_has_no_margins():

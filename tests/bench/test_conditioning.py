@@ -1,7 +1,6 @@
 """What the controller makes of angles and force: App. E's filters, each against SciPy's, at rest from the start."""
 
 import numpy as np
-import pytest
 from scipy import signal
 
 from palpate._vector import Vec3
@@ -69,9 +68,3 @@ def test_every_signal_is_what_appendix_e_makes_of_it():
     for name, (ours, theirs) in pick.items():
         scale = np.abs(theirs).max()
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-7 * scale + 1e-9, err_msg=name)
-
-
-def test_the_force_is_a_wrench_along_x():
-    (signals,) = conditioned(np.array([START]), np.array([3.0]))
-    assert signals.sense.f.y == signals.sense.f.z == 0.0
-    assert signals.sense.f.x == pytest.approx(CONDITIONING.force.b0 * 3.0)

@@ -5,8 +5,6 @@ import sys
 
 import pytest
 
-from palpate.bench import build, load
-
 SCRIPT = """
 import os, signal, threading
 from palpate.bench import build, load
@@ -29,15 +27,3 @@ def test_the_rows_so_far_are_kept():
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[:3] == ["interrupted True"] * 3
-
-
-def test_so_are_they_between_two_chunks():
-    """A progress bar is where it comes most easily."""
-
-    def interrupted(now, _phase):
-        if now > 1.0:
-            raise KeyboardInterrupt
-
-    record = build(load("foam-hybrid")).run(600.0, progress=interrupted)
-    assert record.meta["end"] == "interrupted"
-    assert record["t"][-1] > 1.0

@@ -56,11 +56,6 @@ def test_what_noise_took_for_a_touch_is_forgotten_at_the_next():
     assert once_more.centring.weight == 1.0
 
 
-def test_while_it_presses_a_moment_below_zero_is_data_too():
-    state = after(ESTIMATORS.start_at(X), [(X, 6.0), (X, -0.5), (X, 6.0)], pressing=True)
-    assert state.centring.weight == 3.0
-
-
 def test_a_false_touch_does_not_change_the_result():
     """The same press twice, once with a threshold in the noise: K and its interval hold."""
     results = []

@@ -30,11 +30,6 @@ kind = "hybrid"
 """
 
 
-def test_the_good_one_is_good():
-    assert parse(GOOD, "mine.toml").surface.stiffness == 5200.0
-    build(parse(GOOD, "mine.toml"))
-
-
 @pytest.mark.parametrize("name", names())
 def test_every_shipped_experiment_says_what_it_is_and_builds(name):
     experiment = load(name)
@@ -44,10 +39,6 @@ def test_every_shipped_experiment_says_what_it_is_and_builds(name):
     # The file says nothing that is lost on the way.
     again = msgspec.convert(msgspec.to_builtins(experiment), Experiment)
     assert again == experiment
-
-
-def test_the_four_of_the_thesis_are_there():
-    assert {"foam-hybrid", "rubber-hybrid", "foam-rls", "rubber-rls"} <= set(names())
 
 
 def test_a_copy_in_a_file_is_the_experiment(tmp_path):

@@ -62,8 +62,3 @@ def test_a_blend_below_one_quantum_is_a_hammer(plain):
     assert abs(error) < 0.3 * plain[2]
     assert jitter > 20 * plain[1]
     assert spread > 5 * plain[3]
-
-
-def test_twice_the_level_drives_the_arm(plain):
-    _, _, _, spread = figures(pressed(2.0 * LEVEL, 0.002))
-    assert spread > 20 * plain[3]

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from palpate._vector import Mat3, Vec3
-from palpate.bench.estimators import Centring, Matched, centre
+from palpate.bench.estimators import Centring, Matched
 from palpate.identifiers.kernels.least_squares import LeastSquares
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth3, delay, state_variable
@@ -57,26 +55,6 @@ def test_least_squares_on_what_is_centred_is_least_squares_with_an_intercept(for
     assert mean.weight == pytest.approx(weights.sum(), rel=1e-12)
 
 
-def test_the_first_sample_is_all_offset():
-    (dphi, dy), state = Centring(1.0).step(Centring(1.0).start(), Vec3(1.0, 2.0, 3.0), 9.0)
-    assert dphi == Vec3(0.0, 0.0, 0.0)
-    assert dy == 0.0
-    assert state.mean == Vec3(1.0, 2.0, 3.0)
-    assert (state.force, state.weight) == (9.0, 1.0)
-
-
-numbers = st.floats(-1e3, 1e3)
-vectors = st.tuples(numbers, numbers, numbers)
-
-
-@given(vectors, vectors, st.floats(0.0, 1e6))
-def test_centring_means_the_same_on_values_and_arrays(mean, value, weight):
-    by_value = centre(Vec3(*mean), Vec3(*value), weight)
-    by_array = centre(np.array(mean), np.array(value), weight)
-    for ours, theirs in zip(by_value, by_array, strict=True):
-        np.testing.assert_array_equal(np.array(ours), theirs)
-
-
 def matched(sensor):
     """The front-end for a sensor: its filter in two sections at the tick's rate, the rest as a delay."""
     model = butterworth3(120.0, TICK)
@@ -120,13 +98,6 @@ def test_channels_that_share_the_sensors_lag_give_the_truth():
     bare = matched(sensor)._replace(delay=delay(0.0, TICK))
     _, biased, _ = identified(bare, position, force)
     assert biased < B - 0.8 * TRUTH[2] * (sensor.lag - butterworth3(120.0, TICK).lag)
-
-
-def test_at_rest_the_front_end_is_at_rest_from_the_first_tick():
-    front = matched(force_sensor())
-    (phi, y), _ = front.step(front.start_at(0.46), 0.46, 0.0)
-    np.testing.assert_allclose(np.array(phi), [0.0, 0.0, 0.46], atol=1e-9)
-    assert y == 0.0
 
 
 def test_position_and_force_leave_with_the_same_filter():

@@ -7,7 +7,6 @@ from palpate.bench import names, summarise, with_values
 from palpate.bench.from_experiment import FILES, build_any, load_any, parse_any
 from palpate.bench.one_direction import OneDirection
 from palpate.errors import InputError
-from palpate.force.simulated_press import ENCODER
 
 PRESSES = sorted(set(FILES.names()) - set(names()))
 GOOD = """
@@ -42,28 +41,11 @@ def test_every_shipped_press_says_what_it_is_and_presses_on(name):
         assert np.isfinite(column).all()
 
 
-def test_both_kinds_of_arm_have_every_press():
-    of = {arm: {n.removeprefix(f"{arm}-") for n in PRESSES if n.startswith(arm)} for arm in ("ur5e", "fr3")}
-    assert of["ur5e"] == of["fr3"]
-    assert {"touch", "stiffer", "softer", "rigid", "yielding", "moving", "steps", "sine", "priors"} == of[
-        "fr3"
-    ]
-
-
 def test_the_same_seed_gives_the_same_numbers_and_another_others():
     bench = build_any(load_any("fr3-touch"))
     first, again, other = (bench.run(9.0, seed, press=0.5) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first["force"], again["force"])
     assert not np.array_equal(first["force_measured"][:300], other["force_measured"][:300])
-
-
-def test_times_count_from_the_touch():
-    record = run("ur5e-steps")
-    start = int(np.argmax(record["phase"] == 1.0))
-    assert record["force"][start - 1] == 0.0 < record["force"][start]
-    steps = np.flatnonzero(np.diff(record["force_desired"][start:])) + 1
-    np.testing.assert_array_equal(steps, [1000, 2000, 3000, 4000])  # every 2 s of 500 Hz
-    assert len(record) - start == 5000
 
 
 def test_a_change_keeps_the_force_and_the_surface_is_another_one():
@@ -76,25 +58,6 @@ def test_a_change_keeps_the_force_and_the_surface_is_another_one():
     late, x = record["force"][start + 4000 :], record["x"][start + 4000 :]
     slope = np.polyfit(x, late, 1)[0]
     assert slope == pytest.approx(62e3, rel=0.02)  # friction has none here, the damper's share is small
-
-
-def test_a_surface_that_sways_moves_the_tip():
-    record = run("fr3-moving")
-    rest = record["x"][-4000:]
-    assert np.ptp(rest) == pytest.approx(2e-3, rel=0.1)
-    assert ENCODER < 1e-5
-
-
-def test_wrong_priors_are_what_the_law_is_told():
-    told, true = (build_any(load_any(f"ur5e-{name}")).gains for name in ("priors", "touch"))
-    assert told.cap == pytest.approx(0.1 * true.cap)
-    assert told.theta == pytest.approx(0.5 * true.theta)
-
-
-def test_a_surface_out_of_reach_in_time_is_no_contact():
-    record = build_any(load_any("ur5e-touch")).run(0.05, press=0.05)
-    assert record.meta["end"] == "no contact"
-    assert summarise(record)["force"] is None
 
 
 WRONG = {

@@ -180,17 +180,6 @@ def test_a_bad_identifier_is_told(module):
         check_parts(build(with_values(quick("foam-hybrid"), {"identifier": {"kind": f"{name}:Bad"}})))
 
 
-def test_the_command_refuses_in_one_line_and_leaves_nothing(module, tmp_path, capsys):
-    name = module(controller("return float('nan') * model.h, state"))
-    text = EXPERIMENT.replace("own_parts:Push", f"{name}:Bad").replace(
-        "ki = 2\nhold = [0.0, 1500.0, 2.0]\n", ""
-    )
-    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
-    assert main(["run", "mine.toml", "--plugins", "--out", "out"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
 def test_keys_are_the_parts_own_fields():
     for text, why in (
         ("gain = 2", "unknown key 'gain'.*in \\[controller\\]"),

@@ -195,13 +195,6 @@ def test_friction_takes_what_its_bristles_do_not_hold():
     assert np.all(np.cumsum(out[:, 1]) > -1e-12)
 
 
-def test_without_torque_an_arm_at_rest_stays():
-    plant = plant_with()
-    state = at_rest(plant, 0.454)
-    end, _ = after(plant, state, ZERO3, 50e-6, 0.1)
-    assert end == state
-
-
 def test_below_break_away_the_arm_creeps_and_stops():
     """Less torque than stiction: the joints move about as far as their bristles bend, and no further."""
     plant = plant_with()

@@ -1,8 +1,6 @@
 """Given motion: the force is the surface's law of the path, to the reading through the bench's own instruments."""
 
-import time
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from hypothesis import strategies as st
 from palpate.bench import ForceSensorTable
 from palpate.bench.tip_on_path import COLUMNS, given_motion
 from palpate.environments import HuntCrossley, KelvinVoigt, StandardLinearSolid
-from palpate.environments.surface import UNTOUCHED, SurfaceState
+from palpate.environments.surface import SurfaceState
 from palpate.errors import InputError
 from palpate.instruments import Converter
 
@@ -112,12 +110,6 @@ def test_it_never_pulls_and_gives_back_no_more_than_it_got(surface, amplitudes, 
     assert work.min() >= -moving - 2e-3 * np.abs(work).max() - 1e-9
 
 
-def test_free_motion_is_felt_by_nothing():
-    record = given_motion(FOAM, wall=0.01, **IDEAL).run(sine, 0.5)
-    assert not record["force"].any()
-    assert not record["force_sampled"].any()
-
-
 def test_a_touch_at_speed_gives_its_impulse_to_the_sensor():
     speed = 0.2
     heavy = KelvinVoigt(1.0, 0.0, 0.5)
@@ -135,12 +127,6 @@ def test_the_same_seed_gives_the_same_numbers_and_another_others():
     assert np.std(first["force_sampled"] - other["force_sampled"]) == pytest.approx(0.6 * 2**0.5, rel=0.2)
     assert np.abs(first["x_measured"] - first["x"]).max() <= 2.5e-6 * (1 + 1e-9)
     assert len(np.unique(first["x_measured"])) < 500
-
-
-def test_noise_is_there_from_the_first_reading_on():
-    rig = given_motion(FOAM)
-    starts = [rig.run(lambda t: 0.0 * t + 2e-3, 0.004, seed)["force_sampled"][0] for seed in range(200)]
-    assert np.std(starts) == pytest.approx(0.6, rel=0.15)
 
 
 @pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
@@ -174,50 +160,6 @@ def test_after_the_change_the_law_is_the_new_ones():
     np.testing.assert_allclose(record["force"][~late], sines_force(t, soft)[~late], rtol=0, atol=1e-3)
     expected = sines_force(t, hard) - hard.stiffness * rest
     np.testing.assert_allclose(record["force"][late], expected[late], rtol=0, atol=2e-3)
-
-
-def test_a_surface_that_comes_while_nothing_is_pressed_is_where_the_old_one_was():
-    record = given_motion([(0.0, FOAM), (0.5, RUBBER)], wall=0.01, **IDEAL).run(sine, 1.0)
-    assert [told["rest_m"] for told in record.meta["surfaces"]] == [0.01, 0.01]
-
-
-class Cushion(NamedTuple):
-    """A part of one's own: f = K p + K3 p^3, without mass, that tells nothing of itself."""
-
-    stiffness: float
-    hardening: float
-    mass: float = 0.0
-
-    def start(self):
-        return UNTOUCHED
-
-    def force(self, state, p, v):
-        return (self.stiffness + self.hardening * p * p) * p
-
-    def relax(self, state, p, v, dt):
-        return SurfaceState(p, v, 0.0, 1.0)
-
-    def free(self, state, dt):
-        return UNTOUCHED
-
-
-def test_a_part_of_ones_own_can_be_pressed():
-    record = given_motion(Cushion(2000.0, 4e8), **IDEAL).run(sine, 0.05, compiled=False)
-    np.testing.assert_allclose(record["force"], 2000.0 * record["x"] + 4e8 * record["x"] ** 3, rtol=1e-9)
-    assert record.meta["truth"] == {}
-
-
-def test_a_trial_is_compiled():
-    """Some hundred times as fast as in plain Python: ten are left over on whatever else the machine does."""
-    rig, path = given_motion(FOAM), sine(np.arange(300) / 1000.0)
-
-    def seconds(compiled):
-        begun = time.perf_counter()
-        rig.run(path, compiled=compiled)
-        return time.perf_counter() - begun
-
-    seconds(True)
-    assert 10 * min(seconds(True) for _ in range(5)) < seconds(False)
 
 
 BAD = {

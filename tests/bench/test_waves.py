@@ -5,7 +5,6 @@ import pytest
 
 from bench.quick import quick
 from palpate.bench import build, load, with_values
-from palpate.bench.tables import parse
 from palpate.errors import InputError
 from palpate.references import Chirp, Multisine
 
@@ -24,13 +23,6 @@ def test_chirp_and_sines_are_asked_for_from_contact_on():
     time = np.arange(200) / 1000.0
     expected = 20.0 + Chirp(**CHIRP).at(time) + Multisine(**SINES).at(time)
     np.testing.assert_allclose(asked(experiment), expected, rtol=0, atol=1e-12)
-
-
-def test_a_key_of_a_table_that_was_left_out_can_be_changed():
-    experiment = with_values(load("foam-chirp"), {"force.chirp.high": 30.0})
-    assert experiment.force.chirp.high == 30.0
-    with pytest.raises(InputError, match=r"the key 'low' is missing in \[force.chirp\]"):
-        with_values(load("foam-hybrid"), {"force.chirp.high": 30.0})
 
 
 def test_any_array_will_do():
@@ -74,9 +66,3 @@ BAD = {
 def test_a_bad_wave_is_refused_by_its_key(changes, told):
     with pytest.raises(InputError, match=told):
         build(with_values(load("foam-hybrid"), changes))
-
-
-def test_a_wave_that_is_no_table_is_refused():
-    text = 'title = "x"\n[surface]\nkind = "kelvin-voigt"\nstiffness = 1.0\ndamping = 0.0\nmass = 0.0\n'
-    with pytest.raises(InputError, match=r"chirp in \[force\] must be a table, got 3"):
-        parse(f"{text}[force]\nchirp = 3\n", "mine.toml")

@@ -125,11 +125,6 @@ def test_words_that_are_wrong(tmp_path, bag, capsys, kind):
     refused(tmp_path, capsys, ["identify", bag, *words], pattern)
 
 
-def test_a_report_of_somebody_else_is_not_written_over(tmp_path, bag, capsys):
-    (tmp_path / "thesis.html").write_text("years of work")
-    refused(tmp_path, capsys, ["identify", bag, "--report", "thesis.html"], "palpate did not write it")
-
-
 def test_no_wrench_or_two(tmp_path, capsys):
     write_bag(tmp_path / "none", "mcap", [pose("/pose", TIME, MOVED)])
     refused(
@@ -141,56 +136,6 @@ def test_no_wrench_or_two(tmp_path, capsys):
     sent = [wrench("/ft", TIME, MOVED), wrench("/hand", TIME, MOVED), pose("/pose", TIME, MOVED)]
     write_bag(tmp_path / "two", "mcap", sent)
     refused(tmp_path, capsys, ["identify", "two"], "there are /ft, /hand")
-
-
-def test_a_type_that_nobody_defines(tmp_path, capsys):
-    """As a topic of another tool's in a robot's MCAP."""
-    path = write_bag(tmp_path / "other", "mcap", [wrench("/ft", TIME, MOVED)], extra="/grip")
-    file = storage(path)
-    file.write_bytes(
-        file.read_bytes().replace(
-            b"my_msgs/msg/Grip\x07\x00\x00\x00ros2msg", b"my_msgs/msg/Grip\x07\x00\x00\x00unknown"
-        )
-    )
-    words = ["--force", "/grip.grip", "--position", "/ft.wrench.force.z:1"]
-    refused(
-        tmp_path,
-        capsys,
-        ["identify", "other", *words],
-        "my_msgs/msg/Grip, is not defined in the bag, and its layout is not guessed",
-    )
-    assert main(["topics", "other"]) == 0
-    assert "unknown type" in capsys.readouterr().out
-
-
-def test_topics_that_were_never_recorded_together(tmp_path, capsys):
-    write_bag(tmp_path / "log", "mcap", [wrench("/ft", TIME, MOVED), pose("/pose", TIME + 100, MOVED)])
-    refused(
-        tmp_path,
-        capsys,
-        ["identify", "log", "--wrench-frame", "base"],
-        r"no time in common \(/ft 0 to 1.99 s, /pose 100",
-    )
-
-
-def test_axes_that_nobody_names(tmp_path, capsys):
-    sent = [wrench("/ft", TIME, MOVED, frame=""), pose("/pose", TIME, MOVED, frame="")]
-    write_bag(tmp_path / "log", "mcap", sent)
-    refused(tmp_path, capsys, ["identify", "log"], "does not name the axes of its wrench; say --wrench-frame")
-
-
-def test_a_tool_that_never_moved(tmp_path, capsys):
-    sent = [wrench("/ft", TIME, MOVED), pose("/pose", TIME, ZERO)]
-    write_bag(tmp_path / "log", "mcap", sent)
-    refused(tmp_path, capsys, ["identify", "log"], "the position is 0 in every row")
-
-
-def test_a_wall_that_shows_nothing(tmp_path, bag, capsys):
-    rng = np.random.default_rng(0)
-    air = [wrench("/ft", TIME, rng.normal(0, 0.1, (200, 3))), pose("/pose", TIME, MOVED)]
-    write_bag(tmp_path / "air", "mcap", air)
-    words = ["--wrench-frame", "tool", "--robot-stiffness-from", "air"]
-    refused(tmp_path, capsys, ["identify", bag, *words], "air does not show the robot's stiffness")
 
 
 def test_a_wrench_of_a_log_of_one_axis(tmp_path, capsys):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +14,6 @@ import palpate
 from cli import hostile_logs
 from cli.typed_logs import TypedLog, logs_of_the_project, measured_logs
 from palpate.cli import main
-from palpate.report import style
 from palpate.report.identification import charts, page
 
 NAMED = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
@@ -138,17 +136,6 @@ def test_a_page_that_fails_leaves_figure_and_table(capfd, elsewhere, monkeypatch
     assert said.startswith("palpate: page.html is not drawn: ValueError")
 
 
-def test_a_picture_that_fails_of_many_logs(capfd, elsewhere, monkeypatch):
-    log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
-    other = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading(), "other.csv")
-    monkeypatch.setattr(style, "save", fail)
-    code, text, said = identify(capfd, log, other, *NAMED)
-    assert code == 0
-    assert "other.csv" in text
-    assert said.count("\n") == 1
-    assert said.startswith("palpate: pooled.identify.png is not drawn: ValueError")
-
-
 @pytest.mark.parametrize(
     ("names", "code"),
     [(("fluid", "only_unloading"), 0), (("fluid", "one_touch"), 1), (("no_number", "only_unloading"), 0)],
@@ -209,17 +196,6 @@ def test_no_size_of_a_terminal_spoils_an_answer_or_the_help(columns, lines, capf
     assert "Identify the touched surface" in printed.out
 
 
-def test_another_backend_spoils_no_figure(elsewhere):
-    """In a process of its own, as it is read where matplotlib is imported; with a width of nothing."""
-    log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
-    env = {**os.environ, "MPLBACKEND": "nonsense", "COLUMNS": "0"}
-    words = [sys.executable, "-m", "palpate", "identify", log, *NAMED]
-    ran = subprocess.run(words, capture_output=True, text=True, check=False, env=env)
-    assert (ran.returncode, ran.stderr) == (0, "")
-    assert ran.stdout.endswith("figure: log.identify.png\n")
-    assert (elsewhere / "log.identify.png").exists()
-
-
 @pytest.mark.parametrize("count", [6, 63])
 def test_too_few_open_files_are_one_line(count, elsewhere):
     log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
@@ -230,11 +206,3 @@ def test_too_few_open_files_are_one_line(count, elsewhere):
         f"palpate: this process may have {count} files open, and its libraries need 64; raise the limit with: ulimit -n"
         " 1024\n"
     )
-
-
-def test_as_many_open_files_as_are_asked_for_suffice(elsewhere):
-    log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
-    line = f"ulimit -n 64 && exec {sys.executable} -m palpate identify {log} --report page.html --table t.csv"
-    ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
-    assert (ran.returncode, ran.stderr) == (0, "")
-    assert (elsewhere / "page.html").exists()

@@ -2,13 +2,10 @@
 
 import re
 import shlex
-import subprocess
-import sys
 
 import pytest
 
 from palpate.cli import main
-from palpate.cli._help import example, page
 from palpate.cli._program import COMMANDS, added_commands, program
 from palpate.cli.options.common import MODELS
 from palpate.identification.models import NAMES
@@ -74,16 +71,6 @@ def test_no_line_is_longer_than_the_terminal(help_of, command):
         assert len(line) <= WIDTH or " " not in line.strip(), line
 
 
-def test_an_example_is_continued_as_a_shell_continues_it():
-    line = (
-        "palpate identify press.csv --time time_s --position position_mm:mm --force force_mN:mN > found.json"
-    )
-    shown = "\n".join(example(line, 50))
-    assert max(len(one) for one in shown.splitlines()) <= 50
-    assert shlex.split(shown.replace("\\\n", "")) == shlex.split(line)
-    assert page(f"Words.\n\n{line}", 50) == f"Words.\n\n{shown}"
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -104,29 +91,6 @@ def test_other_suggestions_stay(capsys):
     assert "Did you mean --position" in capsys.readouterr().err
     assert main(["identify", "x.csv", "--forse", "x"]) == 2
     assert "--force" in capsys.readouterr().err  # of identify it is a column
-
-
-@pytest.mark.parametrize(
-    "shell", ["bash", *(pytest.param(s, marks=pytest.mark.long) for s in ("zsh", "fish"))]
-)
-def test_completion_knows_commands_and_options(capsys, shell):
-    assert main(["completion", shell]) == 0
-    script = capsys.readouterr().out
-    for word in (*ALL, "wrench-frame", "working-point"):
-        assert word in script
-
-
-def test_completion_imports_nothing_heavy():
-    code = "import sys; from palpate.cli import main; main(['completion', 'bash']); print([n for n in sys.modules])"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(re.findall(r"'(\w+)'", ran.stdout.splitlines()[-1]))
-    assert not loaded & {"numba", "scipy", "matplotlib", "polars", "mujoco"}
-
-
-def test_the_commands_are_in_groups(capsys):
-    assert main(["--help"]) == 0
-    titles = [title[1] for line in capsys.readouterr().out.splitlines() if (title := PANEL.match(line))]
-    assert titles[:3] == ["From a log", "Force loop", "Simulate"]
 
 
 def test_completed_models_are_those_of_the_library():

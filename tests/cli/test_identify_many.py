@@ -56,35 +56,10 @@ def test_a_folder_is_its_logs_and_what_they_say_together(presses, capsys):
     assert point["force_N"][0] < point["force_N"][1]
 
 
-@pytest.mark.long
-def test_the_dependence_on_a_temperature_is_pooled(presses, capsys):
-    temperatures = {"press_2.csv": 30, "press_10.csv": 20.5, "press_9.csv": 10}
-    for name, temperature in temperatures.items():
-        head, *rows = (presses / name).read_text().splitlines()
-        lines = [f"{head},temperature_C", *(f"{row},{temperature}" for row in rows)]
-        (presses / name).write_text("\n".join(lines))
-    _, found = ask(capsys, presses, "--covariate", "temperature_C")
-    slope = found["pooled"]["parameters"]["K"]["covariates"]["temperature_C"]
-    low, high = slope["ci95"]
-    assert low < -55 < high
-    assert slope["at"] == pytest.approx(20.17, abs=0.01)
-    assert main(["identify", str(presses), *OWN, "--covariate", "temperature_C"]) == 0
-    printed = capsys.readouterr().out
-    assert "N/m per temperature_C" in " ".join(printed.split())
-    assert "temperature_C 20.17" in " ".join(printed.split())
-
-
 def test_a_covariate_is_the_mean_of_a_logs_own_readings(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time_s;warm\n0;20,5\n1;-1\n2;21,5\n")
     assert read_covariates([log], ["warm"], missing=["-1"], delimiter=";")["warm"] == pytest.approx([21.0])
-
-
-@pytest.mark.long
-def test_files_are_pooled_as_a_folder_is(presses, capsys):
-    _, folder = ask(capsys, presses)
-    _, files = ask(capsys, *sorted(presses.glob("*.csv"), key=lambda p: int(p.stem[6:])))
-    assert files["pooled"] == folder["pooled"]
 
 
 def test_one_log_of_many_is_what_it_is_alone(presses, capsys):
@@ -114,27 +89,6 @@ def test_where_all_fail_it_is_one_line_and_code_2(presses, capsys):
     assert printed.err.count("\n") == 1
     assert "none of 3 logs can be identified: " in printed.err
     assert sorted(presses.parent.rglob("*")) == before
-
-
-def test_where_none_touches_the_answer_is_no(presses, capsys):
-    rng = np.random.default_rng(0)
-    for path in presses.glob("*.csv"):
-        rows = np.loadtxt(path, delimiter=",", skiprows=1)
-        rows[:, 2] = rng.normal(0, 0.05, len(rows))
-        np.savetxt(path, rows, delimiter=",", header="time_s,position_mm,force_N", comments="", fmt="%.7g")
-    code, found = ask(capsys, presses)
-    assert code == 1
-    assert found["pooled"]["working_point"] is None
-
-
-def test_the_table_the_figure_and_the_page(presses, capsys):
-    assert main(["identify", str(presses), *OWN, "--report", "a.html"]) == 0
-    printed = capsys.readouterr().out
-    for part in ("press_10.csv", "figure: pooled.identify.png", "report: a.html"):
-        assert part in printed
-    assert printed.startswith("Over 3 of 3 logs the stiffness is ")
-    assert (presses.parent / "pooled.identify.png").read_bytes().startswith(b"\x89PNG")
-    assert "press_10.csv" in (presses.parent / "a.html").read_text()
 
 
 def test_an_interruption_keeps_what_was_done(presses, capsys, monkeypatch):

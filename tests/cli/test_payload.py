@@ -48,16 +48,6 @@ def test_a_log_is_weighed_and_everything_is_written(elsewhere, capsys):
 
 
 @pytest.mark.long
-def test_poses_that_do_not_tell_are_exit_code_1_and_nothing_is_written(elsewhere, capsys):
-    write(log_of(Tool(), Rotation.from_rotvec(np.zeros((3, 3))), np.random.default_rng(0)), "still.parquet")
-    code, found = ask(capsys, "payload", "still.parquet", "--wrench-frame", "tool", "--out", "tool.toml")
-    assert code == 1
-    assert found["payload"] is None
-    assert "hardly turns" in found["lacking"][0]
-    assert not (elsewhere / "tool.toml").exists()
-
-
-@pytest.mark.long
 def test_a_press_is_identified_with_the_payload(elsewhere, capsys):
     tool = Tool(side=-1.0, taken_off=1.0)
     write(log_of(tool, six(), np.random.default_rng(0)), "turning.parquet")

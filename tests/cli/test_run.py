@@ -92,18 +92,6 @@ def test_a_run_leaves_a_folder_of_results(done):
         assert png.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
 
 
-def test_the_summary_agrees_with_the_record(done):
-    folder = done[0] / "results"
-    summary = json.loads((folder / "summary.json").read_text())
-    record = read_record(folder / "record.parquet")
-    pressing = record["phase"] == 1.0
-    assert summary["end"] == "done"
-    assert summary["contact_at_s"] == record["t"][np.argmax(pressing)]
-    assert summary["force"]["overshoot_N"] == pytest.approx(max(0.0, record["force"][pressing].max() - 20.0))
-    assert summary["identified"]["matched"]["K"] == record["K_matched"][-1]
-    assert summary["truth"]["B"] == {"value": 200.0, "unit": "N s/m"}
-
-
 def test_the_report_opens_without_a_network(done):
     page = (done[0] / "results" / "report.html").read_text(encoding="utf-8")
     references = References()
@@ -194,58 +182,6 @@ def test_print_shows_a_file_that_can_be_run(name, capsys):
     assert capsys.readouterr().out == source(name)
 
 
-@pytest.mark.long
-def test_a_press_along_one_direction_has_its_own_page(tmp_path, capsys):
-    out = tmp_path / "results"
-    assert main(["run", "ur5e-touch", "--out", str(out)]) == 0
-    assert {p.name for p in out.iterdir()} == {
-        "record.parquet",
-        "summary.json",
-        "report.html",
-        "force.png",
-        "bound.png",
-    }
-    assert "settling to 5 %" in capsys.readouterr().out
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert "First touch of an unknown surface" in page
-    assert "stiffness of the surface" in page
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert summary["force"]["settling_s"] < 0.3
-    assert summary["saturated"] == {}
-    assert read_record(out / "record.parquet").units["bound"] == "N/m"
-
-
-def test_without_a_name_it_says_what_to_do(capsys):
-    assert "palpate run --list" in refused(capsys)
-
-
-def test_an_unknown_experiment_names_the_nearest(capsys, tmp_path):
-    assert "did you mean 'rubber-hybrid'" in refused(capsys, "rubber-hybird")
-    nothing_but(tmp_path)
-
-
-def test_a_missing_file(capsys, tmp_path):
-    assert "absent.toml: no such file" in refused(capsys, "absent.toml")
-    nothing_but(tmp_path)
-
-
-WRONG = {
-    "TOML": ("[run]", "[run", "not TOML"),
-    "value": ("stiffness = 5200.0", "stiffness = -52.0", "stiffness in [surface] must be a number above 0, got -52.0"),
-    "friction": ("static = [3.6", "static = [0.6", "static in [friction] must be at least coulomb"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("old", "new", "told"), WRONG.values(), ids=WRONG)
-def test_a_wrong_experiment_is_refused_with_its_file_named(mine, capsys, old, new, told):
-    assert old in mine.read_text()
-    mine.write_text(mine.read_text().replace(old, new, 1), encoding="utf-8")
-    line = refused(capsys, "mine.toml", "--out", "results")
-    assert line.startswith("palpate: mine.toml: ")
-    assert told in line
-    nothing_but(mine.parent, "mine.toml")
-
-
 @pytest.mark.parametrize("seed", ["-1", "1.5", "many"])
 def test_a_seed_is_a_whole_number_from_zero_on(mine, capsys, seed):
     assert "seed" in refused(capsys, "mine.toml", "--seed", seed).lower()
@@ -257,23 +193,6 @@ def test_results_are_not_written_over(mine, done, capsys):
     before = (results / "record.parquet").read_bytes()
     assert "--replace" in refused(capsys, "mine.toml", "--seed", "9", "--out", "results")
     assert (results / "record.parquet").read_bytes() == before
-
-
-@pytest.mark.long
-def test_results_are_replaced_by_force_and_figures_are_of_the_kinds_asked_for(mine, done):
-    results = shutil.copytree(done[0] / "results", mine.parent / "results")
-    before = (results / "record.parquet").read_bytes()
-    kinds = ("--figures", "svg", "--figures", "pdf")
-    assert main(["run", "mine.toml", "--seed", "9", "--out", "results", "--replace", *kinds]) == 0
-    assert (results / "record.parquet").read_bytes() != before
-    figures = {
-        Path(name).with_suffix(end).name
-        for name in FILES
-        if name.endswith(".png")
-        for end in (".svg", ".pdf")
-    }
-    nothing_but(results, *(name for name in FILES if not name.endswith(".png")), *figures)
-    nothing_but(mine.parent, "mine.toml", "results")
 
 
 def test_figures_that_cannot_be_written_are_refused(mine, capsys):

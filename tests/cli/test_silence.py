@@ -3,8 +3,6 @@
 import subprocess
 import sys
 
-import pytest
-
 WAYS = {
     "warnings": "import warnings; warnings.simplefilter('always'); warnings.warn('library')",
     "arithmetic": "import numpy; numpy.float64(1e308) * numpy.float64(1e308)",
@@ -38,14 +36,13 @@ def said(code, *options):
     return ran.stderr
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_library_is_not_heard(way):
-    assert said(WAYS[way]) == "own\n"
+def test_a_library_is_not_heard():
+    assert said("\n".join(WAYS.values())) == "own\n"
 
 
-@pytest.mark.parametrize("way", ["warnings", "descriptor", "finaliser"])
-def test_it_is_heard_by_who_develops(way):
-    assert "library" in said(WAYS[way], "-X", "dev")
+def test_it_is_heard_by_who_develops():
+    heard = said("\n".join(WAYS[way] for way in ("warnings", "descriptor", "finaliser")), "-X", "dev")
+    assert heard.count("library") >= 3
 
 
 def test_a_defect_in_a_thread_of_palpate_keeps_its_traceback():

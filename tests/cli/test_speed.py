@@ -8,7 +8,6 @@ from palpate.bench import build, load, speed
 from palpate.bench.force_input import COLUMNS
 from palpate.bench.summary import CONTACT
 from palpate.bench.tables import with_values
-from palpate.cli import main
 
 
 def test_the_figures_follow_from_a_clock_and_the_ticks_that_were_run(monkeypatch):
@@ -40,13 +39,3 @@ def test_what_is_measured_presses_and_learns():
     record = bench.run(1.0)
     assert (record["phase"] == CONTACT).mean() > 0.5
     assert record["adapted2"][-1] != record["adapted2"][0]  # a norm of the network's weights
-
-
-def test_people_get_a_table(monkeypatch, capsys):
-    figures = {"ns_per_tick": 800.0, "ticks_per_s": 2.5e6, "cores": 2, "times_real_time": 1250.0}
-    monkeypatch.setattr(speed, "measure", lambda waiting: figures)
-    assert main(["speed"]) == 0
-    printed = capsys.readouterr().out
-    assert "times real time" in printed
-    assert "one tick" in printed
-    assert "1250" in printed.replace(",", "")

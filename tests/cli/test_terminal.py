@@ -18,7 +18,6 @@ from palpate.report.terminal import head, show_table
 from palpate.text import printable
 
 EVIL = "\x1b]0;owned\x07\x1b[2J[bold]$x^{$\u202egnp.\udcff"
-COLUMNS = ("--time", "time_s", "--position", "position_mm:mm", "--force", "force_N:N")
 
 
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Zs", "Cc", "Cf", "Cs"])))

@@ -45,10 +45,3 @@ def test_a_wrong_one_is_missed_by_as_much_as_it_is_off(log):
     missed, lines = off(record, tcp=tuple(world.tcp + across + 0.1 * inside), wrench_at=tuple(at))
     assert missed == pytest.approx(0.03, rel=0.05)  # along the force the line does not tell
     assert any("--tcp" in line for line in lines)
-
-
-def test_without_a_torque_nothing_is_said(log):
-    world, _, record = log
-    bare = {name: column for name, column in record.columns.items() if not name.startswith("torque")}
-    missed, _ = off(Record(bare, dict.fromkeys(bare, "1")), tcp=tuple(world.tcp))
-    assert missed is None

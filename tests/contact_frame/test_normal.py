@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.contact_frame.load import Normal, main_axis, scale_std, slope_across
+from palpate.contact_frame.load import Normal, main_axis, scale_std
 
 TRIALS = 300
 
@@ -60,20 +60,6 @@ def test_what_a_wrong_normal_does_to_the_stiffness():
     assert np.std(stiffness) / 5000 == pytest.approx(
         scale_std(Normal(normal, std, True), force, place), rel=0.05
     )
-
-
-def test_where_tool_and_force_go_along_the_normal_the_cosines_cancel():
-    depth = np.linspace(0, 1, 100)
-    vectors = np.outer(depth, [0.0, 0.0, 1.0])
-    std = 0.02
-    assert scale_std(Normal(np.array([0.0, 0.0, 1.0]), std, True), vectors, vectors) == pytest.approx(std**2)
-    assert scale_std(Normal(np.array([0.0, 0.0, 1.0]), 0.0, False), vectors, vectors) == 0.0
-
-
-def test_across_per_along():
-    depth = np.linspace(0, 1, 50)
-    vectors = np.outer(depth, [0.3, 0.0, 1.0]) + 7
-    assert slope_across(vectors, np.array([0.0, 0.0, 1.0])) == pytest.approx([0.3, 0.0, 0.0])
 
 
 def test_noise_has_no_direction():

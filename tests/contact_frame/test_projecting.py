@@ -55,23 +55,6 @@ def test_the_force_and_the_position_are_those_of_one_axis():
     np.testing.assert_allclose(along["force"], flat["force"], atol=1e-9)
 
 
-def test_a_tool_that_does_not_turn_shows_weight_and_bias_together():
-    rng = np.random.default_rng(1)
-    world = any_world(rng, turns=False)
-    about = project(log_of(world, rng), frame_of(world)).meta["contact_frame"]
-    assert about["weight_N"] is None
-    together = world.turn.inv().apply(world.weight) + world.sensor.apply(world.bias)
-    assert about["bias_N"] == pytest.approx(together, abs=0.02)
-
-
-def test_a_compensated_wrench_has_a_bias_only():
-    rng = np.random.default_rng(2)
-    world = any_world(rng, weight=np.zeros(3))
-    about = project(log_of(world, rng), frame_of(world, gravity_compensated=True)).meta["contact_frame"]
-    assert about["weight_N"] is None
-    assert about["bias_N"] == pytest.approx(world.sensor.apply(world.bias), abs=0.02)
-
-
 @pytest.mark.parametrize("axes", ["base", "tool"])
 def test_a_normal_that_is_given_is_taken(axes):
     rng = np.random.default_rng(4)

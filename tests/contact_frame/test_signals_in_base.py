@@ -23,10 +23,6 @@ def test_an_axis_at_its_limit_is_found():
     assert (stuck == at_limit).mean() > 0.99  # a single row there may be a reading
 
 
-def test_a_force_within_its_range_is_left():
-    assert not saturated_rows(force(), PLACE, ALL).any()
-
-
 def test_a_tool_that_rests_is_not_at_its_limit():
     held = force(15.0)
     assert not saturated_rows(held, 0 * PLACE, ALL).any()

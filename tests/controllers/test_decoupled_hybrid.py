@@ -49,20 +49,6 @@ def test_without_measured_compensation_a_step_of_force_moves_the_position(law):
     assert phi > math.radians(0.1)
 
 
-def test_even_as_printed_a_step_of_position_leaves_the_force_alone():
-    """The coupling of (4.18) goes one way: the force error moves y and phi, they do not move the force."""
-    *_, f = press(SAME_GAIN, task(0.0, y=0.001), K_E)
-    assert np.abs(f).max() < 1e-5
-
-
-def test_as_printed_nothing_damps_the_force():
-    t, _, _, f = press(SAME_GAIN, task(20.0), K_E, duration=1.0, samples=2001)
-    early, late = np.ptp(f[t < 0.25]), np.ptp(f[t > 0.75])
-    assert late > 0.9 * early
-    *_, damped = press(CORRECTED, task(20.0), K_E, duration=1.0)
-    assert np.ptp(damped[-250:]) < 1e-3
-
-
 def test_the_printed_gain_is_a_stiffness_squared_too_high():
     printed = DecoupledHybrid.printed(KP, KV, Vec3(KF, KF, KF), K_E)
     assert printed.force_gain.x / CORRECTED.force_gain.x == pytest.approx(K_E**2)

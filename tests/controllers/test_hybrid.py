@@ -13,7 +13,6 @@ from palpate.controllers.hybrid import hybrid
 from palpate.signals.types import Sense
 
 KP, KV = Vec3(400.0, 400.0, 400.0), Vec3(80.0, 80.0, 80.0)
-ALONG_X = Vec3(1.0, 0.0, 0.0)
 angles = st.floats(-3.0, 3.0)
 joints = st.builds(Vec3, angles, angles, angles)
 

@@ -33,8 +33,3 @@ def test_along_the_surface_it_holds_the_pose_of_the_task():
     _, x, _, _ = press(LAW, task(0.0, y=0.001), SPRING, duration=1.5)
     assert x[-1, 1:] == pytest.approx([0.001, 0.0], abs=1e-6)
     assert np.abs(x[:, 2]).max() < 1e-8
-
-
-def test_a_desired_force_is_none_of_its_business():
-    one, other = (press(LAW, task(force), SPRING, duration=0.05)[3] for force in (0.0, 20.0))
-    assert np.array_equal(one, other)

@@ -102,14 +102,6 @@ def test_on_arrays_it_means_the_same(make, seed):
     assert on_arrays == pytest.approx(plain, rel=1e-9)
 
 
-@each
-def test_an_arm_of_seven_joints_follows_a_task_of_six(make):
-    arrays = inputs(6, 7, 4)
-    torques = walk_on_arrays(make(lambda v: np.full(6, v), lambda v: np.full(7, v)), *arrays)
-    assert torques.shape == (5, 7)
-    assert np.isfinite(torques).all()
-
-
 @pytest.mark.parametrize("name", ["resolved acceleration", "decoupled", "impedance"])
 def test_seven_joints_accelerate_as_the_six_directions_were_told(name):
     """These compensate all of the dynamics: what is left is J qdd + Jdot qd = u."""

@@ -6,8 +6,7 @@ import pytest
 
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.bench import build, load
-from palpate.bench.plant import compiled_march
-from palpate.controllers import Hybrid, Neural, join
+from palpate.controllers import Hybrid, Neural
 from palpate.errors import InputError
 from palpate.networks import Perceptron, layers_of, network, random_layers
 from palpate.robots.arm3 import Arm3
@@ -115,60 +114,6 @@ def test_compiled_and_plain_agree_to_the_last_bit_in_contact(quick):
         np.testing.assert_allclose(compiled[name], plain[name], rtol=tolerance, err_msg=name)
     assert np.ptp(compiled["memory_fx"]) > 1.0
     assert (compiled["adapted1"] > 0.0).all()
-
-
-def test_every_run_starts_from_fresh_weights(quick):
-    bench = build(quick)
-    first, second, other = bench.run(1.5, seed=1), bench.run(1.5, seed=1), bench.run(1.5, seed=2)
-    np.testing.assert_array_equal(first["memory_fx"], second["memory_fx"])
-    assert not np.array_equal(first["memory_fx"], other["memory_fx"])
-    assert other["adapted2"][0] == first["adapted2"][0]
-
-
-def test_joined_it_is_what_it_is_alone(quick):
-    bench = build(quick)
-    alone = Neural.thesis(5e-5)
-    joined = bench.run(0.5, seed=1, compiled=False)
-    single = build(quick)
-    object.__setattr__(single, "loop", single.loop._replace(controller=alone))
-    record = single.run(0.5, seed=1, compiled=False)
-    assert (record["phase"] == 1.0).sum() > 20
-    for name in record.columns:
-        np.testing.assert_array_equal(record[name], joined[name], err_msg=name)
-    assert type(join(alone)) is type(bench.loop.controller)
-
-
-def test_other_sizes_share_the_compiled_loop(quick):
-    build(quick).run(0.01)
-    versions = len(compiled_march.compiled.signatures)
-    deep = replaced(quick, controller=replaced(quick.controller, layers=(6, 5), weights="random"))
-    record = build(deep).run(1.0, seed=1)
-    assert record.meta["end"] == "done"
-    assert len(compiled_march.compiled.signatures) == versions
-
-
-def test_it_does_what_the_equivalent_integral_does_on_foam():
-    """Hybrid control leaves 3 to 4 N at 20 N; network and integral of 5 per second leave next to nothing."""
-    steps = load("foam-neural")
-    without = replaced(load("foam-hybrid"), force=steps.force)
-    gains = {"none": (0.25, 0.0), "integral": (0.25, 0.005)}
-    left = {"neural": left_at_20(build(steps))}
-    for name, (kf, ki) in gains.items():
-        left[name] = left_at_20(
-            build(replaced(without, controller=replaced(without.controller, kf=kf, ki=ki)))
-        )
-    assert 3.0 < left["none"] < 4.2
-    assert abs(left["neural"]) < 0.5
-    assert left["neural"] == pytest.approx(left["integral"], abs=0.2)
-
-
-def left_at_20(bench):
-    """Mean force missing in the last second of the third step, 12.5 s into contact."""
-    record = bench.run(40.0, seed=1, press=12.5)
-    t = record["t"]
-    late = (t > t[-1] - 1.0) & (record["force_desired"] == 20.0)
-    assert late.sum() > 900
-    return float(np.mean((record["force_desired"] - record["force"])[late]))
 
 
 @pytest.mark.parametrize("compiled", [True, False])

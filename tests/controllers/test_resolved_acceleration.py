@@ -9,7 +9,7 @@ from scipy.signal import StateSpace, lsim
 from controllers.ideal_arm import ARM, START, press, task
 from palpate._vector import ZERO3, Vec3, solve
 from palpate.controllers import ResolvedAcceleration
-from palpate.controllers.resolved_acceleration import position_command, resolved_acceleration
+from palpate.controllers.resolved_acceleration import resolved_acceleration
 
 angles = st.floats(-3.0, 3.0)
 joints = st.builds(Vec3, angles, angles, angles)
@@ -50,21 +50,6 @@ def test_the_error_decays_as_the_gains_say():
     assert x[:, 1].max() > 0.004, "kv 12 overshoots"
     critical = press(ResolvedAcceleration(*GAINS), asked, stiffness=0.0)[1]
     assert critical[:, 1].max() <= 0.004
-
-
-def test_it_knows_no_force():
-    pressed, free = (press(ResolvedAcceleration(*GAINS), task(f), 0.0, duration=0.02)[1] for f in (0.0, 50.0))
-    np.testing.assert_array_equal(pressed, free)
-
-
-def test_each_term_of_the_command():
-    zero = np.zeros(3)
-    kp, kv, unit = np.full(3, 2.0), np.full(3, 5.0), np.array([0.0, 1.0, 0.0])
-    assert position_command(kp, kv, zero, zero, unit, zero, zero).tolist() == [0, 2, 0]
-    assert position_command(kp, kv, unit, zero, zero, zero, zero).tolist() == [0, -2, 0]
-    assert position_command(kp, kv, zero, zero, zero, unit, zero).tolist() == [0, 5, 0]
-    assert position_command(kp, kv, zero, unit, zero, zero, zero).tolist() == [0, -5, 0]
-    assert position_command(kp, kv, zero, zero, zero, zero, unit).tolist() == [0, 1, 0]
 
 
 @pytest.mark.parametrize("n", [3, 5])

@@ -127,12 +127,6 @@ def test_pressing_converges_with_the_step(surface):
 
 
 @each
-def test_compiled_is_plain_bit_for_bit(surface):
-    """By itself; joined it is among the laws."""
-    laws.compiled_it_is_as_in_plain_python(surface)
-
-
-@each
 def test_joined_it_is_the_same(surface):
     push = 15.0 * np.sin(np.arange(3000) * 0.004)
     single, joined = np.empty((3000, 4)), np.empty((3000, 4))
@@ -142,10 +136,3 @@ def test_joined_it_is_the_same(surface):
     assert alone(join(surface)) is surface
     assert join(surface).truth() == surface.truth()
     assert join(surface).mass == surface.mass
-
-
-@each
-def test_truth_names_its_mass_and_stiffness(surface):
-    truth = surface.truth()
-    assert {"K", "M"} <= truth.keys()
-    assert truth["M"] == (surface.mass, "kg")

@@ -107,26 +107,6 @@ def test_nothing_is_overwritten_unasked(capsys, elsewhere):
     assert (elsewhere / "excite.csv").read_text() == "mine"
 
 
-def test_a_surface_without_a_mass(capsys):
-    code, found = ask(capsys, "--stiffness", "5200", "--damping", "200", "--force", "15", "--peak", "20")
-    assert code == 0
-    assert set(found["reached"]) == {"K", "B"}
-    assert len(found["surfaces"]) == 1
-
-
-@pytest.mark.long
-def test_a_robot_and_sensors_of_ones_own(capsys):
-    own = ("--noise", "0.06", "--sampling", "1000", "--force-filter", "none", "--position-step", "0.1:um")
-    asked = (*ONE, "--duration", "4")
-    _, better = ask(capsys, *asked, *own, "--loop-bandwidth", "30")
-    _, usual = ask(capsys, *asked)
-    assert better["reached"]["M"] < usual["reached"]["M"]
-    _, vague = ask(capsys, *asked, "--lag-std", "1:ms")
-    assert vague["reached"]["M"] > usual["reached"]["M"]
-    _, heavy = ask(capsys, *asked, "--tip-mass", "100", "--tip-friction", "0")
-    assert heavy["reached"]["M"] > usual["reached"]["M"]
-
-
 BAD = [
     ((), "stiffness"),
     (("--stiffness", "soft"), "--stiffness"),

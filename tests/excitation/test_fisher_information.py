@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from cramer_rao import NAMES, cramer_rao_bound, filter_at, instants, sensitivities
 
-from palpate.errors import InputError
 from palpate.excitation import ForceChain
 from palpate.excitation.sensors import phase_std
 from palpate.signals.low_pass import LowPass
@@ -127,9 +126,3 @@ def test_a_slow_motion_confounds_lag_damping_and_mass_but_not_stiffness():
     corr = free.covariance[1, 4] / (free.std[1] * free.std[4])
     assert corr == pytest.approx(1.0, abs=1e-3)  # dB = K dT
     assert free.covariance[1, 4] / free.covariance[4, 4] == pytest.approx(FOAM["K"], rel=0.02)
-
-
-@pytest.mark.parametrize("change", [{"noise": 0.0}, {"sampling": -1.0}, {"phase_std": np.nan}])
-def test_a_chain_that_is_none_is_refused(change):
-    with pytest.raises(InputError):
-        ForceChain(LowPass(), **change)

@@ -26,19 +26,6 @@ def test_a_spring_and_a_damper_get_half_of_the_information_each():
     assert largest_variance(np.linalg.inv(told)[None])[0][0] == pytest.approx(2.0 * 2**0.125, rel=0.01)
 
 
-def test_of_a_line_that_tells_more_of_both_there_is_nothing_for_the_other():
-    information = np.array([[np.diag([1.0, 1.0]), np.diag([0.5, 0.9])]])
-    found = optimal_powers(information, NOTHING, UNIT)
-    assert found.powers == pytest.approx([1.0, 0.0], abs=0.05)  # it stops within 1 % of the best
-
-
-def test_dear_frequencies_get_less():
-    information = two_parameters([0.2, 0.8])
-    found = optimal_powers(information, NOTHING, UNIT, costs=np.array([1.0, 3.0]))
-    assert found.powers @ [1.0, 3.0] == pytest.approx(1.0)
-    assert found.powers[1] < found.powers[0]
-
-
 def random_information(rng, surfaces=3, lines=10, size=3):
     columns = rng.standard_normal((surfaces, lines, size, 2)) * [[5.0], [1.0], [0.2]]
     return columns @ columns.transpose(0, 1, 3, 2)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from cramer_rao import cramer_rao_bound
 
-from palpate.errors import InputError
 from palpate.excitation import ForceChain, LinearSurface, Sensors
 from palpate.excitation.power_spectrum import covariance
 from palpate.excitation.sensors import LAG_UNIT
@@ -51,9 +50,3 @@ def test_position_noise_is_a_force_of_its_own():
     found = noisy.information(spring, omega, np.ones(1, complex))[0, 0, 0]
     # One second of a sine of amplitude 1 in noise of that size, 1000 samples: n/2 / var.
     assert found == pytest.approx(500 / ((1e5 * q) ** 2 / 12), rel=1e-3)
-
-
-@pytest.mark.parametrize("change", [{"position_step": -1.0}, {"lag_std": np.nan}, {"rate": 0.0}])
-def test_sensors_that_are_none_are_refused(change):
-    with pytest.raises(InputError):
-        Sensors(**change)

@@ -21,11 +21,6 @@ def contents(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 
 
-def test_results_appear_with_their_parents(tmp_path):
-    write(tmp_path / "runs" / "foam")
-    assert contents(tmp_path) == ["runs", "runs/foam", f"runs/foam/{FILE}"]
-
-
 def test_nothing_is_there_before_the_end(tmp_path):
     with fresh_folder(tmp_path / "foam", replace=False) as folder:
         (folder / FILE).write_text(OURS % 1)

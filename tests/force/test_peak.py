@@ -31,15 +31,5 @@ def test_no_gain_within_the_share_passes_the_bound(share):
     )  # and it says something: the step alone comes to alpha a lag
 
 
-def test_it_says_nothing_of_a_torque_arm():
-    assert peak_bound(gains_of("fr3")) is None
-
-
 def test_a_loop_that_hardly_moves_hardly_overshoots():
     assert peak_bound(gains_of(), 0.05) == pytest.approx(20.0, rel=0.02)
-
-
-@pytest.mark.long
-def test_longer_waits_change_nothing():
-    gains = gains_of()
-    assert peak_bound(gains, lags=10.0) == pytest.approx(peak_bound(gains), rel=2e-3)

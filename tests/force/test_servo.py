@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from force.gained import servo_gains
 from palpate.certify.force_certificate import RefusedError, check
 from palpate.errors import InputError
-from palpate.force.arm import load_arm, parse_arm
+from palpate.force.arm import load_arm
 from palpate.force.boundary import radius
 from palpate.force.certificate import FORM, Certificate
 from palpate.force.certifying import certify, proved_claim
@@ -211,10 +211,6 @@ def test_wrong_numbers_keep_the_approach_and_end_in_a_press(gains, theta, lag):
         assert np.abs(force[touch + 1000 :] - 15.0).max() < 0.05 * 15.0
 
 
-def test_other_arms_have_no_lead(gains):
-    assert lead_speed(gains.cautious()._replace(lead=0.0), 0.3, 0.1, 1e3, 0.05) == (0.1, 0.1)
-
-
 def test_its_encoders_show_the_surface_so_that_no_compliance_is_taken_off(gains):
     """A position arm that gave way behind its encoders has its own spring in the estimate; a servo has not."""
     known = Known(stiffness=(9e3, 1e4), value=9.5e3, in_series=True)
@@ -247,11 +243,6 @@ def test_its_command_leads_only_where_a_test_has_borne_the_surface_out(gains):
     assert full > first
     assert force[full] - force[first] > 0.5 * 400.0 * (position[full] - position[first])
     assert speed[full : full + 50].max() > 5.0 * gains.approach
-
-
-def test_it_is_read_from_a_file(gains):
-    text = gains.to_toml().split("[arm]")[1].replace("[arm.", "[")
-    assert parse_arm(text, "here").kind == "servo"
 
 
 @pytest.mark.long

@@ -33,16 +33,6 @@ def test_of_a_chirp_it_is_the_end(top, noise):
     )
 
 
-def test_a_coarse_encoder_does_not_move_it():
-    """Steps of 5 um are 6 % of the smallest turn of the motion; they are noise and no motion."""
-    assert moved(np.round(chirp(40) / 5e-6) * 5e-6) == pytest.approx(40, rel=0.05)
-
-
-def test_overtones_that_carry_nothing_do_not_count():
-    """A tenth of a micrometre at 200 Hz has 1e-4 of the speed's power at 40 Hz and less: it shows no mass."""
-    assert moved(chirp(40) + 1e-7 * np.sin(2 * np.pi * 200 * TIME)) == pytest.approx(40, rel=0.05)
-
-
 def test_what_is_between_two_contacts_does_not_count():
     position = np.where((TIME > 8) & (TIME < 12), np.sin(2 * np.pi * 60 * TIME), np.sin(2 * np.pi * 5 * TIME))
     rows = np.r_[0:7900:2, 12100:20000:2]

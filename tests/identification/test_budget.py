@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.stats import t as student
 
 from identification.test_by_octave import DT, ROWS, level, system
 from palpate.identification import budget as causes
 from palpate.identification.octaves import System, estimate, solve
-from palpate.identification.uncertainty import Contribution, half_width, half_widths
 from palpate.signals.octaves import HIDDEN_SHARE
 
 NOISE = 0.1
@@ -116,20 +112,6 @@ def test_a_force_that_nothing_explains_is_bounded_by_what_is_seen_of_it():
     assert none.variance[0] == 0.0
 
 
-def test_more_of_the_same_log_does_not_hide_what_is_unexplained():
-    """Noise of the sensor averages out over four times the lines; a force that nothing explains does not."""
-    shares = []
-    for rows in (500, 2000):
-        column = np.random.default_rng(3).normal(size=(rows, 1))
-        asked = system(column, 5.0 * column[:, 0])
-        whole = solve(asked, level(asked))
-        hidden = causes.unexplained_spread(asked, whole, level(asked, 0.01), asked.lines)
-        shares.append(np.sqrt([hidden.variance[0], whole.cov[0, 0]]))
-    (hidden, noise), (hidden_long, noise_long) = shares
-    assert noise_long == pytest.approx(noise / 2, rel=0.1)
-    assert hidden_long > 0.6 * hidden
-
-
 def test_parts_of_the_covariance_are_what_each_cause_adds():
     """Noise with lag and other forces known; what the lag, and what the other forces, add to it."""
     base = flat_columns(0)
@@ -149,25 +131,3 @@ def test_parts_of_the_covariance_are_what_each_cause_adds():
     known = solve(without_lag, noise).cov[0, 0]
     assert parts["lag"].variance[0] == pytest.approx(whole.cov[0, 0] - known, rel=1e-3)
     assert parts["lag"].variance[1] == 0.0
-
-
-def test_half_widths_are_students_for_one_cause():
-    for freedom in (1.0, 4.0, 30.0):
-        found = half_width({"one": Contribution(2.0, freedom)})
-        assert found == pytest.approx(2 * student.ppf(0.975, freedom))
-
-
-def test_of_two_causes_the_better_known_one_does_not_suffer():
-    """Welch and Satterthwaite: two alike variances of n degrees have 2 n; a small one of few hardly counts."""
-    alike = {"one": Contribution(2**0.5, 5.0), "two": Contribution(2**0.5, 5.0)}
-    assert half_width(alike) == pytest.approx(2 * student.ppf(0.975, 10))
-    small = {"sure": Contribution(2.0), "open": Contribution(1e-2, 1.0)}
-    assert half_width(small) == pytest.approx(2 * 1.96, rel=1e-3)
-
-
-@given(st.floats(-140, 140))
-def test_half_widths_have_the_unit_of_the_parameter(size):
-    variance, freedom = np.array([[3.0, 0.0], [6.0, 0.0]]), [[3.0, 3.0], [np.inf, np.inf]]
-    one, other = half_widths(variance, freedom), half_widths(10.0**size * variance, freedom)
-    np.testing.assert_allclose(other, 10 ** (size / 2) * one, rtol=1e-6)
-    assert one[1] == 0.0

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from palpate.identification.octaves import (
     Segment,
@@ -105,15 +101,6 @@ def test_a_direction_without_information_is_not_known():
         assert (std > 0.5 * np.abs(found.theta)).all()  # half-widths as large as the numbers themselves
 
 
-def test_a_column_of_nothing_is_not_known():
-    own, force = two_columns()
-    asked = system(np.column_stack([own, np.zeros(ROWS)]), force)
-    found = solve(asked, level(asked, 0.25))
-    assert found.cov[2, 2] > 1e6 * found.cov[:2, :2].max()
-    np.testing.assert_allclose(found.theta[:2], TRUTH, atol=0.2)
-    assert found.theta[2] == pytest.approx(0.0, abs=1e-9)
-
-
 def test_a_prior_is_an_observation_as_good_as_its_deviation():
     own, force = two_columns()
     free = system(own, force)
@@ -123,28 +110,6 @@ def test_a_prior_is_an_observation_as_good_as_its_deviation():
     found = solve(told, level(told, 0.25))
     assert found.theta[0] == pytest.approx((alone.theta[0] + 4.0) / 2, rel=1e-5)
     assert found.cov[0, 0] == pytest.approx(std**2 / 2, rel=1e-4)
-
-
-@settings(max_examples=20, deadline=None)
-@given(st.floats(-6, 6), st.floats(-6, 6), st.integers(0, 50))
-def test_units_of_force_and_position_do_not_count(force_size, position_size, seed):
-    """Theta has the unit of force over position, and everything else follows."""
-    c, s = 10.0**force_size, 10.0**position_size
-    own, force = two_columns(seed)
-    one, other = estimate(system(own, force)), estimate(system(s * own, c * force))
-    np.testing.assert_allclose(other.theta * s / c, one.theta, rtol=1e-6)
-    np.testing.assert_allclose(np.diag(other.cov) * (s / c) ** 2, np.diag(one.cov), rtol=1e-6)
-    np.testing.assert_allclose(other.noise / c**2, one.noise, rtol=1e-6)
-
-
-def test_octaves_that_do_not_count_are_as_if_there_were_none():
-    own, force = two_columns()
-    asked = system(own, force)
-    use = np.ones(len(asked.lines), bool)
-    use[:3] = False
-    some = solve(asked, level(asked), use)
-    cut = replace(asked, products=np.where(use[:, None, None], asked.products, 0.0))
-    np.testing.assert_allclose(some.theta, solve(cut, level(cut)).theta, rtol=1e-12)
 
 
 def test_a_parameter_that_is_held_leaves_the_others_as_if_its_force_were_taken_off():

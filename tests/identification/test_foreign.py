@@ -11,7 +11,6 @@ from foreign.logs import CELLS, Cell, make_log
 from foreign.motions import tracked
 from foreign.scoring import WORKING_POINT, judged, score
 from foreign.surfaces import SURFACES, Surface, random_surface, touch
-from foreign.tables import tables
 from foreign.truth import Dense, dynamic_stiffness, octave_stiffness, press_stiffness
 
 physics = pytest.mark.long
@@ -139,22 +138,6 @@ def test_a_seed_makes_one_log(cell):
     assert log.dense.contact.any()
 
 
-@pytest.fixture(scope="module")
-def scores():
-    """Of logs at 65 to 125 rows a second, which are soon identified."""
-    return [score(Cell(name, "low-rate", "sine"), 11) for name in ("kelvin-voigt", "friction", "arms")]
-
-
-@physics
-def test_every_log_has_one_outcome_and_counts_once(scores):
-    assert {s.outcome for s in scores} <= {"answered", "refused"}
-    for rows in tables(scores).values():
-        assert sum(figures["logs"] for figures in rows) == len(scores)
-        for figures in rows:
-            assert figures["all"]["hold"] <= figures["all"]["answers"]
-            assert figures["K known and given"] <= figures["K known"] <= figures["logs"]
-
-
 @physics
 def test_a_knowing_estimator_scatters_as_the_bound_says():
     log = make_log(Cell("kelvin-voigt", "lag-told", "multisine"), 2)
@@ -167,14 +150,6 @@ def test_a_knowing_estimator_scatters_as_the_bound_says():
     bound = half_widths(log)
     # The deviation of 200 draws is known to 5 %.
     assert 1.96 * found[:, :2].std(0) == pytest.approx([bound["K"], bound["B"]], rel=0.2)
-
-
-@pytest.mark.long
-def test_a_knowing_estimator_learns_nothing_of_a_probe_at_rest():
-    log = make_log(Cell("mass", "glued"), 970)
-    assert np.ptp(log.dense.depth) < 1e-6 * log.dense.depth.mean()
-    bound = half_widths(log)
-    assert all(bound[name] > abs(log.truth[name][0]) for name in bound)
 
 
 def test_confidently_wrong_is_far_off_or_many_half_widths():

@@ -79,17 +79,6 @@ def test_a_held_position_leaves_the_surface_all_the_same(every, ramp):
 
 
 @pytest.mark.long
-def test_a_force_that_drifts_in_the_air_is_level_again():
-    log = pressed()
-    drift = 2.0 * log["time"] / log["time"][-1]
-    found = identify(record(log["time"], log["position"], log["force"] + drift))
-    assert "force-drifts" in found.codes
-    start, end = found.contacts[0]
-    assert (start, end) == (pytest.approx(0.52, abs=0.02), pytest.approx(2.03, abs=0.05))
-    assert "force-drifts" not in identify(log).codes
-
-
-@pytest.mark.long
 def test_many_presses_are_as_many_contacts():
     """In contact for more than half of the time, and in free motion for half a second at a time."""
     t = np.arange(int(60 * 1.6 * 125)) / 125

@@ -74,22 +74,6 @@ def test_the_models_law_holds_in_every_row_at_the_true_lag(path):
     assert np.std(question.force - force) == pytest.approx(CODE / np.sqrt(12), rel=0.4)
 
 
-def test_the_readings_are_taken_as_they_are_each_once(chirp):
-    question, clock = asked(chirp)
-    shown = clock.rows[question.motion.rows]
-    np.testing.assert_array_equal(question.force, chirp["force"][shown])
-    assert (np.diff(question.motion.rows) == 1).all()
-    assert np.isin(np.diff(shown), (2, 3)).all()
-    np.testing.assert_allclose(np.diff(question.time), 1 / SAMPLING, rtol=1e-6)
-
-
-def test_the_position_is_the_logs_counted_from_the_surface(chirp):
-    question, _ = asked(chirp)
-    np.testing.assert_allclose(
-        question.motion.position + question.origin, chirp["position"], rtol=0, atol=1e-15
-    )
-
-
 @pytest.mark.parametrize("std", [0.0, 5e-6, 2e-4])
 def test_a_calibrated_lag_is_as_sure_as_the_calibration_and_the_sensors_clock(chirp, std):
     question, _ = asked(chirp, LAG, lag_std=std, mass=(0.3, 0.01))
@@ -129,18 +113,6 @@ def test_least_squares_err_within_the_cramer_rao_bound():
     assert np.all(np.abs(fitted[:3] - truth) < 4 * bound[:3])
 
 
-@pytest.mark.parametrize("signs", [(-1, 1), (1, -1), (-1, -1)])
-def test_channels_that_count_the_other_way_ask_the_same(chirp, signs):
-    turned = log(chirp["time"], signs[1] * chirp["position"], signs[0] * chirp["force"])
-    (one, _), (other, _) = asked(chirp), asked(turned)
-    np.testing.assert_array_equal(other.motion.rows, one.motion.rows)
-    np.testing.assert_array_equal(other.force, one.force)
-    np.testing.assert_array_equal(other.motion.position, one.motion.position)
-    assert other.contacts.position_sign == signs[1]
-    assert other.contacts.resting == one.contacts.resting
-    np.testing.assert_array_equal(np.concatenate(other.free), np.concatenate(one.free))
-
-
 def test_each_contact_has_its_own_rows_and_what_is_between_has_none():
     question, _ = asked(pressed_along(twice))
     time = question.time
@@ -156,13 +128,6 @@ def test_each_contact_has_its_own_rows_and_what_is_between_has_none():
     assert touch.motion.rows[0] < question.motion.rows[0]
 
 
-def test_the_noise_out_of_contact_is_the_sensors():
-    """To four deviations of the deviation of n samples."""
-    question, _ = asked(pressed_along(twice))
-    noise = np.concatenate([free - np.median(free) for free in question.free])
-    assert noise.std() == pytest.approx(0.6, rel=4 / np.sqrt(2 * len(noise)))
-
-
 def test_a_probe_that_never_leaves_counts_from_the_middle_of_its_motion():
     record = pressed_along(within)
     question, clock = asked(record, bonded=True)
@@ -173,15 +138,6 @@ def test_a_probe_that_never_leaves_counts_from_the_middle_of_its_motion():
     assert question.origin == pytest.approx(3e-3, abs=1e-4)
     # All but what the low-pass' weights reach for beyond the log's ends.
     assert len(question.force) > 0.95 * 3.0 * SAMPLING
-
-
-def test_a_gap_in_the_log_costs_the_samples_in_it(chirp):
-    position = chirp["position"].copy()
-    position[1500:1530] = np.nan
-    question, clock = asked(log(chirp["time"], position, chirp["force"]))
-    rows = clock.rows[question.motion.rows]
-    assert not ((rows >= 1500) & (rows < 1530)).any()
-    assert {1499, 1498, 1497} & set(rows)
 
 
 @pytest.mark.parametrize(

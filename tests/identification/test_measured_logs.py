@@ -21,7 +21,7 @@ def skin(force):
 
 
 @measured
-@pytest.mark.parametrize("force", [400, 800, pytest.param(600, marks=pytest.mark.long)])
+@pytest.mark.parametrize("force", [800, *(pytest.param(f, marks=pytest.mark.long) for f in (400, 600))])
 def test_a_press_on_skin_leaves_with_a_stiffness_and_what_it_belongs_to(force):
     """It stiffens and relaxes: no parameter of a model but a stiffness as the press has it, which is there anyway."""
     found = identify(skin(force))

@@ -93,12 +93,6 @@ def test_a_sine_is_in_the_octave_of_its_frequency_and_leaks_into_no_other(octave
     assert far.max() < 1e-3 * power[at]
 
 
-def test_octaves_follow_each_other_by_two():
-    frequency = sums(columns(1000)).frequency
-    np.testing.assert_allclose(frequency[2:] / frequency[1:-1], 2.0, rtol=1e-3)
-    assert frequency[1] == pytest.approx(4 / (1000 * DT))
-
-
 def test_a_short_contact_has_its_say_in_the_octave_of_its_frequency():
     """One of 108 rows beside one of 1000: an oscillation of it is in no block of 500 rows, but in its own."""
     own = 1e-3 * columns(1108, p=1)
@@ -120,23 +114,10 @@ def test_groups_are_stretches_of_the_log_that_sum_to_all_of_it():
     assert all(group.any() for group in found.products)
 
 
-def test_octaves_alone():
-    found = sums(columns(1000))
-    use = np.arange(len(found.frequency)) > 2
-    only = found.only(use)
-    np.testing.assert_array_equal(only.total[3:], found.total[3:])
-    assert not only.total[:3].any()
-    assert not only.all_lines[:3].any()
-
-
 def test_rows_are_cut_at_gaps_and_at_the_ends_of_contacts():
     rows = np.r_[np.arange(10, 60), np.arange(80, 120), np.arange(120, 150)]
     spans = np.r_[np.zeros(90, int), np.ones(30, int)]
     assert [(s.first, s.last) for s in split_segments(rows, spans)] == [(0, 50), (50, 90), (90, 120)]
-
-
-def test_rows_that_are_two_samples_apart_have_no_gap():
-    assert split_segments(np.arange(0, 100, 2), np.zeros(50, int)) == [Segment(0, 50)]
 
 
 def test_a_piece_too_short_for_a_block_is_left_out():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from palpate.identification.filters import Chain, SensorPath
 from palpate.signals.low_pass import LowPass
-from palpate.signals.position_noise import NOISELESS, PositionNoise
+from palpate.signals.position_noise import PositionNoise
 
 DT = 1e-3
 SENSOR = LowPass(((3, 120.0),))
@@ -81,24 +81,6 @@ def test_the_series_is_smooth_where_the_reading_is_in_steps():
     assert np.abs(middle).max() > 0.5
 
 
-def test_another_signal_is_not_mistaken_for_one_that_was_read():
-    one, motion = path(), np.random.default_rng(2).standard_normal(COUNT)
-    first = one.read(motion, 0, SENSOR.lag, ROWS)
-    np.testing.assert_allclose(one.read(2 * motion, 0, SENSOR.lag, ROWS), 2 * first, rtol=1e-12)
-    far = [one.read(motion, 0, SENSOR.lag + k * DT, ROWS) for k in range(1, 12)]
-    assert all(not np.allclose(late, first) for late in far)
-    np.testing.assert_array_equal(one.read(motion, 0, SENSOR.lag, ROWS), first)
-
-
-def test_rows_are_those_of_the_force():
-    motion = np.random.default_rng(3).standard_normal(COUNT)
-    some = np.array([5, 3, 700])
-    every = path().read(motion, 1, 4e-3, ROWS)
-    np.testing.assert_allclose(
-        path().read(motion, 1, 4e-3, some), every[some], rtol=0, atol=1e-12 * np.abs(every).max()
-    )
-
-
 def test_what_was_before_a_jump_has_left_the_readings_when_the_path_says_so():
     """The slowest mode has died away by ten powers of e."""
     jump = np.where(np.arange(COUNT) < 900, -1.0, 0.0)
@@ -113,20 +95,6 @@ def test_what_was_before_a_jump_has_left_the_readings_when_the_path_says_so():
         assert np.abs(got[(since > 0) & ~after]).max() > 0.5
 
 
-def test_samples_further_than_the_reach_do_not_count():
-    one = path()
-    before, after = one.reach
-    motion = np.random.default_rng(4).standard_normal(COUNT)
-    k = 300
-    middle = int(INSTANTS[k])
-    changed = motion.copy()
-    changed[: middle - before - 2] += 1.0
-    changed[middle + after + 2 :] += 1.0
-    for d in range(3):
-        own = [one.read(m, d, SENSOR.lag, np.array([k]))[0] for m in (motion, changed)]
-        assert own[1] == pytest.approx(own[0], rel=1e-9, abs=1e-12)
-
-
 @pytest.mark.parametrize(("white", "jump"), [(5e-5, 0.0), (0.0, 2e-6)])
 def test_the_noise_of_an_acceleration_is_that_of_noise_filtered(white, jump):
     """Of jumps, half of the power counts."""
@@ -135,13 +103,3 @@ def test_the_noise_of_an_acceleration_is_that_of_noise_filtered(white, jump):
     stated = chain.acceleration_noise(PositionNoise(white, jump))
     # The filter leaves some thousand independent numbers, which know a variance to 5 %.
     assert chain(noise, 2)[100:-100].var() == pytest.approx(stated if white else 2 * stated, rel=0.2)
-
-
-def test_no_noise_no_variance():
-    assert Chain(60.0, 1e-3).acceleration_noise(NOISELESS) == 0.0
-
-
-def test_the_rate_is_the_low_passs_or_what_the_position_shows():
-    assert path().cutoff == pytest.approx(120.0)
-    assert path(LowPass(((3, 1e4),))).cutoff == pytest.approx(250.0)
-    assert path().rate == pytest.approx(2 * np.pi * 120.0)

@@ -5,7 +5,7 @@ import pytest
 
 from identification.synthetic_contacts import record
 from palpate.identification.sampling import channels_of
-from palpate.identification.strokes import find_strokes, find_turns
+from palpate.identification.strokes import find_strokes
 
 TIME = np.arange(5000) / 1000
 REST_AND_PRESS = np.interp(TIME, [0.0, 0.5, 1.5, 3.0, 5.0], [0.0, 0.3e-3, 0.3e-3, 2e-3, 0.0])
@@ -30,9 +30,3 @@ def test_neither_sign_nor_size_nor_origin_counts(scale, offset):
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 7.0])
 def test_a_shaken_position_has_none(frequency):
     assert strokes(1e-3 * np.sin(2 * np.pi * frequency * TIME)) == ()
-
-
-def test_turns_are_the_extremes_further_apart_than_a_way():
-    position = np.array([0.0, 3.0, 2.5, 5.0, 1.0, 4.0])
-    assert find_turns(position, 1.0) == [0, 3, 4, 5]
-    assert find_turns(position, 0.3) == [0, 1, 2, 3, 4, 5]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 import pytest
 
-from identification.problems import problem
 from identification.synthetic_contacts import press_path, record
 from palpate.identification import Verdict, identify
 from palpate.identification.models import Motion
-from palpate.identification.options import Options
-from palpate.identification.press import gather_evidence, stiffness_at_point
 
 TIME = np.arange(4000) / 1000
 NAME = "quasi-linear-viscoelastic"
@@ -84,17 +80,6 @@ def test_a_power_of_the_depth_is_refused_where_no_surface_is_seen():
     log = tissue(TIME, lambda t: 3e-3 + 1e-3 * np.sin(2 * np.pi * 2 * t) + 4e-4 * np.sin(2 * np.pi * 7 * t))
     asked = identify(log, lag=0.0, model=NAME, bonded=True)
     assert all(p.verdict is not Verdict.IDENTIFIED for p in asked.parameters.values())
-
-
-@pytest.mark.parametrize("source", ["octave", "press"])
-def test_half_the_force_shows_half_the_stiffness(source):
-    own = problem(tissue(TIME, once))
-    point = gather_evidence(own, Options.of(), "N/m")[2]
-    assert point is not None
-    point = replace(point, source=source)
-    own = own.with_touches if source == "press" else own
-    whole, half = (stiffness_at_point(own, share * own.force, point) for share in (1.0, 0.5))
-    assert half == pytest.approx(whole / 2, rel=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 99, 100, 101, 2000])

@@ -161,20 +161,3 @@ def test_what_is_given_back_is_a_copy(make):
     estimator.covariance[:] = 7.0
     estimator.estimate().covariance[:] = 7.0
     np.testing.assert_array_equal(answers(estimator), before)
-
-
-@linear
-@pytest.mark.parametrize(
-    ("arguments", "why"),
-    [
-        ((np.zeros(0), np.zeros((0, 0))), "n at least 1"),
-        ((START, np.eye(2)), r"shape \(3, 3\)"),
-        ((START, -np.eye(3)), "positive definite"),
-        ((START, np.diag([1.0, np.inf, 1.0])), "finite"),
-        (([0.0, np.nan, 0.0], np.eye(3)), "finite"),
-    ],
-    ids=["nothing", "size", "negative", "infinite", "not a number"],
-)
-def test_a_bad_start_is_refused(make, arguments, why):
-    with pytest.raises(InputError, match=why):
-        make(*arguments)

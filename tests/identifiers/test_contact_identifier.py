@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -281,18 +278,6 @@ def test_what_cannot_be_is_refused(changes, words):
     assert "\n" not in str(caught.value)
 
 
-def test_a_copy_goes_its_own_way_and_a_pickle_goes_on():
-    x, force = moving()
-    one = identifier()
-    one.update_many(x[:900], force[:900])
-    before = told(one)
-    copied, thawed = copy.deepcopy(one), pickle.loads(pickle.dumps(one))
-    for other in (copied, thawed):
-        other.update_many(x[900:], force[900:])
-    np.testing.assert_array_equal(told(one), before)
-    np.testing.assert_array_equal(told(thawed), told(copied))
-
-
 def seen(period, phase, changes, told_period=None):
     """True instants of a sensor's samples, and what the clock says in each row that it finds one in.
 
@@ -332,14 +317,6 @@ def test_each_sample_is_found_in_its_row_to_half_a_row(period, phase):
     assert np.abs(error).max() <= 0.5 + 1e-6
 
 
-def test_480_of_1000_are_known_to_a_24th_of_a_row():
-    """The clock passes every twelfth of a row, so the interval it leaves is one wide, and its middle is taken."""
-    for phase in np.linspace(0.02, 0.97, 23):
-        instants, _, found = seen(25 / 12, phase, np.ones(400, bool))
-        error = np.array([instant for _, instant in found]) - instants
-        assert np.abs(error[24:]).max() <= 1 / 24 + 1e-6
-
-
 @settings(max_examples=60)
 @given(st.floats(2.0, 12.0), phases, st.lists(st.booleans(), min_size=300, max_size=300))
 def test_a_sample_that_equals_the_one_before_is_counted(period, phase, changes):
@@ -367,12 +344,6 @@ def test_a_clock_that_drifts_is_followed(drift):
     assert np.abs(error).max() <= 0.5 + 1e-6
     # Each time the clock has passed a twelfth of a row, one may be given twice.
     assert len(found) <= 9600 + 20_000 * abs(drift) * 12 + 1
-
-
-def test_before_the_first_change_nothing_is_known():
-    clock = np.array(UNSET)
-    assert [sampled_at(clock, float(row), False, True, 25 / 12) for row in range(10)] == [np.inf] * 10
-    assert sampled_at(clock, 10.0, True, True, 25 / 12) == 9.5
 
 
 def identify_with(bad, touch=None, count=1, seconds=70.0):

@@ -56,17 +56,6 @@ def test_it_is_its_definition(n, name):
     np.testing.assert_allclose(estimator.covariance, np.linalg.inv(information), rtol=1e-5, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", [Exponential, pytest.param(SIFt, marks=pytest.mark.long)])
-def test_forgetting_nothing_is_no_policy_at_all(kind):
-    phi, y = samples(3, 200)
-    plain = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3))
-    other = RecursiveLeastSquares(np.zeros(3), 1e4 * np.eye(3), kind(1))
-    for estimator in (plain, other):
-        estimator.update_many(phi, y)
-    np.testing.assert_allclose(other.theta, plain.theta, rtol=1e-12)
-    np.testing.assert_allclose(other.covariance, plain.covariance, rtol=1e-11)
-
-
 def test_subspace_forgetting_keeps_the_information_within_its_bounds():
     """Between least/(1 - keep) and the largest sample/(1 - keep), in units of the initial deviations."""
     random = np.random.default_rng(3)

@@ -32,30 +32,6 @@ def test_it_finds_a_spring_damper_and_mass_that_are_well_excited():
     assert found.force_at_zero == 0.0
 
 
-def test_one_sample_at_a_time_is_many_at_once():
-    phi, force = pressing(200)
-    one, many, watched = (NeuralProbe.thesis("foam", seed=4) for _ in range(3))
-    for p, f in zip(phi, force, strict=True):
-        one.update(p, f)
-    many.update_many(phi, force)
-    answers = watched.trajectory(phi, force)
-    for a, b, c in zip(one.layers, many.layers, watched.layers, strict=True):
-        np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(a, c)
-    last = many.probe()
-    assert tuple(answers[-1, :3]) == pytest.approx((last.stiffness, last.damping, last.mass), rel=1e-9)
-    assert one.samples == many.samples == 200
-
-
-def test_the_trajectory_s_error_is_the_one_before_learning():
-    phi, force = pressing(3)
-    probe, other = NeuralProbe.thesis("foam"), NeuralProbe.thesis("foam")
-    errors = probe.trajectory(phi, force)[:, 3]
-    for p, f, e in zip(phi, force, errors, strict=True):
-        assert e == pytest.approx(f - other.force(p), abs=1e-12)
-        other.update(p, f)
-
-
 def test_a_probe_outside_what_was_learned_is_warned_of():
     phi, force = pressing(500)
     probe = NeuralProbe.thesis("foam")
@@ -78,24 +54,6 @@ def test_it_never_claims_to_have_identified():
     assert estimate.theta[0] == probe.probe().stiffness
 
 
-def test_the_answer_depends_on_the_weights_at_the_start():
-    answers = []
-    for seed in range(4):
-        probe = NeuralProbe.thesis("foam", seed=seed)
-        probe.update_many(*pressing(4000))
-        answers.append(probe.probe().mass)
-    assert np.ptp(answers) > 0.01
-    again = NeuralProbe.thesis("foam", seed=3)
-    again.update_many(*pressing(4000))
-    assert again.probe().mass == answers[3]
-
-
-def test_more_layers_by_configuration():
-    probe = NeuralProbe(FOAM, layers=(5, 4))
-    assert [w.shape for w in probe.layers] == [(5, 4), (4, 6), (1, 5)]
-    probe.update_many(*pressing(100))
-
-
 def test_watch_takes_a_run_s_contact_only():
     phi, force = pressing(300)
     phase = np.repeat([0.0, 1.0, 2.0], 100)
@@ -115,17 +73,6 @@ def test_watch_takes_a_run_s_contact_only():
         watch(without, probe)
 
 
-def test_a_bad_sample_is_named_and_the_rest_kept():
-    phi, force = pressing(10)
-    probe = NeuralProbe.thesis("foam")
-    force[6] = np.nan
-    with pytest.raises(InputError, match="sample 6 is not finite"):
-        probe.update_many(phi, force)
-    assert probe.samples == 6
-    with pytest.raises(InputError, match="shape"):
-        probe.update([1.0, 2.0], 3.0)
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -140,8 +87,3 @@ def test_a_bad_sample_is_named_and_the_rest_kept():
 def test_numbers_out_of_range_are_refused(wrong):
     with pytest.raises(InputError):
         NeuralProbe(**{"setting": FOAM, **wrong})
-
-
-def test_an_unknown_surface_is_refused_by_name():
-    with pytest.raises(InputError, match="foam"):
-        NeuralProbe.thesis("fom")

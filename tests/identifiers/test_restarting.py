@@ -165,17 +165,6 @@ def test_a_change_that_shows_only_when_it_moves_is_found_when_it_does():
     assert estimator.theta[1] == pytest.approx(HARD[1], rel=0.02)
 
 
-@pytest.mark.long
-def test_four_parameters_go_the_same_way():
-    phi, force = changed(7)
-    a = np.gradient(phi[:, 0]) * RATE
-    wide, mass = np.column_stack([a, phi]), 0.3
-    estimator = RestartingLeastSquares(np.zeros(4), np.diag([1e2, 1e6, 1e10, 1e6]))
-    estimator.update_many(wide, force + mass * a)
-    assert estimator.changes == 1
-    assert estimator.theta[2] == pytest.approx(HARD[1], rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -208,23 +197,3 @@ def test_zeros_teach_nothing(make):
     after = estimator.estimate()
     np.testing.assert_array_equal(after.theta, before.theta)
     np.testing.assert_array_equal(after.covariance, before.covariance)
-
-
-def test_two_threads_share_an_estimator_with_a_lock():
-    """An estimator belongs to one thread at a time: behind a lock no sample is lost."""
-    from threading import Lock, Thread
-
-    phi, force = changed(13, CHANGE)
-    estimator, lock = RecursiveLeastSquares(np.zeros(3), VAGUE), Lock()
-
-    def work(first):
-        for row, f in zip(phi[first::2], force[first::2], strict=True):
-            with lock:
-                estimator.update(row, f)
-
-    threads = [Thread(target=work, args=(first,)) for first in (0, 1)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert estimator.estimate().samples == CHANGE

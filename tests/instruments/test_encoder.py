@@ -26,16 +26,6 @@ def test_the_error_is_half_a_count_at_most(angle, offset, counts):
     assert abs(encoder.read(angle) - angle) <= 0.5 * encoder.resolution + 1e-12
 
 
-@given(st.floats(-10.0, 10.0))
-def test_reading_a_reading_changes_nothing(angle):
-    encoder = Encoder(2000.0, 0.3)
-    assert encoder.read(encoder.read(angle)) == pytest.approx(encoder.read(angle), abs=1e-14)
-
-
-def test_the_offset_is_a_level():
-    assert Encoder(7.0, 0.3).read(0.3 + 0.4 * math.pi / 7.0) == 0.3
-
-
 def test_three_joints_are_three_encoders():
     angles = Vec3(0.7, -1.3, 2.9)
     apart = [

@@ -89,15 +89,6 @@ def test_pause_stops_step_steps_and_reset_begins_again(browser, served_simulatio
         until(page, f"palpate.live.state.playing && palpate.live.latest.t < {before}")
 
 
-def test_two_pages_at_once_see_the_same(browser, served_simulation):
-    _, address = served_simulation
-    with opened(browser, address) as one, opened(browser, address) as other:
-        until(one, "palpate.live.latest.t > 0")
-        until(other, "palpate.live.latest.t > 0")
-        one.get_by_role("slider", name="desired force").fill("0.8")
-        until(other, "palpate.live.latest.desired > 30 || palpate.live.state.values['force.first'] > 30")
-
-
 def test_the_host_s_page_steers_and_the_audience_s_has_nothing_to_steer_by(browser):
     """The audience's page is opened first."""
     with shared(WatchedSimulation(near(), seed=1)) as (player, host, audience):
@@ -162,14 +153,6 @@ def test_nothing_runs_but_the_page_itself(browser, served_simulation):
         page.wait_for_timeout(100)
         assert page.evaluate("window.ran") is None
         assert sum("Content Security Policy" in text for text in page.wrong) >= 3
-
-
-@pytest.mark.parametrize("width", [400, 1400])
-def test_nothing_is_wider_than_the_screen(browser, served_simulation, width):
-    _, address = served_simulation
-    with opened(browser, address, viewport={"width": width, "height": 860}, color_scheme="dark") as page:
-        until(page, "palpate.live.frames > 2")
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 @pytest.mark.real_time

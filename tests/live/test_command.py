@@ -3,13 +3,11 @@
 import re
 from contextlib import contextmanager
 
-import numpy as np
 import pytest
 
 from cli import asked
 from live.conftest import Stream, headless
 from palpate import cli
-from palpate.live.view import AT
 
 ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/[\w-]{24}/")
 
@@ -25,15 +23,6 @@ def running(*words, lines=1):
         yield said
     assert process.returncode == 130, process.said
     assert "Traceback" not in process.said[1]
-
-
-@pytest.mark.long
-def test_an_arm_presses_in_space():
-    with running("--arm", "ur5e") as (address,):
-        one = Stream(address).until(lambda c: len(c.rows) > 20)
-        assert np.isfinite(one.rows[:, AT["q1"] : AT["q6"] + 1]).all()
-        assert np.isnan(one.rows[:, AT["q7"]]).all()
-        one.close()
 
 
 @pytest.mark.long

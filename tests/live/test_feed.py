@@ -34,13 +34,6 @@ def test_a_slow_reader_is_told_what_it_lost_and_memory_stays():
     assert len(feed.since(-1, 0)[2]) == 10
 
 
-def test_more_rows_at_once_than_there_is_room_for():
-    feed = Feed(rows=10)
-    feed.put(rows(0, 25))
-    *_, new, _ = feed.since(-1, 0)
-    assert new[:, 0].tolist() == list(range(15, 25))
-
-
 def test_another_time_is_another_epoch():
     feed = Feed(rows=10)
     feed.put(rows(0, 5))

@@ -51,11 +51,6 @@ def test_it_begins_shortly_before_the_touch_and_the_same_again(simulation):
     assert not np.array_equal(pressed(simulation, 2.0), first)
 
 
-def test_the_whole_approach_is_there_if_asked_for():
-    whole = WatchedSimulation(near(), seed=1, whole=True)
-    assert pressed(whole, 0.1)[0, 0] == pytest.approx(0.004)
-
-
 @pytest.mark.parametrize("surface", ["foam-hybrid", "foam-viscoelastic"])
 def test_a_surface_that_changes_bears_the_force_of_that_moment(surface):
     simulation = WatchedSimulation(near(surface), seed=1)
@@ -110,12 +105,6 @@ def test_sliders_take_nothing_else(simulation, key, value):
     with pytest.raises(InputError, match=r"slider|must be from"):
         simulation.set(key, value)
     assert simulation.experiment is before
-
-
-def test_controllers_without_a_force_gain_say_so():
-    simulation = WatchedSimulation(near("foam-impedance"), seed=0)
-    assert "controller.kf" not in simulation.state.values
-    assert any("no force gain" in note for note in simulation.view.notes)
 
 
 @pytest.mark.long

@@ -43,12 +43,6 @@ def test_intervals_hold_on_the_surface_and_for_a_next_press(lumpy):
     assert np.median(seen.ci95[:, 1] / seen.ci95[:, 0]) < 1.6
 
 
-def test_the_interval_is_narrow_where_it_was_pressed_and_wide_between(lumpy):
-    at, between = lumpy.predict(lumpy.places).std, lumpy.predict(GRID).std
-    assert np.median(at) < 0.6 * np.median(between)
-    assert np.all(lumpy.predict(lumpy.places).std < 0.06)
-
-
 def test_a_lump_is_found_where_it_is(lumpy):
     grid = lumpy.grid(2500)
     (lump,) = [lump for lump in lumps_of(grid, lumpy.predict(grid.places), 1700.0) if lump.is_sure]
@@ -159,14 +153,6 @@ def test_presses_that_repeat_worse_than_they_state_are_no_contradiction():
     result = StiffnessMap()
     result.update(places, value, 0.01 * value)
     assert result.process.repeat == pytest.approx(0.1, rel=0.5)
-
-
-def test_presses_in_one_line_or_at_one_place_make_no_map():
-    for places in ([[0.0, 0.0]], [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2]]):
-        result = StiffnessMap()
-        result.update(places, np.full(len(places), 1e3), np.full(len(places), 20.0))
-        with pytest.raises(InputError, match="not in one line"):
-            result.predict([[0.0, 0.0]])
 
 
 def test_two_frames_are_not_mixed():

@@ -17,7 +17,7 @@ from palpate._jit import kernel, law
 from palpate._jit.elementary import exp, log
 from palpate.cli import main
 from palpate.native.exporting import exported_law
-from palpate.native.replay import program, write_rows
+from palpate.native.replay import write_rows
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
@@ -42,25 +42,6 @@ def test_a_law_that_differs_by_one_operator_fails_the_check(squares):
     assert changed != text
     other = dataclasses.replace(squares, sources=dataclasses.replace(squares.sources, source=changed))
     assert other.check(4_000)[1] > 3_000
-
-
-def test_the_c_is_of_the_law_as_it_stands(squares):
-    """Another operator in Python is another operator in C: there is no second copy."""
-    module = dataclasses.replace(
-        squares.module, entries=(dataclasses.replace(squares.module.entries[0], law=sum_of_squares),)
-    )
-    from palpate.native.module import generate_sources
-
-    assert "total = total + regressor.at[i] * regressor.at[i]" in generate_sources(module).source
-
-
-@law
-def sum_of_squares(gains, state, regressor, force):
-    """The sum of the squares, and of the force's."""
-    total = force * force
-    for i in range(len(regressor)):
-        total += regressor[i] * regressor[i]
-    return total
 
 
 @needs_compiler
@@ -149,13 +130,6 @@ def test_the_code_has_35_kilobytes_at_most(compiler, force, tmp_path):
     assert int(sizes.stdout.split()[6]) < 35_000
 
 
-def test_the_header_names_law_and_gains(force, gains):
-    from palpate.force import load_gains
-
-    own = load_gains(gains)
-    assert f"// law: {own.law}\n// gains: {own.digest}\n" in force.sources.header
-
-
 def test_a_certificate_knows_the_header_of_its_gains(force, gains, tmp_path, capsys):
     from palpate.force import Certificate, load_gains
     from palpate.force.certificate import FORM
@@ -228,12 +202,6 @@ def test_bad_input_is_one_line(gains, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     assert "install gcc or clang" in refused(capsys, own, "--to", "c", "--check")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "mine", "older.toml"]
-
-
-def test_the_program_reads_arrays_and_numbers_in_their_order(squares):
-    text = program(squares.module, squares.recording.inputs)
-    assert "palpate_squares_update(gains, &state, &in[0], in[3])" in text
-    assert np.isnan(next(iter(squares.recording.presses(4000, 1)))[:, 1:4]).any()
 
 
 def equality():

@@ -18,13 +18,12 @@ from palpate.force import ForceLoop
 from palpate.force.arm import Limits, ServoLoop, load_arm
 from palpate.force.gains import gains_for
 from palpate.press.cell import Reading, WristSensor, read_sensor
-from palpate.press.prepare import PressSpec, arm_of, prepare_press, surface_of
+from palpate.press.prepare import PressSpec, prepare_press, surface_of
 from palpate.press.pressing import press
 from palpate.press.sequence import CautiousDriver, Plan
 from palpate.press.setting import cell_of, check_able
 from palpate.press.simulated_arm import SimulatedArm
 from palpate.press.summary import summarise
-from palpate.robots.serial.from_toml import names
 
 PLAIN = ("press", "--arm", "fr3", "--force", "20:N", "--surface", "K=5000,B=50")
 
@@ -108,19 +107,6 @@ def test_controllers_of_three_directions_press_with_seven_joints(controller):
     _, summary = asked(controller=controller, arm="iiwa14", seconds=4.0)
     assert summary["end"] == "done"
     assert summary["force"]["mean_N"] == pytest.approx(20.0, abs=0.5)
-
-
-@pytest.mark.long
-def test_the_impedance_shares_the_depth_with_the_surface():
-    _, summary = asked(controller="impedance", seconds=2.5, probe=0.0)
-    assert summary["force"]["mean_N"] == pytest.approx(20.0 * 5000.0 / (5000.0 + 2000.0), rel=0.01)
-
-
-@pytest.mark.long
-def test_the_same_seed_gives_the_same_numbers_and_another_others():
-    one, again, other = (asked(seconds=0.3, seed=seed)[0] for seed in (1, 1, 2))
-    assert np.array_equal(one["force"], again["force"])
-    assert not np.array_equal(one["force_sampled"][:100], other["force_sampled"][:100])
 
 
 def test_the_folder_and_what_is_printed(tmp_path, capsys):
@@ -208,17 +194,6 @@ def test_a_users_own_gains(tmp_path):
     assert again.request.gains == pressing.request.gains
     with pytest.raises(InputError, match="for a torque arm, and --mode says position"):
         prepare_press(question(force=15.0, gains=path, mode="position"))
-
-
-def test_a_plan_is_steady_at_both_ends():
-    plan = Plan(20.0, 6.0, 0.2)
-    assert [plan.force_at(t) for t in (0.0, 1.9, 2.1, 2.4, 4.1, 5.9)] == [20.0, 20.0, 16.0, 20.0, 20.0, 20.0]
-
-
-def test_every_arm_by_its_name():
-    assert names() == ["fr3", "iiwa14", "panda", "ur5e"]
-    for name in names():
-        assert arm_of(name, None).joints in (6, 7)
 
 
 WRONG = [

@@ -32,10 +32,6 @@ def test_no_step_comes_a_tick_early_or_late(period):
     np.testing.assert_array_equal(steps, 300 + np.round(np.arange(len(steps)) * period / TICK))
 
 
-def test_without_a_hold_it_starts_with_the_first_step():
-    assert THESIS._replace(hold=0.0).position(0.0) == 0.456
-
-
 def test_compiled_is_plain():
     plain, compiled = np.empty(8000), np.empty(8000)
     positions(THESIS, 8000, plain)

@@ -17,11 +17,6 @@ def forces(schedule, ticks, out):
         out[k] = schedule.force(k * 0.001)
 
 
-def test_a_constant_force_is_constant():
-    schedule = ForceSchedule(20.0, 20.0, 2.5, 0.0, 0.5, 0.0)
-    assert {schedule.force(k * TICK) for k in range(10000)} == {20.0}
-
-
 def test_the_levels_alternate_on_their_ticks():
     at = [STEPS.force(k * TICK) for k in range(10000)]
     for interval in range(4):

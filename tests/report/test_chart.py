@@ -60,21 +60,6 @@ def test_a_figure_and_a_page_show_the_same():
     assert (spec["unit"], under["spec"]["series"][0]["label"]) == ("s", "depth")
 
 
-def test_charts_in_rows_have_an_axis_each():
-    charts = [
-        Chart("torque [N m]", [Series(T, k * T, "ink")], x="time [s]", title=f"q{k}") for k in (1, 2, 3, 4)
-    ]
-    figure = build_figure(charts, columns=3)
-    assert [axis.get_title(loc="left") for axis in figure.axes] == ["q1", "q2", "q3", "q4"]
-    assert all(axis.get_xlabel() == "time [s]" for axis in figure.axes)
-
-
-def test_gaps_stay_gaps():
-    values = np.where((T > 1.0) & (T < 2.0), np.nan, T)
-    (shown,) = panels([Chart("force [N]", [Series(T, values, "F")])])
-    assert np.isnan(opened(shown["columns"]["c0"])).any()
-
-
 @pytest.mark.parametrize("offset", [0.0, 1e3, -1e-4])
 def test_a_page_has_a_column_to_a_ten_thousandth_of_its_range(offset):
     y = offset + 1e-3 * np.sin(T[::100])

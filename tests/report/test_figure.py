@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.files import check_place
-from palpate.report.identification.charts import build_charts, evidence_charts, time_charts
+from palpate.report.identification.charts import build_charts, time_charts
 from palpate.report.identification.page import draw, write_figure
-from palpate.report.identification.words import full_number, sentence
-from palpate.report.style import with_peaks
 from report.outcomes import OUTCOMES
 
 
@@ -25,23 +23,6 @@ def by_title(charts):
 def line_of(chart, label):
     (line,) = (series for series in chart.series if series.label == label)
     return line
-
-
-def test_the_panels_and_what_they_measure(found):
-    pressed = replace(OUTCOMES["not_identifiable"](), dynamic_stiffness=found.dynamic_stiffness)
-    charts = build_charts(pressed, pressed.traces)
-    assert [(chart.title, chart.x, chart.y) for chart in charts] == [
-        ("Storage", "frequency [Hz]", "storage [kN/m]"),
-        ("Loss", "frequency [Hz]", "loss [kN/m]"),
-        ("Press", "depth from touch [mm]", "force [N]"),
-        ("Force", "time [s]", "force [N]"),
-        ("Misfit", "time [s]", "misfit [N]"),
-    ]
-
-
-def test_without_a_press_there_is_no_chart_of_one(found):
-    bare = replace(found, press=None)
-    assert "Press" not in by_title(evidence_charts(bare, bare.traces))
 
 
 def test_storage_and_loss_are_those_of_the_octaves(found):
@@ -82,15 +63,6 @@ def test_a_line_is_broken_between_contacts(found):
     assert model.x[gap + 1] - model.x[gap] > 5.0
 
 
-def test_the_sentence_and_the_verdicts_stand_above_the_panels(found):
-    written = " ".join(draw(found, "press.csv").get_suptitle().split())
-    assert written.startswith("press.csv")
-    assert sentence(found) in written
-    for name, p in found.parameters.items():
-        assert f"{name} {full_number(p)}" in written
-    assert written.index(sentence(found)) < written.index("K ")
-
-
 def test_a_name_is_no_formula(found):
     """Matplotlib would take what stands between dollars for mathematics, and fail."""
     figure = draw(found, "a$x_{1$ \x1b[31m.csv")
@@ -114,25 +86,7 @@ def test_every_outcome_has_a_picture(outcome, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_without_a_contact_the_force_is_shown_alone():
-    none = OUTCOMES["no_contact"]()
-    (chart,) = build_charts(none, none.traces)
-    assert chart.y == "force [N]"
-
-
 def test_without_traces_there_is_none(found, tmp_path):
     with pytest.raises(ValueError, match="without traces"):
         write_figure(replace(found, traces=None), tmp_path / "a.png", "log")
     assert not list(tmp_path.iterdir())
-
-
-def test_a_long_log_is_thinned_without_losing_a_peak():
-    time = np.arange(100_000) / 1000
-    values = np.zeros(len(time))
-    values[54_321] = 7.0
-    values[77_777] = -3.0
-    at, kept = with_peaks(time, values, 2400)
-    assert len(kept) < 5000
-    assert (np.diff(at) >= 0).all()
-    assert (kept.max(), kept.min()) == (7.0, -3.0)
-    assert at[kept.argmax()] == time[54_321]

@@ -64,12 +64,6 @@ def test_a_rejected_parameter_has_a_reason_and_no_number():
     assert "B: the fit gives -1800 N s/m, below zero." in lines
 
 
-def test_a_log_without_contact_names_what_to_check():
-    lines = printed(OUTCOMES["no_contact"]())
-    assert lines[0].startswith("Nothing is touched in press [1].csv: ")
-    assert not any("95 %" in line for line in lines)
-
-
 def test_a_stiffness_behind_the_joints_is_a_lower_bound_everywhere():
     found = with_arm(OUTCOMES["identified"](), ArmDynamics(position_from="joints"), 0.25, from_pose=True)
     lines = printed(found)
@@ -87,13 +81,6 @@ def test_a_modulus_goes_first():
     assert "stiffness" in lines[2]
     assert not any(line.startswith("E ") for line in lines)
     assert next(iter(found.parameters)) == "E"
-
-
-def test_a_narrow_terminal_hangs_long_lines_under_their_beginning():
-    lines = printed(OUTCOMES["identified"](), width=70)
-    assert max(map(len, lines)) <= 70
-    indent = len(lines[1]) - len(lines[1].lstrip())
-    assert lines[2][:indent].isspace()
 
 
 def test_nothing_of_a_log_is_obeyed_by_the_terminal():

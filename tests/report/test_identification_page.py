@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 from functools import cache
 from html import unescape
 from html.parser import HTMLParser
@@ -132,20 +131,6 @@ def test_what_has_no_number_shows_none(found, html):
     assert len(re.findall(r"<td[^>]*>no number", html)) == count
 
 
-def test_interval_and_budget_stand_with_each_parameter(found, read):
-    for p in found.parameters.values():
-        if p.ci95 is not None and p.value is not None:
-            assert full_number(p) in read.text
-        for cause in p.budget:
-            assert cause in read.text
-
-
-def test_a_verdict_has_its_colour(found, html):
-    for p in found.parameters.values():
-        tone = {"identified": "ok", "not identifiable": "warn", "rejected": "fail"}[str(p.verdict)]
-        assert f'<span class="v {tone}">{p.verdict}</span>' in html
-
-
 def test_the_footer_says_how_to_make_it_again(read):
     for part in ("0" * 64, "palpate identify 'press <1>.csv'", "2026-01-02T03:04:05+00:00", "position x"):
         assert part in read.text
@@ -198,31 +183,14 @@ def test_the_charts_are_those_of_the_figure(found, html):
         assert set(labels) >= {series.label for series in chart.series if series.label}
 
 
-def test_the_models_are_listed(found, read):
-    for comparison in found.comparison:
-        assert f"{comparison.rmse:.3g}" in read.text
-    assert read.text.count("(chosen)") == (1 if found.comparison else 0)
-
-
 @pytest.mark.long
 def test_the_same_identification_gives_the_same_page():
     found, once = drawn("not_identifiable")
     assert page(found, SOURCE) == once
 
 
-def test_without_a_unit_none_is_shown():
-    text = Reader(drawn("volts")[1]).text
-    for unit in ("[N]", "N/m", " kg", "[mm]"):
-        assert unit not in text.split("The same as JSON")[0]
-
-
 def test_there_is_advice_for_every_warning():
     assert set(ADVICE) == set(Code)
-
-
-def test_an_identification_without_traces_has_a_page_without_pictures():
-    bare = replace(OUTCOMES["no_contact"](), traces=None)
-    assert not panels_of(page(bare, SOURCE))
 
 
 def test_how_the_log_was_read_is_told():

@@ -36,21 +36,6 @@ def test_each_parameter_has_its_number_its_verdict_and_its_largest_cause():
         assert all(part in line for part in parts), line
 
 
-def test_what_is_not_identified_has_its_reason_and_no_number():
-    found = OUTCOMES["not_identifiable"]()
-    text = printed(found)
-    assert f"M: {found.parameters['M'].reason}" in text
-    (line,) = (own for own in text.splitlines() if own.strip().startswith("M "))
-    assert "no number" in line
-
-
-def test_a_log_without_contact_says_so():
-    text = printed(OUTCOMES["no_contact"]())
-    assert "press [1].csv: 0 contacts" in text
-    assert "no-contact:" in text
-    assert text.startswith("Nothing is touched in this log")
-
-
 def test_nothing_of_a_log_is_obeyed_by_the_terminal():
     """Names and warnings may hold escape sequences and what rich takes for markup."""
     nasty = "\x1b]0;gone\x07[bold]x[red]"

@@ -7,17 +7,13 @@ from html import unescape
 import numpy as np
 import pytest
 
-from palpate.cli._terminal import console
-from palpate.files import check_place, write_text
 from palpate.identification.pooling import pool
 from palpate.identification.result import Identification, Traces, WorkingPoint
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.report.identification.words import Source
 from palpate.report.many.page import draw_logs as draw
 from palpate.report.many.page import page_of_logs as page
-from palpate.report.many.page import write_figure
-from palpate.report.many.table import LogRow, build_answer, failures, pooled_json, sentence
-from palpate.report.terminal import show_answer
+from palpate.report.many.table import LogRow, failures, pooled_json, sentence
 from report.test_identification_page import Reader
 
 NONE = np.empty(0)
@@ -104,19 +100,3 @@ def test_the_forest_has_a_row_a_log_and_the_pooled_one(rows, pooled):
     diamond = axis.patches[-1].get_xy()
     low, high = pooled.working_point.stiffness.parameter.ci95
     assert (diamond[:, 0].min(), diamond[:, 0].max()) == pytest.approx((low, high))
-
-
-def test_both_files_are_whole_and_ours(rows, pooled, tmp_path):
-    check_place(write_figure(rows, pooled, tmp_path / "a.png"), "--figure")
-    write_text(tmp_path / "a.html", page(rows, pooled))
-    check_place(tmp_path / "a.html", "--report")
-
-
-def test_the_terminal_shows_each_log_and_the_mean(rows, pooled, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "160")
-    show_answer(build_answer(rows, pooled), console())
-    text = capsys.readouterr().out
-    assert " ".join(text.split()).startswith(sentence(rows, pooled))
-    assert "5000 ± 40" in text
-    assert "there is no file <b>" in text
-    assert "\x1b" not in text

@@ -51,15 +51,6 @@ def test_the_summary_is_the_pooled_answer(rows, pooled):
         assert float(line[column]) == pytest.approx(own.value, abs=float(line[column + 1]) / 5)
 
 
-def test_a_covariate_has_a_row_of_its_slopes(rows):
-    pooled = pool([row.result for row in rows], covariates={"temperature_C": [30.0, 20.0, 5.0]})
-    head, body = cells(rows, pooled)
-    name, *values = body[-1]
-    slope = pooled.parameters["K"].slopes["temperature_C"]
-    assert name == "per temperature_C"
-    assert float(values[head.index("K [N/m]") - 1]) == pytest.approx(slope.value, rel=0.05)
-
-
 def test_the_file_holds_all_cells_and_may_be_replaced(rows, pooled, tmp_path):
     path = tmp_path / "t.csv"
     write_table(rows, pooled, path)

@@ -70,33 +70,6 @@ def test_an_identification_is_readable(found):
     assert "\n" not in repr(found)
 
 
-def test_many_logs_are_readable(pooled):
-    text = str(pooled)
-    assert text.startswith("Over 2 of 3 logs the stiffness is ")
-    assert re.search(r"^ *left.csv +\d", text, re.MULTILINE)
-    assert "broken.csv" in text
-    assert repr(pooled).startswith("<Pooled: 3 logs; working point 5232 ± ")
-    assert "1 of 3 logs could not be identified" in pooled._repr_html_()
-
-
-def test_many_logs_are_equal_by_value_and_named_one_by_one(found, pooled):
-    assert pooled == copy.deepcopy(pooled)
-    assert pooled == pickle.loads(pickle.dumps(pooled))
-    assert pool([found, found]) != pool([found, found, found])
-    assert str(pool([found, found])).count("log 1") == 1
-    with pytest.raises(InputError, match="one for each of the 2 logs, got 1"):
-        pool([found, found], names=["a"])
-    with pytest.raises(InputError, match="nothing to draw"):
-        pool([None, None]).plot()
-
-
-def test_a_record_is_readable(record):
-    lines = str(record).splitlines()
-    assert lines[0].startswith("Record: 3 columns of 4000 rows, 0 to 7.998 s")
-    assert [line.split()[:2] for line in lines[3:]] == [["time", "s"], ["position", "m"], ["force", "N"]]
-    assert repr(record).startswith("<Record: 3 columns of 4000 rows")
-
-
 TUNED = pytest.param("tuned", marks=pytest.mark.long)
 
 
@@ -192,35 +165,6 @@ def test_no_number_equals_no_number():
     assert not same({"a": 1}, {"b": 1})
     assert not same(np.zeros(2), [0.0, 0.0])
     assert not same(float("nan"), 1.0)
-
-
-def test_an_empty_record_is_shown(tmp_path):
-    empty = palpate.Record({}, {})
-    head, columns = str(empty).splitlines()[:2]
-    assert head == "Record: 0 columns of 0 rows"
-    assert columns.split() == ["column", "unit", "least", "mean", "largest", "missing"]
-    assert empty.report(tmp_path / "empty.html").exists()
-    nothing = palpate.Record({"force": np.full(5, np.nan)}, {"force": "N"})
-    assert str(nothing).splitlines()[-1].split() == ["force", "N", "-", "-", "-", "5"]
-
-
-def test_a_long_record_is_drawn_by_its_extremes(tmp_path):
-    force = np.zeros(300_000)
-    force[123_456] = 9.0
-    (axis,) = palpate.Record({"force": force}, {"force": "N"}).plot().get_axes()
-    (line,) = axis.get_lines()
-    assert len(line.get_ydata()) < 10_000
-    assert line.get_ydata().max() == 9.0
-    assert line.get_xdata()[line.get_ydata().argmax()] == 123_456
-
-
-def test_dir_is_what_a_user_can_use():
-    names = dir(palpate)
-    assert not [name for name in names if name.startswith("_") and name != "__version__"]
-    assert {"identify", "read_log", "Record", "Identification", "InputError"} <= set(names)
-    assert not {"annotations", "import_module", "Any", "TYPE_CHECKING"} & set(names)
-    for name in names:
-        assert getattr(palpate, name) is not None
 
 
 def test_help_tells_the_rooms_and_the_first_lines(root, tmp_path, monkeypatch, capsys):

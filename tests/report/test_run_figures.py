@@ -47,22 +47,6 @@ def test_without_contact_there_is_nothing_to_show_of_it(record, summary, tmp_pat
     assert list(write(air, {**summary, "force": None}, tmp_path)) == ["approach.png", "torque.png"]
 
 
-@pytest.mark.long
-def test_the_same_record_gives_the_same_picture(record, summary, tmp_path):
-    (tmp_path / "a").mkdir()
-    (tmp_path / "b").mkdir()
-    for folder in "ab":
-        write(record, summary, tmp_path / folder)
-    for path in (tmp_path / "a").glob("*.png"):
-        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
-
-
-@pytest.mark.long
-def test_a_surface_that_knows_no_mass_or_stiffness_is_drawn_too(record, summary, tmp_path):
-    untold = Record(record.columns, record.units, {**record.meta, "truth": {}})
-    assert "identification.png" in write(untold, summary, tmp_path)
-
-
 @pytest.mark.parametrize(
     "rows", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(250, marks=pytest.mark.long)]
 )

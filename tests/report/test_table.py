@@ -29,13 +29,6 @@ def cells(table):
     return {row[0]: row[1:] for row in table.rows}
 
 
-def test_every_row_fits_its_head(summary, found):
-    for table in tables(summary, found):
-        assert table.title
-        assert all(len(row) == len(table.head) for row in table.rows)
-        assert all(isinstance(cell, str) for row in table.rows for cell in row)
-
-
 def test_the_tables_say_what_the_summary_and_the_identification_say(summary, found):
     force, surface, identified = tables(summary, found)
     assert cells(force)["desired at the end"] == ("20.00 N",)
@@ -48,19 +41,6 @@ def test_the_tables_say_what_the_summary_and_the_identification_say(summary, fou
     assert row["truth"] == "5200 N/m"
     assert "verdict" not in identified.head, "an estimator that assumes the model judges nothing"
     assert float(stiffness["thesis"]) == pytest.approx(summary["identified"]["thesis"]["K"], rel=1e-3)
-
-
-def test_without_contact_there_is_no_table(summary):
-    assert tables({**summary, "force": None}, None) == []
-
-
-def test_what_has_no_truth_and_no_settling_has_a_dash(summary):
-    force = {**summary["force"], "settling_s": None, "overshoot_N": None}
-    changed, identified = tables({**summary, "force": force, "truth": {}}, None)
-    assert cells(changed)["overshoot"] == cells(changed)["settling to 5 %"] == ("-",)
-    assert cells(identified)["K [N/m]"][-1] == "-"
-    never = tables({**summary, "force": {**summary["force"], "settling_s": None}}, None)[0]
-    assert cells(never)["settling to 5 %"] == ("not within the run",)
 
 
 NOTED = {

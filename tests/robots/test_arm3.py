@@ -37,14 +37,6 @@ def test_compiled_is_plain_bit_for_bit(state):
     assert everything(Arm3(), *values) == everything.plain(Arm3(), *values)
 
 
-def test_model_gathers_the_single_laws():
-    q, qd = (Vec3(*row) for row in RNG.uniform(-3.0, 3.0, (2, 3)).tolist())
-    arm = Arm3()
-    model = arm.model(q, qd)
-    assert model == (arm.jac(q), arm.jac_dot_qd(q, qd), arm.inertia(q), arm.bias(q, qd))
-    np.testing.assert_allclose(model.Jdqd, arm.jac_dot(q, qd) @ qd, atol=1e-13)
-
-
 def test_model_takes_each_sine_and_cosine_once(monkeypatch):
     calls = []
     for name in ("sin", "cos"):

@@ -60,15 +60,6 @@ def test_any_fraction(instant, frequency):
 
 
 @each_chain
-def test_what_does_not_move_stays_where_it_is(low_pass):
-    """Its derivatives are nothing, however far from zero it is."""
-    instants = np.linspace(-30, COUNT + 30, 500)
-    got = read(np.full(COUNT, 1e6), instants, taps(low_pass, DT, 3))
-    np.testing.assert_allclose(got[0], 1e6, rtol=1e-14)
-    np.testing.assert_array_equal(got[1:], 0.0)
-
-
-@each_chain
 def test_a_straight_line_comes_out_late_by_the_lag(low_pass):
     instants = on_the_grid(np.random.default_rng(2), low=900, high=1100)
     got = read(0.3 * (ROWS - 1000), instants, taps(low_pass, DT, 3))
@@ -173,23 +164,3 @@ def test_only_the_samples_that_it_states_count():
     assert weights.weights.shape == (FRACTIONS + 1, 3, weights.before + 1 + weights.after)
     by_hand = weights.weights[FRACTIONS // 4] @ noise[first : last + 1]
     np.testing.assert_allclose(read(noise, at, weights)[:, 0], by_hand, rtol=0, atol=1e-12)
-
-
-def test_a_whole_sample_further_is_the_next_samples_first_place():
-    """The last of the fractions is the first, one sample on: the weights join."""
-    found = taps(SENSOR, DT, 3).weights
-    np.testing.assert_allclose(found[-1, :, 1:], found[0, :, :-1], rtol=0, atol=2e-5)
-
-
-def test_weights_are_made_once_and_kept_from_harm():
-    weights = taps(SENSOR, DT, 3)
-    assert taps(LowPass.parse("butterworth3:120"), DT, 3) is weights
-    with pytest.raises(ValueError, match="read-only"):
-        weights.weights[0, 0, 0] = 1.0
-
-
-def test_what_is_faster_than_half_the_rate_is_not_seen():
-    weights = taps(LowPass(), DT, 1)
-    alternating = np.where(np.arange(COUNT) % 2, -1.0, 1.0)
-    got = read(alternating, np.linspace(900, 1100, 64), weights)
-    np.testing.assert_allclose(got, 0.0, rtol=0, atol=1e-4)

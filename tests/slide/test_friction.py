@@ -12,8 +12,7 @@ from scipy.spatial import cKDTree
 from oracles.wiped_surface import Wipe, WipeLog, any_press, any_wipe, press, wipe
 from palpate.cli import main
 from palpate.contact_frame import ContactFrame, identify_contact
-from palpate.contact_frame.signals_in_base import base_signals
-from palpate.contact_frame.slide_log import RELAXATION_SPREAD, compensate_slide
+from palpate.contact_frame.slide_log import RELAXATION_SPREAD
 from palpate.identification import Identification, Verdict
 from palpate.records import Record
 
@@ -86,14 +85,6 @@ def test_stiffness_is_refused_where_its_friction_relaxes_on_an_unknown_length():
     found = found_in(wipe(any_wipe(215, free=1.5)))  # one length gives 42 % too much, known to 10 %
     assert found.parameters["mu"].verdict is Verdict.IDENTIFIED
     assert found.parameters["K"].verdict is Verdict.NOT_IDENTIFIABLE
-
-
-@pytest.mark.parametrize(
-    "seed", [12118, *(pytest.param(s, marks=pytest.mark.long) for s in (12132, 20102))]
-)  # of a bowl, a plane and a cylinder: a press would have K at 259, 3054 and 62 N/m
-def test_a_slide_without_free_motion_is_no_press_with_a_stiffness(seed):
-    found = found_in(wipe(any_wipe(seed, free=0.0)))
-    assert found.parameters["K"].verdict is not Verdict.IDENTIFIED
 
 
 @pytest.mark.long
@@ -170,15 +161,6 @@ def test_a_slides_own_record_is_read_with_its_frames_and_without_its_touches(tmp
     for name, truth in (("mu", 0.3), ("K", 8e3)):
         assert own[name]["verdict"] == "identified"
         assert own[name]["ci95"][0] < truth < own[name]["ci95"][1]
-
-
-@pytest.mark.parametrize("seed", [21100, 21101, 21116, 21120])
-def test_a_slide_that_begins_in_contact_shows_no_free_motion(seed):
-    log = wipe(any_wipe(seed, free=0.0))
-    record = Record(log.columns, {name: UNITS[name.partition("_")[0]] for name in log.columns}, {})
-    frame = ContactFrame(wrench_frame="tool")
-    freed = compensate_slide(base_signals(record, frame), frame)
-    assert freed is None or not freed.free.any()
 
 
 def test_the_length_of_a_spheres_friction_is_within_its_factor():

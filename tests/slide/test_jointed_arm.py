@@ -82,28 +82,6 @@ def test_wrong_words_are_one_line(words: list[str], said: str, tmp_path, capsys)
 
 
 @pytest.mark.long
-def test_the_command_says_by_whom_the_arm_was_moved(tmp_path, capsys) -> None:
-    words = [
-        "slide",
-        "--arm",
-        "iiwa14",
-        "--physics",
-        "mujoco",
-        "--seconds",
-        "1",
-        "--touches",
-        "0:mm",
-        "--tilt",
-        "3",
-    ]
-    assert main([*words, "--out", str(tmp_path / "out"), "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
-    assert answer["physics"] == "mujoco"
-    assert answer["end"] == "held"
-    assert (tmp_path / "out" / "report.html").is_file()
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["ur5e", "fr3"])
 def test_a_tool_is_kept_perpendicular_by_palpates_own_physics(name: str) -> None:
     """With its payload's weight the force is held as before, and the tool follows a normal that turns by 30 degrees."""

@@ -10,9 +10,7 @@ import polars
 import pytest
 
 from cli import asked
-from cli.asked import References
 from palpate.cli import main
-from palpate.studies.study import names
 from studies.small import NEAR, SMALL, text
 
 MANY = SMALL.replace("points = 3", "points = 60")
@@ -68,14 +66,6 @@ def wait_for(path, lines):
         time.sleep(0.003)
 
 
-def test_the_list_has_a_name_and_a_title_a_line(capsys):
-    assert main(["study", "--list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == names()
-    assert len(names()) >= 5
-    assert all(len(line.split()) > 3 for line in lines)
-
-
 def test_a_study_is_printed_to_be_copied(capsys):
     assert main(["study", "learning-rate", "--print"]) == 0
     assert "[parameters]" in capsys.readouterr().out
@@ -92,25 +82,6 @@ def test_the_folder_of_results(folder):
     assert best["metric"]["value"] == pytest.approx(means["force_rms"].min())
     assert best["metric"]["half"] > 0.0
     assert (folder / "small" / "study.toml").read_text().endswith(f"\n{SMALL}")
-
-
-def test_the_page_says_what_was_found_and_fetches_nothing(folder):
-    page = (folder / "small" / "report.html").read_text()
-    references = References()
-    references.feed(page)
-    assert references.found
-    assert all(one.startswith("data:") for one in references.found)
-    for told in ("Small", "The best settings", "RMS of the true force", "points = 3", "palpate study"):
-        assert told in page
-
-
-@pytest.mark.long
-def test_a_finished_study_is_shown_again_and_json_is_all_there_is(folder, capsys):
-    assert main(["study", str(folder / "small.toml"), "--out", str(folder / "small"), "--json"]) == 0
-    captured = capsys.readouterr()
-    summary = json.loads((folder / "small" / "summary.json").read_text())
-    assert summary.items() <= json.loads(captured.out).items()
-    assert captured.err == ""
 
 
 @pytest.mark.long

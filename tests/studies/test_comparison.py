@@ -8,11 +8,9 @@ import pytest
 from scipy import stats
 
 from palpate.studies.comparison import Entrant, compare, comparisons, mean, median_interval, rankings
-from palpate.studies.journal import Row
 from palpate.studies.plan import plan_runs as plan_of
-from palpate.studies.run_study import table
 from palpate.studies.study import parse
-from palpate.studies.summary import comparison_sentence, comparison_table, headline, present
+from palpate.studies.summary import comparison_sentence, comparison_table, headline
 from studies.small import planned, table_of, text
 
 N = 64
@@ -99,17 +97,6 @@ def test_laws_that_do_not_differ_are_not_told_apart():
     assert 0.4 < pair.won < 0.6
 
 
-def test_page_and_summary_say_which_is_better(tmp_path):
-    plan = planned(RANDOM)
-    found = present(frame_of(plan), plan, tmp_path, RANDOM, "palpate study x")
-    page = (tmp_path / "report.html").read_text()
-    assert "C has the smaller force_rms than A, the next, on 64 of 64 surfaces" in page
-    assert found.summary["compared"][0]["settings"][0]["name"] == "C"
-    assert {"trends-force_rms.png", "trends-overshoot.png", "trends-K_matched.png"} <= {
-        p.name for p in tmp_path.iterdir()
-    }
-
-
 SEEDS = 6
 GRID = text(
     '"controller.ki" = [1.0, 2.0, 3.0]\n"surface.damping" = [60.0, 200.0]',
@@ -160,17 +147,6 @@ def test_a_setting_with_a_failing_run_is_not_ranked():
     assert ranking.settings[0].at["controller.ki"] == 2.0
 
 
-def test_a_number_of_a_run_that_failed_does_not_count():
-    plan = planned(GRID)
-    rows = [
-        Row(run, at, "lost contact" if at["controller.ki"] == 1.0 else "done", "", value_on_grid(at), 0.0)
-        for run, at in ((run, plan.setting(run).at) for run in range(len(plan)))
-    ]
-    (ranking,) = rankings(table(plan, rows), plan)
-    assert ranking.failed == 2
-    assert {one.at["controller.ki"] for one in ranking.settings} == {2.0, 3.0}
-
-
 def test_the_best_for_each_of_what_is_given():
     plan = planned(GRID.replace('"force_rms" }', '"force_rms", each = ["surface.damping"] }'))
     found = {r.of["surface.damping"]: r for r in rankings(table_of(plan, value_on_grid), plan)}
@@ -178,13 +154,6 @@ def test_the_best_for_each_of_what_is_given():
     for one in found.values():
         assert one.settings[0].at == {"controller.ki": 1.0}
         assert len(one.settings) == 3
-
-
-def test_the_most_is_the_best_where_it_is_asked_for():
-    plan = planned(GRID.replace("least", "most"))
-    (ranking,) = rankings(table_of(plan, value_on_grid), plan)
-    assert ranking.settings[0].at == {"controller.ki": 3.0, "surface.damping": 60.0}
-    assert all(one.behind.value >= 0.0 for one in ranking.settings)
 
 
 def test_one_seed_has_no_interval():

@@ -5,10 +5,8 @@ import numpy as np
 import pytest
 
 from palpate.bench import load
-from palpate.studies.comparison import MetricMean, rankings
-from palpate.studies.drawing import Scale
+from palpate.studies.comparison import rankings
 from palpate.studies.figures import (
-    bounds_of,
     cells,
     draw,
     equivalent,
@@ -21,8 +19,7 @@ from palpate.studies.figures import (
 from palpate.studies.journal import Row
 from palpate.studies.metrics import METRICS
 from palpate.studies.run_study import table
-from palpate.studies.study import Map
-from palpate.studies.summary import interval, present, ranking_table
+from palpate.studies.summary import present, ranking_table
 from studies.small import planned, table_of, text
 
 GRID = text(
@@ -155,25 +152,6 @@ def test_runs_that_feel_no_surface_are_a_report_too(tmp_path, parameters):
     }
 
 
-def test_cells_lie_around_their_values():
-    np.testing.assert_allclose(
-        Scale("x", [1.0, 10.0, 100.0], log=True).edges(), 10.0 ** np.array([-0.5, 0.5, 1.5, 2.5])
-    )
-    np.testing.assert_allclose(Scale("x", [1.0, 2.0, 4.0]).edges(), [0.5, 1.5, 3.0, 5.0])
-    np.testing.assert_allclose(Scale("x", ["a", "b"]).edges(), [-0.5, 0.5, 1.5])
-    low, high = Scale("x", [5.0]).edges()
-    assert low < 5.0 < high
-
-
-@pytest.mark.parametrize(
-    ("values", "logarithmic"),
-    [("[1, 2, 5, 10, 20]", True), ("[1, 2, 3, 4]", False), ("[0, 1, 10]", False), ("[1, 100]", True)],
-)
-def test_a_wide_list_of_values_has_a_logarithmic_axis(values, logarithmic):
-    plan = planned(text(f'"controller.ki" = {values}'))
-    assert scale_of(plan.axis("controller.ki")).log == logarithmic
-
-
 def test_the_table_has_the_best_settings_for_each_surface(plan):
     frame = results(plan, lost)
     ranked = rankings(frame, plan)
@@ -185,18 +163,6 @@ def test_the_table_has_the_best_settings_for_each_surface(plan):
     assert [ranking.failed for ranking in ranked] == [2, 0]
 
 
-@pytest.mark.parametrize(
-    ("mean", "told"),
-    [
-        (MetricMean(1.23456, 0.0123), "1.235 ± 0.012"),
-        (MetricMean(123.4, 15.0), "123 ± 15"),
-        (MetricMean(0.5, None), "0.5"),
-    ],
-)
-def test_a_mean_has_the_digits_of_its_interval(mean, told):
-    assert interval(mean) == told
-
-
 def test_the_equivalent_of_the_neural_controller_is_its_integrator():
     neural = load("foam-neural")
     plain = equivalent(neural)
@@ -204,20 +170,3 @@ def test_the_equivalent_of_the_neural_controller_is_its_integrator():
     assert plain.controller.kf == neural.controller.kf
     assert plain.surface == neural.surface
     assert equivalent(plain) == plain
-
-
-@pytest.mark.long
-def test_the_bound_is_where_the_linear_model_turns_unstable():
-    from palpate.studies.analysis import linearise
-
-    source = text(
-        '"surface.stiffness" = { log = [2000.0, 100000.0], points = 3 }\n"surface.damping" = [60.0]', fixed=""
-    )
-    plan = planned(source.replace("foam-pi", "foam-hybrid"))
-    asked = Map("surface.stiffness", "surface.damping", "force_rms", bound="linear")
-    x, y = (Scale(a.name, a.labels(), log=i == 0) for i, a in enumerate(plan.axes))
-    (line,) = bounds_of(plan, asked, None, x, y)
-    assert list(line.y) == [60.0]
-    for factor, stable in ((0.97, True), (1.03, False)):
-        one = plan.experiment({"surface.stiffness": factor * line.x[0], "surface.damping": 60.0})
-        assert linearise(one).stable == stable

@@ -34,14 +34,6 @@ def of(name, one, window=None):
     return METRICS[name].value_in(Window(one, window))
 
 
-def test_names_are_those_of_the_table_and_texts_are_lines():
-    assert len(METRICS) > 30
-    for name, metric in METRICS.items():
-        assert name == metric.name
-        assert metric.text
-        assert "\n" not in metric.text
-
-
 def test_errors_of_a_force_that_is_one_newton_off_for_half_of_the_time():
     one = record(np.concatenate([np.full(2000, 20.0), np.full(2000, 21.0)]))
     assert of("force_rms", one) == pytest.approx(np.sqrt(0.5))

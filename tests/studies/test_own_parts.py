@@ -13,7 +13,6 @@ from palpate.studies.cluster import pack, run_on_worker
 from palpate.studies.journal import head_of, sources
 from palpate.studies.plan import plan_runs
 from palpate.studies.run_one import RunJob, run_one
-from palpate.studies.run_study import check_parts_of
 from palpate.studies.study import parse
 from studies.small import NEAR, text
 
@@ -137,10 +136,3 @@ def test_results_that_name_a_plugin_import_nothing(module, tmp_path):
     with pytest.raises(InputError, match="another study"):
         run(IDENTIFIED.replace("960", "1000"), folder)
     assert name not in sys.modules
-
-
-@pytest.mark.long
-def test_a_whole_study_with_a_controller_of_ones_own(tmp_path):
-    frame = run(OWN, tmp_path / "out")
-    assert frame["result"].to_list() == ["done"] * 2
-    check_parts_of(plan_runs(parse(OWN, "T"), "T"))

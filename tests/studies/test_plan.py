@@ -92,16 +92,6 @@ def test_cases_bring_other_surfaces_and_other_experiments_which_the_rest_changes
     assert {e.surface.stiffness for e in experiments.values()} == {1000.0}
 
 
-def test_a_seed_may_set_other_things_too():
-    source = text('seed = { values = [3, 4], sets = ["seed", "controller.weights_seed"] }', head="seeds = 5")
-    plan = planned(source.replace("foam-pi", "foam-neural"))
-    assert len(plan) == 2
-    assert [(plan.setting(i).seed, plan.setting(i).experiment.controller.weights_seed) for i in range(2)] == [
-        (3, 3),
-        (4, 4),
-    ]
-
-
 def test_refused_values_are_runs_with_a_reason():
     plan = planned(text('"controller.ki" = [1.0, -1.0]'))
     assert plan.setting(0).experiment is not None

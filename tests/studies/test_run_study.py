@@ -182,8 +182,3 @@ def test_stopping_stops_the_runs_under_way():
     while set(threading.enumerate()) - before:
         assert time.monotonic() < deadline
         time.sleep(0.01)
-
-
-def test_replace_in_a_new_folder_has_nothing_to_remove(tmp_path, uninterrupted):
-    work(GRID, tmp_path / "new", Formula(formula)).run(replace=True)
-    assert table(tmp_path / "new") == uninterrupted

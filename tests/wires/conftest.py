@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from wires.slow_cell import ADDRESSES, ALONE, slower_cell
+from wires.slow_cell import ADDRESSES, ALONE, cell, slower_cell
 
 
 @pytest.fixture
@@ -19,6 +19,14 @@ def here(tmp_path, monkeypatch):
 def address():
     """Of the loopback, of its own for each test."""
     return next(ADDRESSES)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A cell of 100 Hz."""
+    made = tmp_path_factory.mktemp("cell")
+    cell(made)
+    return made
 
 
 @pytest.fixture(scope="module")

@@ -13,16 +13,9 @@ import time
 import pytest
 
 from palpate.logs import read_record
-from wires.slow_cell import PATIENCE, WORDS, arm, cell, relayed, rows_came
+from wires.slow_cell import PATIENCE, WORDS, arm, relayed, rows_came
 
 pytestmark = pytest.mark.real_time
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("asked")
-    cell(made)
-    return made
 
 
 CONTROLLED = """

@@ -19,18 +19,15 @@ from palpate.signals.rotations import quaternion_from_columns
 from palpate.wires import Command, ConnectionLostError, open_wire
 from palpate.wires import subprocess_wire as messages
 from palpate.wires.franka import Driver, step_towards
-from wires.slow_cell import PATIENCE, REHEARSAL, WORDS, child, slower_cell
+from wires.slow_cell import PATIENCE, REHEARSAL, WORDS, child
 
 pytest.importorskip("pylibfranka", reason="pylibfranka has no wheel for this system")
 pytest.importorskip("franky_sim", reason="franky-sim is not installed")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("franka")
-    # At its controller's 1 kHz; slower than the others', so that a loop at this rate may be late on a busy machine.
-    slower_cell(made, 1000)
-    return made
+def folder(folders):
+    return folders[1000]
 
 
 @contextmanager

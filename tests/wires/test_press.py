@@ -13,7 +13,7 @@ from palpate.force import ForceLoop, load_arm
 from palpate.force.simulated_press import surface
 from palpate.wires import ArmReading, ConnectionLostError, PressLimits, PressTask, Rows, check_order, press
 from palpate.wires.order import safe_travel
-from wires.slow_cell import cell, servo_cell
+from wires.slow_cell import servo_cell
 
 SURFACE = surface(4000.0, 20.0)
 
@@ -70,13 +70,6 @@ class ArmClock:
 
     def sleep(self, seconds):
         """Not waited for: the arm's time goes on with its commands."""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("lies")
-    cell(made)
-    return made
 
 
 def lying(

@@ -14,16 +14,9 @@ import pytest
 from palpate.cli import main
 from palpate.errors import InputError
 from palpate.logs import read_record
-from wires.slow_cell import ALONE, DOMAIN, REHEARSAL, WORDS, cell, child
+from wires.slow_cell import ALONE, DOMAIN, REHEARSAL, WORDS, child
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("ros2")
-    cell(made)
-    return made
 
 
 @contextmanager

@@ -15,7 +15,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.logs import read_record
-from wires.slow_cell import ALONE, DOMAIN, REHEARSAL, WORDS, child, slower_cell, while_it_presses
+from wires.slow_cell import ALONE, DOMAIN, REHEARSAL, WORDS, child, while_it_presses
 
 pytest.importorskip("cyclonedds", reason="cyclonedds has no wheel for this system")
 pytestmark = pytest.mark.real_time
@@ -23,10 +23,8 @@ TOPIC = "rt/ft/wrench"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("ros2")
-    slower_cell(made, 100)
-    return made
+def folder(folders):
+    return folders[100]
 
 
 @contextmanager

@@ -13,17 +13,10 @@ import pytest
 
 from palpate.logs import read_record
 from palpate.wires import open_wire
-from wires.slow_cell import PATIENCE, WORDS, arm, cell, relayed, standing, wait_for_rows
+from wires.slow_cell import PATIENCE, WORDS, arm, relayed, standing, wait_for_rows
 from wires.test_asking import Terminal
 
 pytestmark = pytest.mark.real_time
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("signals")
-    cell(made)
-    return made
 
 
 def pressing(folder, address, where, *before):

@@ -22,14 +22,7 @@ from palpate.force import ForceLoop
 from palpate.logs import read_record
 from palpate.wires import Command, NoReadingError, open_wire, sim
 from wires.simulated import SimulatedClock, simulated_arm
-from wires.slow_cell import WORDS, arm, cell, servo_cell, wait_for_rows, while_it_presses
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("cell")
-    cell(made)
-    return made
+from wires.slow_cell import WORDS, arm, servo_cell, wait_for_rows, while_it_presses
 
 
 def press(capsys, folder, address, *words):

@@ -20,8 +20,7 @@ import numpy as np
 import pytest
 from rtde_arm import RTDE, SCRIPT, Server
 from rtde_controller import SIMULATED, Controller
-from rtde_dictionary import INPUTS, OUTPUTS
-from tool_axis_arm import Joints, ToolAxisArm
+from tool_axis_arm import ToolAxisArm
 
 from palpate.force import load_arm
 from palpate.force.simulated_press import surface
@@ -111,21 +110,6 @@ def ur():
     server.close()
 
 
-def test_the_dictionary_has_the_types_of_the_guide():
-    assert {OUTPUTS[n] for n in ("actual_digital_input_bits", "actual_digital_output_bits")} == {"UINT64"}
-    assert {OUTPUTS[n] for n in ("elbow_position", "payload_cog", "actual_tool_accelerometer")} == {
-        "VECTOR3D"
-    }
-    assert OUTPUTS["joint_mode"] == "VECTOR6INT32"
-    assert OUTPUTS["output_bit_register_64"] == "BOOL"
-    assert "output_bit_register_63" not in OUTPUTS  # the lower ones are read together
-    assert OUTPUTS["output_int_register_47"] == INPUTS["input_int_register_47"] == "INT32"
-    assert not {"output_int_register_48", "input_int_register_48", "actual_temperature"} & {*OUTPUTS, *INPUTS}
-    assert "actual_q" not in INPUTS
-    assert "speed_slider_mask" not in OUTPUTS
-    assert INPUTS["standard_digital_output_mask"] == "UINT8"
-
-
 @pytest.mark.real_time
 def test_a_client_by_the_guide_reads_what_it_asks_for(ur):
     address, _ = ur
@@ -176,19 +160,6 @@ def test_a_script_that_is_not_ur_rtde_s_is_refused_by_name(ur, capsys):
     assert "a script that is not ur-rtde's ('def mine()" in capsys.readouterr().err
 
 
-def test_joints_follow_the_tool():
-    """By one step of Newton's method a tick, on arms of six and of seven joints."""
-    for name in ("ur5e", "fr3"):
-        place = np.array([0.4, 0.0, 0.3])
-        joints = Joints(name, place)
-        for _ in range(200):
-            place = place + 1e-4 * np.array([1.0, -1.0, 1.0])
-            q = joints.follow(place)
-        pose = joints.arm.forward_kinematics(q)
-        np.testing.assert_allclose(pose[:3, 3], place, atol=1e-6)
-        np.testing.assert_allclose(pose[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-5)
-
-
 REFUSED = {
     "moveJ": lambda c: c.moveJ([0.0] * 6),
     "moveL": lambda c: c.moveL([0.4, 0.0, 0.3, 3.14, 0.0, 0.0]),
@@ -227,26 +198,6 @@ def ur_rtde(address, refused, calls, sent):
         assert not control.isProgramRunning()
         assert not control.speedL([0.0] * 6, 1.0, 0.0)  # and so is all that comes after
         control.disconnect()
-
-
-@pytest.mark.real_time
-def test_ur_rtde_reads_no_garbage():
-    pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
-    from rtde_receive import RTDEReceiveInterface
-
-    address = next(ADDRESSES)
-    with stand_in("rtde_arm", address):
-        receive = RTDEReceiveInterface(address)  # asks for all variables
-        q, pose = receive.getActualQ(), receive.getActualTCPPose()
-        np.testing.assert_allclose(
-            SerialArm.named("ur5e").forward_kinematics(np.array(q))[:3, 3], pose[:3], atol=1e-6
-        )
-        assert receive.getRobotMode() == 7
-        assert receive.getSpeedScaling() == 1.0
-        assert receive.getRobotStatus() & 1
-        assert np.isnan(receive.getJointTemperatures()).all()
-        assert receive.getActualTCPForce()[2] == pytest.approx(-3.0, abs=1.0)
-        receive.disconnect()
 
 
 @pytest.mark.real_time

@@ -15,16 +15,9 @@ from palpate.cli import main
 from palpate.logs import read_record
 from palpate.signals.rotations import quaternion_from_vector, rotate
 from palpate.wires import Command, open_wire
-from wires.slow_cell import REHEARSAL, WORDS, cell, child
+from wires.slow_cell import REHEARSAL, WORDS, child
 
 pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this system")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("ur")
-    cell(made)
-    return made
 
 
 @contextmanager

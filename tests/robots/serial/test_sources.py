@@ -123,13 +123,6 @@ def test_toml_that_is_wrong(old, new, what):
     assert "\n" not in str(error.value)
 
 
-def test_toml_that_is_no_text(write):
-    path = write("", "arm.toml")
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not a text file"):
-        SerialArm.from_toml(path)
-
-
 REFUSED = [
     (lambda t: "nonsense", None, "MuJoCo refuses it: XML parse error"),
     (lambda t: t.replace('type="slide"', 'type="foo"'), None, "invalid keyword: 'foo' Element 'joint', line"),
