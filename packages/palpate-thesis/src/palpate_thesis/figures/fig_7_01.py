@@ -1,0 +1,252 @@
+"""Section 7.1: his conclusions, sentence by sentence, and the force control that they leave to the reader."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from palpate.report import style
+from palpate.report.page import Table
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.drawing import Axes, Figure, panels
+from palpate_thesis.force_control import gain_sets
+from palpate_thesis.force_control.gain_sets import ONE_SET, ForceComparison
+from palpate_thesis.force_control.tracking import FOLLOWS
+from palpate_thesis.least_squares.panels import PARAMETERS as AXES
+from palpate_thesis.least_squares.panels import calm_limits
+from palpate_thesis.neural_identifier import network, side_by_side
+from palpate_thesis.neural_identifier.claims import RUBBER_BAND, SMALL
+from palpate_thesis.neural_identifier.side_by_side import (
+    DAMPING_FACTOR,
+    METHODS,
+    PRESSES,
+    QUICK,
+    Comparison,
+    Identified,
+    Pair,
+    fraction,
+)
+from palpate_thesis.runs import Runs
+
+NUMBER = "7.1"
+PARAMETERS = PRESSES
+SQUARES, NETWORK, MATCHED = METHODS
+COLORS = {SQUARES: style.INK, NETWORK: style.SERIES[0], MATCHED: style.SERIES[1]}
+CALM = 60
+"""Milliseconds after which curves set the scale of a panel."""
+COLUMNS: Mapping[str, Callable[[Identified], float]] = {
+    "K_e [kN/m]": lambda a: 1e-3 * a.K,
+    "K_e over f/x": lambda a: a.over,
+    "B_e [N s/m]": lambda a: a.B,
+    "M_e [kg]": lambda a: a.M,
+    "K settles [s]": lambda a: a.settled_K,
+    "B settles [s]": lambda a: a.settled_B,
+    "M settles [s]": lambda a: a.settled_M,
+    "ripple of K [%]": lambda a: 100.0 * a.ripple,
+}
+"""Columns of the first table."""
+
+
+class Data(NamedTuple):
+    """Both comparisons."""
+
+    identified: dict[str, Comparison]  # by surface
+    force: ForceComparison
+
+
+def run(runs: Runs) -> Data:
+    """The presses of figures 6.7 and 6.9 by every method, and the steps of 6.11 and 6.16 by every controller."""
+    identified = {surface: side_by_side.compare(runs, e, surface) for surface, e in PRESSES.items()}
+    return Data(identified, gain_sets.compare(runs))
+
+
+def check(data: Data) -> Sequence[ThesisClaim]:
+    """A row for each sentence of section 7.1, and for the gains of section 6.3."""
+    pairs = {surface: c.pairs for surface, c in data.identified.items()}
+    limits = {"band": RUBBER_BAND, "factor": DAMPING_FACTOR, "small": SMALL, "quick": QUICK}
+
+    def always(id_: str, holds: Callable[[Pair], bool], **numbers: Any) -> ThesisClaim:
+        """A row that needs 9 of 10 runs on each surface."""
+        flags = {surface: [holds(pair) for pair in both] for surface, both in pairs.items()}
+        counts = "; ".join(f"{surface} {fraction(good)} runs" for surface, good in flags.items())
+        return claim(id_, all(map(often, flags.values())), counts=counts, **limits, **numbers)
+
+    def value(method: str, name: str, unit: str = "") -> str:
+        """Values of one method on both surfaces in words."""
+        return "; ".join(
+            f"{surface} {spread([getattr(a, name) for a in c.answers[method]], unit)}"
+            for surface, c in data.identified.items()
+        )
+
+    def by_method(id_: str, name: str, unit: str, coefficient: int) -> list[ThesisClaim]:
+        """A row for each method: is this coefficient realistic?"""
+        return [
+            always(
+                f"{id_}.least-squares",
+                lambda p: p.squares.realistic[coefficient],
+                values=value(SQUARES, name, unit),
+            ),
+            always(
+                f"{id_}.network",
+                lambda p: p.network.realistic[coefficient],
+                values=value(NETWORK, name, unit),
+            ),
+        ]
+
+    mass = by_method("conclusion-mass", "M", "kg", 2)
+    negative = always(
+        "conclusion-mass.least-squares", lambda p: p.squares.M < 0.0, values=value(SQUARES, "M", "kg")
+    )
+    return [
+        claim("conclusion-two-methods", "not checkable"),
+        *by_method("conclusion-stiffness", "over", "times f/x", 0),
+        *by_method("conclusion-damping", "relative_B", "times the surface's own", 1),
+        negative,
+        mass[1],
+        always("conclusion-suitable", lambda p: sum(p.network.realistic) > sum(p.squares.realistic)),
+        *(
+            always(
+                f"conclusion-faster.{key}",
+                lambda p, i=i: p.faster[i],  # type: ignore[misc]
+                squares=value(SQUARES, f"settled_{key}", "s"),
+                network=value(NETWORK, f"settled_{key}", "s"),
+            )
+            for i, key in enumerate("KBM")
+        ),
+        _inputs(data, "similar", "other_inputs"),
+        _inputs(data, "scaled", "unscaled"),
+        always(
+            "conclusion-feasible",
+            lambda p: all(a.realistic[0] and a.settled_K <= QUICK for a in p),
+            squares=value(SQUARES, "settled_K", "s"),
+            network=value(NETWORK, "settled_K", "s"),
+        ),
+        always("conclusion-situation", lambda p: not _dominates(p)),
+        always("conclusion-preferred.quick", lambda p: p.faster[0]),
+        always("conclusion-preferred.all", lambda p: all(p.nearer)),
+        *_gains(data.force),
+    ]
+
+
+def _dominates(pair: Pair) -> bool:
+    """True if one method is faster in K and nearer in both B and M."""
+    return (pair.faster[0] and not any(pair.nearer)) or (not pair.faster[0] and all(pair.nearer))
+
+
+def _inputs(data: Data, part: str, name: str) -> ThesisClaim:
+    """Does K change by more than the band where the network's inputs are not as the thesis asks?"""
+    ratios = {surface: getattr(c, name) for surface, c in data.identified.items()}
+    return claim(
+        f"conclusion-inputs.{part}",
+        all(often(abs(r - 1.0) > RUBBER_BAND for r in values) for values in ratios.values()),
+        values="; ".join(f"{s} {spread(values, 'times')}" for s, values in ratios.items()),
+        band=RUBBER_BAND,
+    )
+
+
+def _gains(force: ForceComparison) -> list[ThesisClaim]:
+    """Hybrid gains have to be changed with the surface, neural gains do not."""
+    follow = {key: often(run.follows for run in runs) for key, runs in force.runs.items()}
+    both = {name: all(follow[name, surface] for surface in gain_sets.SURFACES) for name in ONE_SET}
+    *hybrids, neural = ONE_SET
+    described = {name: _described(force, name) for name in ONE_SET}
+    return [
+        claim(
+            "conclusion-gains.hybrid",
+            not any(both[name] for name in hybrids),
+            described="; ".join(f"{name}: {described[name]}" for name in hybrids),
+            follows=FOLLOWS,
+        ),
+        claim("conclusion-gains.neural", both[neural], described=described[neural], follows=FOLLOWS),
+    ]
+
+
+def _described(force: ForceComparison, name: str) -> str:
+    return ", ".join(
+        f"{surface} RMS {spread([run.settled for run in force.runs[name, surface]], 'N')}, "
+        f"{fraction([run.follows for run in force.runs[name, surface]])} follow"
+        for surface in gain_sets.SURFACES
+    )
+
+
+def tables(data: Data) -> list[Table]:
+    """Methods and controllers side by side: medians and ranges over the seeds."""
+    rows = []
+    for surface, c in data.identified.items():
+        K, B, M = c.first.truth
+        rows.append(
+            [f"{surface}: its own values", f"{1e-3 * K:.3g}", "", f"{B:.3g}", f"{M:.3g}", "", "", "", ""]
+        )
+        for method, answers in c.answers.items():
+            rows.append(
+                [f"{surface}: {method}", *(spread([f(a) for a in answers]) for f in COLUMNS.values())]
+            )
+    force = [
+        [
+            f"{surface}: {name}",
+            data.force.gains[name, surface],
+            spread([run.settled for run in runs]),
+            spread([run.rms for run in runs]),
+            spread([100.0 * run.off for run in runs]),
+            fraction([run.follows for run in runs]),
+        ]
+        for (name, surface), runs in sorted(data.force.runs.items(), key=lambda item: item[0][1])
+    ]
+    head = (
+        "controller",
+        "gains",
+        "RMS error outside the steps [N]",
+        "with steps [N]",
+        "interval ends off by [%]",
+        "follow",
+    )
+    return [
+        Table("Identification: the same presses by each method", ("method", *COLUMNS), rows),
+        Table("Force control: the same steps by each controller", head, force),
+    ]
+
+
+def plot(data: Data) -> Figure:
+    """K, B, M of each method along one press, and the force under each controller with one set of gains."""
+    drawing, grid = panels([1.9, 1.9, 1.9, 2.2], 2, 11.0)
+    for column, (surface, c) in enumerate(data.identified.items()):
+        for row, key in enumerate("KBM"):
+            _coefficient(grid[row][column], c, key)
+        grid[0][column].set_title(surface)
+        _force(grid[3][column], data.force, surface)
+    for axis in (grid[0][0], grid[3][0]):
+        style.legend(axis)
+    return drawing
+
+
+def _coefficient(axis: Axes, c: Comparison, key: str) -> None:
+    label, scale = AXES[key]
+    i = "KBM".index(key)
+    t = np.arange(len(c.first.matched)) * network.TICK
+    curves = {SQUARES: c.first.press.squares[:, 2 - i], MATCHED: c.first.matched[:, i]}
+    for number, curve in enumerate(c.curves):
+        axis.plot(
+            t,
+            scale * curve[:, i],
+            color=COLORS[NETWORK],
+            linewidth=0.8,
+            alpha=0.5,
+            label=None if number else NETWORK,
+        )
+    for method, curve in curves.items():
+        axis.plot(t, scale * curve, color=COLORS[method], linewidth=1.2, label=method)
+    axis.axhline(scale * c.first.truth[i], **style.KNOWN, label="the surface's own")
+    calm_limits(
+        axis,
+        *(scale * curve[CALM:] for curve in curves.values()),
+        *(scale * curve[CALM:, i] for curve in c.curves),
+    )
+    axis.set(ylabel=label, xlabel="time since 5 N [s]", xlim=(0.0, t[-1]))
+
+
+def _force(axis: Axes, force: ForceComparison, surface: str) -> None:
+    for name, color in zip(ONE_SET, style.SERIES, strict=False):
+        shown = force.shown[name, surface]
+        axis.plot(shown["t"], shown["force"], color=color, linewidth=1.2, label=name)
+    axis.plot(shown["t"], shown["force_desired"], **style.KNOWN, label="desired")
+    axis.set(ylabel="true force [N]", xlabel="time since contact [s]", xlim=gain_sets.SHOWN)
