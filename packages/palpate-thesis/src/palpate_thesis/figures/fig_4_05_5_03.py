@@ -65,10 +65,16 @@ def label(block: Block, sizes: str) -> str:
     """Text of a block: words, or name, law or formula, and equation."""
     if block.name in WORDS:
         return WORDS[block.name].format(sizes=sizes)
-    what = block.law.replace("_", " ") if block.law else re.sub(r"\s*@\s*", " ", block.formula)
-    return "\n".join(
-        part for part in ("" if block.name == "return" else block.name, what, block.equation) if part
+    formula = re.sub(r"(\w+)\([^()]*\)", r"\1", block.formula) if "," in block.formula else block.formula
+    for code, sign in (("J.T @", "Jᵀ"), ("1.0", "1"), (" * ", " "), (" - ", " − ")):
+        formula = formula.replace(code, sign)
+    formula = formula.replace(" + ", "\n+ ") if len(formula) > 24 else formula
+    lines = (
+        "" if block.name == "return" else block.name,
+        block.law.replace("_", " ") or formula,
+        block.equation,
     )
+    return "\n".join(filter(None, lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +104,11 @@ def controller() -> Figure:
     _steps(axis, blocks, CONTROLLER, sizes)
     _box(axis, PLANT, f"arm on\n{_surface('foam-neural')}", plain=False)
     _wire(axis, [_right(CONTROLLER["return"]), _left(PLANT)], "torque")
-    _bus(axis, blocks, "task", 0.45, "desired x, f")
-    _bus(axis, blocks, "sense", 0.95, "measured x, f")
-    low, x = -0.1, PLANT[0]
-    axis.plot([x, x, 0.95, 0.95], [PLANT[1] - HEIGHT / 2, low, low, 0.3], color=style.QUIET, linewidth=1.1)
+    _bus(axis, blocks, "task", [(0.3, 4.1)], 0.12)
+    axis.text(0.3, 4.15, "desired x, f", va="bottom", fontsize=7.5, color=style.QUIET)
+    low = -0.15
+    _bus(axis, blocks, "sense", [(PLANT[0], PLANT[1] - HEIGHT / 2), (PLANT[0], low), (0.9, low)], -0.12)
+    axis.text(PLANT[0] - 0.1, low, "measured x, f", ha="right", va="bottom", fontsize=7.5, color=style.QUIET)
     _wire(axis, [(6.6, 0.6 + HEIGHT / 2), (6.6, 1.8 - HEIGHT / 2)], "weights of the next tick", dashed=True)
     return drawing
 
@@ -131,7 +138,13 @@ def control_network() -> Figure:
         f"{name}, up to {a:g}"
         for name, a in zip(("f_x [N]", "f_y [N]", "moment [N m]"), NET.amplitude, strict=True)
     ]
-    return _neurons(layers_of(NET.sizes, NET.weights), values_written(neural, "see"), outputs, 5.4)
+    names = {"x": "{axis}", "x_before": "{axis} of the tick before", "torque": "torque of motor {motor}"}
+    parts = [value.split(".") for value in values_written(neural, "see")]
+    inputs = [
+        names[signal].format(axis="φ" if axis == "z" else axis, motor="xyz".index(axis) + 1)
+        for signal, axis in parts
+    ]
+    return _neurons(layers_of(NET.sizes, NET.weights), inputs, outputs, 5.4)
 
 
 def identifying_network() -> Figure:
@@ -202,7 +215,9 @@ def _steps(axis: Axes, blocks: Mapping[str, Block], places: Mapping[str, Place],
     """All blocks, and a wire from each to those that use its value."""
     for name, block in blocks.items():
         _box(axis, places[name], label(block, sizes))
-        for source in sorted(block.inputs & blocks.keys()):
+        sources = block.inputs & blocks.keys()
+        values = {source for source in sources if blocks[source].law != source}
+        for source in sorted(values or sources):  # a memory connects steps that no value connects
             _wire(axis, route(places[source], places[name]))
 
 
@@ -219,15 +234,15 @@ def route(start: Place, end: Place) -> list[Place]:
     return [(x0 + side, y0), (middle, y0), (middle, y1), (x1 - side, y1)]
 
 
-def _bus(axis: Axes, blocks: Mapping[str, Block], given: str, x: float, text: str) -> None:
-    """A line from top to bottom at x, with a wire to each block in need of what the law is given."""
+def _bus(axis: Axes, blocks: Mapping[str, Block], given: str, start: Sequence[Place], offset: float) -> None:
+    """A line along `start` and on upright, with a wire to each block in the first column, and `see`, that needs it."""
     users = [name for name, block in blocks.items() if any(i.startswith(f"{given}.") for i in block.inputs)]
-    offset = 0.12 if given == "task" else -0.12
-    rows = [CONTROLLER[name][1] + offset for name in users if name != "torque"]
-    axis.plot([x, x], [min(rows), 4.15], color=style.QUIET, linewidth=1.1)
-    axis.text(x, 4.2, text, ha="center", va="bottom", fontsize=7.5, color=style.QUIET)
-    for name, y in zip([name for name in users if name != "torque"], rows, strict=True):
-        _wire(axis, [(x, y), (CONTROLLER[name][0] - WIDTH / 2, y)])
+    ends = [_left(CONTROLLER[name]) for name in users if name != "torque"]  # S and f_d are drawn at u_f
+    x, y = start[-1]
+    furthest = max((row + offset for _, row in ends), key=lambda row: abs(row - y))
+    axis.plot(*np.transpose([*start, (x, furthest)]), color=style.QUIET, linewidth=1.1)
+    for end, row in ends:
+        _wire(axis, [(x, row + offset), (end, row + offset)])
 
 
 def _neurons(layers: Sequence[Array], inputs: Sequence[str], outputs: Sequence[str], height: float) -> Figure:
