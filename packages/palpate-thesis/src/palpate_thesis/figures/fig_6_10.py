@@ -9,7 +9,7 @@ from palpate.bench import with_values
 from palpate.records import Record
 from palpate.studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.drawing import Figure, force_panel, panels
+from palpate_thesis.drawing import Figure, force_figure, panels, strip
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, robustness, since_contact, slot
 from palpate_thesis.runs import Runs, stops_holding
 
@@ -59,8 +59,14 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 def plot(data: Data) -> Figure:
     """Draw the two cycles of the figure."""
-    drawing, ((force,),) = panels([3.2])
-    force_panel(force, data.shown)
+    return force_figure(data.shown)
+
+
+def beside(data: Data) -> Figure:
+    """Error at 20 N under each variation; dashed: a tenth of the desired force."""
+    drawing, ((axis,),) = panels([2.2])
+    errors = {name: [abs(ends.high) for ends in runs] for name, runs in data.varied.items()}
+    strip(axis, errors, "error at 20 N [N]", 20.0 * SHARE)
     return drawing
 
 

@@ -11,7 +11,7 @@ from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.studies.metrics.following import LIMIT
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.drawing import LIMIT_LINE, Figure, force_panel, panels
+from palpate_thesis.drawing import LIMIT_LINE, Figure, force_figure, panels, strip
 from palpate_thesis.force_control import tracking
 from palpate_thesis.force_control.tracking import FOLLOWS, Tracked, Tracking, describe, since_contact, track
 from palpate_thesis.runs import Runs, stops_holding
@@ -56,8 +56,13 @@ class Steps:
 
     def plot(self, data: Tracked) -> Figure:
         """The force in the slot."""
-        drawing, ((force,),) = panels([3.2])
-        force_panel(force, data.shown)
+        return force_figure(data.shown)
+
+    def beside(self, data: Tracked) -> Figure:
+        """Error outside the steps under each variation; dashed: the limit of following."""
+        drawing, ((axis,),) = panels([2.2])
+        settled = {name: [run.settled for run in runs] for name, runs in data.varied.items()}
+        strip(axis, settled, "RMS error outside steps [N]", LIMIT)
         return drawing
 
     def _as_said(self, run: Tracking) -> bool:
@@ -91,14 +96,16 @@ class FromTheStart(Steps):
         ]
 
     def plot(self, data: Adapting) -> Figure:  # type: ignore[override]
-        """The beginning, and the way to the settled cycle."""
-        drawing, ((force,), (away,)) = panels([3.2, 1.5])
-        force_panel(force, data.tracked.shown)
+        """The beginning."""
+        return super().plot(data.tracked)
+
+    def beside(self, data: Adapting) -> Figure:  # type: ignore[override]
+        """The way to the settled cycle; dashed: the limit of adapted."""
+        drawing, ((away,),) = panels([2.2])
         shown = data.t < self.shown[1]
         away.plot(data.t[shown], data.away[shown])
         away.axhline(LIMIT, **LIMIT_LINE)
         away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=self.shown, ylim=(0.0, None))
-        away.set_title("from the settled cycles, mean over 0.25 s; dashed: limit of adapted")
         return drawing
 
 
