@@ -198,7 +198,7 @@ class Later:
         return drawing
 
     def beside(self, data: Data) -> Figure:
-        """The ratios of single samples."""
+        """Estimates from single samples by the ratios of section 5.1."""
         drawing, ((axis,),) = rows_of_panels([2.4])
         _ratios(axis, data)
         return drawing

@@ -100,7 +100,7 @@ class FromTheStart(Steps):
         return super().plot(data.tracked)
 
     def beside(self, data: Adapting) -> Figure:  # type: ignore[override]
-        """The way to the settled cycle; dashed: the limit of adapted."""
+        """Distance of the force from the settled cycles, mean over 0.25 s; dashed: the limit of adapted."""
         drawing, ((away,),) = panels([2.2])
         shown = data.t < self.shown[1]
         away.plot(data.t[shown], data.away[shown])

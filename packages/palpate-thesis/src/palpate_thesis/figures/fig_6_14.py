@@ -86,7 +86,7 @@ def plot(data: Data) -> Figure:
 
 
 def beside(data: Data) -> Figure:
-    """The course of the error, on another foam and under a plain integral controller as well."""
+    """Error outside the steps by cycles of 5 s, beside the equivalent integral controller; crosses: contact is lost."""
     drawing, ((course,),) = panels([2.4])
     for (name, runs), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
         for i, run in enumerate(runs):
