@@ -14,6 +14,7 @@ SAMPLE = {"phi", "y"}
 MEMORIES = ("memory", "signals", "deltas")
 """Arrays that a step changes in place: the next step that names them follows it."""
 LETTERS = {
+    "self.kf": "K_fp",
     "task.x": "x_d",
     "task.f": "f_d",
     "task.s": "S",

@@ -22,7 +22,7 @@ from palpate_thesis.neural_identifier.network import NetworkChoice
 from palpate_thesis.runs import Runs
 
 Place = tuple[float, float]
-WIDTH, HEIGHT = 1.5, 0.62
+WIDTH, HEIGHT = 1.74, 0.74
 """Size of a block, in the units of the places."""
 CONTROLLER: Mapping[str, Place] = {
     "u_x": (2.3, 3.6),
@@ -102,13 +102,13 @@ def controller() -> Figure:
     blocks, sizes = blocks_of(neural, "Neural.step"), _sizes(layers_of(NET.sizes, NET.weights))
     drawing, axis = _canvas(12.0, 4.5, 5.0)
     _steps(axis, blocks, CONTROLLER, sizes)
-    _box(axis, PLANT, f"arm on\n{_surface('foam-neural')}", plain=False)
+    _box(axis, PLANT, f"arm on a\n{_surface('foam-neural')}", plain=False)
     _wire(axis, [_right(CONTROLLER["return"]), _left(PLANT)], "torque")
     _bus(axis, blocks, "task", [(0.3, 4.1)], 0.12)
-    axis.text(0.3, 4.15, "desired x, f", va="bottom", fontsize=7.5, color=style.QUIET)
+    axis.text(0.3, 4.15, "desired x, f", va="bottom", fontsize=8.5, color=style.QUIET)
     low = -0.15
     _bus(axis, blocks, "sense", [(PLANT[0], PLANT[1] - HEIGHT / 2), (PLANT[0], low), (0.9, low)], -0.12)
-    axis.text(PLANT[0] - 0.1, low, "measured x, f", ha="right", va="bottom", fontsize=7.5, color=style.QUIET)
+    axis.text(PLANT[0] - 0.1, low, "measured x, f", ha="right", va="bottom", fontsize=8.5, color=style.QUIET)
     _wire(axis, [(6.6, 0.6 + HEIGHT / 2), (6.6, 1.8 - HEIGHT / 2)], "weights of the next tick", dashed=True)
     return drawing
 
@@ -192,7 +192,7 @@ def _box(axis: Axes, place: Place, text: str, *, plain: bool = True) -> None:
         "edgecolor": style.INK,
     }
     axis.add_patch(FancyBboxPatch(corner, WIDTH, HEIGHT, linewidth=1.1, zorder=3, **look))
-    axis.text(*place, text, ha="center", va="center", fontsize=8.0, color=style.INK, zorder=4)
+    axis.text(*place, text, ha="center", va="center", fontsize=9.0, color=style.INK, zorder=4)
 
 
 def _wire(axis: Axes, points: Sequence[Place], text: str = "", *, dashed: bool = False) -> None:
@@ -208,7 +208,7 @@ def _wire(axis: Axes, points: Sequence[Place], text: str = "", *, dashed: bool =
     upright = a[0] == b[0]
     x, y = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
     put: dict[str, Any] = {"ha": "left", "va": "center"} if upright else {"ha": "center", "va": "bottom"}
-    axis.text(x + 0.07 * upright, y + 0.05 * (not upright), text, fontsize=7.5, color=style.QUIET, **put)
+    axis.text(x + 0.07 * upright, y + 0.05 * (not upright), text, fontsize=8.5, color=style.QUIET, **put)
 
 
 def _steps(axis: Axes, blocks: Mapping[str, Block], places: Mapping[str, Place], sizes: str) -> None:

@@ -1,13 +1,14 @@
 """Section 7.1: his conclusions, sentence by sentence, and the force control that they leave to the reader."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from palpate.report import style
 from palpate.report.page import Table
 from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.claims import tables as texts_of_all
 from palpate_thesis.drawing import Axes, Figure, panels
 from palpate_thesis.force_control import gain_sets
 from palpate_thesis.force_control.gain_sets import ONE_SET, ForceComparison
@@ -31,6 +32,7 @@ from palpate_thesis.runs import Runs
 NUMBER = "7.1"
 PARAMETERS = PRESSES
 SQUARES, NETWORK, MATCHED = METHODS
+OWN = "times the surface's own"
 COLORS = {SQUARES: style.INK, NETWORK: style.SERIES[0], MATCHED: style.SERIES[1]}
 CALM = 60
 """Milliseconds after which curves set the scale of a panel."""
@@ -47,6 +49,53 @@ COLUMNS: Mapping[str, Callable[[Identified], float]] = {
 """Columns of the first table."""
 
 
+LIMITS = {"band": RUBBER_BAND, "factor": DAMPING_FACTOR, "small": SMALL, "quick": QUICK}
+Value = tuple[str, str, str]
+"""Method, attribute of `Identified`, and unit of a placeholder."""
+
+
+def dominates(pair: Pair) -> bool:
+    """True if one method is faster in K and nearer in both B and M."""
+    return (pair.faster[0] and not any(pair.nearer)) or (not pair.faster[0] and all(pair.nearer))
+
+
+def _settled(key: str) -> dict[str, Value]:
+    return {
+        name: (method, f"settled_{key}", "s") for name, method in (("squares", SQUARES), ("network", NETWORK))
+    }
+
+
+ROWS: Mapping[str, tuple[Callable[[Pair], bool], Mapping[str, Value]]] = {
+    "conclusion-stiffness.least-squares": (
+        lambda p: p.squares.realistic[0],
+        {"values": (SQUARES, "over", "times f/x")},
+    ),
+    "conclusion-stiffness.network": (
+        lambda p: p.network.realistic[0],
+        {"values": (NETWORK, "over", "times f/x")},
+    ),
+    "conclusion-damping.least-squares": (
+        lambda p: p.squares.realistic[1],
+        {"values": (SQUARES, "relative_B", OWN)},
+    ),
+    "conclusion-damping.network": (
+        lambda p: p.network.realistic[1],
+        {"values": (NETWORK, "relative_B", OWN)},
+    ),
+    "conclusion-mass.least-squares": (lambda p: p.squares.M < 0.0, {"values": (SQUARES, "M", "kg")}),
+    "conclusion-mass.network": (lambda p: p.network.realistic[2], {"values": (NETWORK, "M", "kg")}),
+    "conclusion-suitable": (lambda p: sum(p.network.realistic) > sum(p.squares.realistic), {}),
+    "conclusion-faster.K": (lambda p: p.faster[0], _settled("K")),
+    "conclusion-faster.B": (lambda p: p.faster[1], _settled("B")),
+    "conclusion-faster.M": (lambda p: p.faster[2], _settled("M")),
+    "conclusion-feasible": (lambda p: all(a.realistic[0] and a.settled_K <= QUICK for a in p), _settled("K")),
+    "conclusion-situation": (lambda p: not dominates(p), {}),
+    "conclusion-preferred.quick": (lambda p: p.faster[0], {}),
+    "conclusion-preferred.all": (lambda p: all(p.nearer), {}),
+}
+"""Sentences about both methods: truth for one press, and the values that are printed."""
+
+
 class Data(NamedTuple):
     """Both comparisons."""
 
@@ -61,76 +110,31 @@ def run(runs: Runs) -> Data:
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """A row for each sentence of section 7.1, and for the gains of section 6.3."""
-    pairs = {surface: c.pairs for surface, c in data.identified.items()}
-    limits = {"band": RUBBER_BAND, "factor": DAMPING_FACTOR, "small": SMALL, "quick": QUICK}
+    """A row for each sentence of section 7.1, and for the gains of section 6.3, in the order of their texts."""
+    rows = [
+        claim("conclusion-two-methods", "not checkable"),
+        *(_needs_nine_of_ten(data, id_, holds, values) for id_, (holds, values) in ROWS.items()),
+        _inputs(data, "similar", "other_inputs"),
+        _inputs(data, "scaled", "unscaled"),
+        *_gains(data.force),
+    ]
+    return sorted(rows, key=lambda row: list(texts_of_all()["claims"]).index(row.id))
 
-    def always(id_: str, holds: Callable[[Pair], bool], **numbers: Any) -> ThesisClaim:
-        """A row that needs 9 of 10 runs on each surface."""
-        flags = {surface: [holds(pair) for pair in both] for surface, both in pairs.items()}
-        counts = "; ".join(f"{surface} {fraction(good)} runs" for surface, good in flags.items())
-        return claim(id_, all(map(often, flags.values())), counts=counts, **limits, **numbers)
 
-    def value(method: str, name: str, unit: str = "") -> str:
-        """Values of one method on both surfaces in words."""
-        return "; ".join(
+def _needs_nine_of_ten(
+    data: Data, id_: str, holds: Callable[[Pair], bool], values: Mapping[str, Value]
+) -> ThesisClaim:
+    """A row that has to hold in 9 of 10 runs on each surface, with the values of its placeholders."""
+    flags = {surface: [holds(pair) for pair in c.pairs] for surface, c in data.identified.items()}
+    counts = "; ".join(f"{surface} {fraction(good)} runs" for surface, good in flags.items())
+    words = {
+        place: "; ".join(
             f"{surface} {spread([getattr(a, name) for a in c.answers[method]], unit)}"
             for surface, c in data.identified.items()
         )
-
-    def by_method(id_: str, name: str, unit: str, coefficient: int) -> list[ThesisClaim]:
-        """A row for each method: is this coefficient realistic?"""
-        return [
-            always(
-                f"{id_}.least-squares",
-                lambda p: p.squares.realistic[coefficient],
-                values=value(SQUARES, name, unit),
-            ),
-            always(
-                f"{id_}.network",
-                lambda p: p.network.realistic[coefficient],
-                values=value(NETWORK, name, unit),
-            ),
-        ]
-
-    mass = by_method("conclusion-mass", "M", "kg", 2)
-    negative = always(
-        "conclusion-mass.least-squares", lambda p: p.squares.M < 0.0, values=value(SQUARES, "M", "kg")
-    )
-    return [
-        claim("conclusion-two-methods", "not checkable"),
-        *by_method("conclusion-stiffness", "over", "times f/x", 0),
-        *by_method("conclusion-damping", "relative_B", "times the surface's own", 1),
-        negative,
-        mass[1],
-        always("conclusion-suitable", lambda p: sum(p.network.realistic) > sum(p.squares.realistic)),
-        *(
-            always(
-                f"conclusion-faster.{key}",
-                lambda p, i=i: p.faster[i],  # type: ignore[misc]
-                squares=value(SQUARES, f"settled_{key}", "s"),
-                network=value(NETWORK, f"settled_{key}", "s"),
-            )
-            for i, key in enumerate("KBM")
-        ),
-        _inputs(data, "similar", "other_inputs"),
-        _inputs(data, "scaled", "unscaled"),
-        always(
-            "conclusion-feasible",
-            lambda p: all(a.realistic[0] and a.settled_K <= QUICK for a in p),
-            squares=value(SQUARES, "settled_K", "s"),
-            network=value(NETWORK, "settled_K", "s"),
-        ),
-        always("conclusion-situation", lambda p: not _dominates(p)),
-        always("conclusion-preferred.quick", lambda p: p.faster[0]),
-        always("conclusion-preferred.all", lambda p: all(p.nearer)),
-        *_gains(data.force),
-    ]
-
-
-def _dominates(pair: Pair) -> bool:
-    """True if one method is faster in K and nearer in both B and M."""
-    return (pair.faster[0] and not any(pair.nearer)) or (not pair.faster[0] and all(pair.nearer))
+        for place, (method, name, unit) in values.items()
+    }
+    return claim(id_, all(map(often, flags.values())), counts=counts, **LIMITS, **words)
 
 
 def _inputs(data: Data, part: str, name: str) -> ThesisClaim:
