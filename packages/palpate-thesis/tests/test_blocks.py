@@ -5,9 +5,11 @@ import inspect
 import numpy as np
 import pytest
 
-from palpate.controllers import neural
+from palpate.controllers import hybrid, neural
 from palpate.identifiers import neural_probe
+from palpate_thesis import diagram
 from palpate_thesis.blocks import blocks_of, read_blocks
+from palpate_thesis.figures import fig_4_03
 from palpate_thesis.figures import fig_4_05_5_03 as diagrams
 
 SOURCE = inspect.getsource(neural)
@@ -34,6 +36,7 @@ def test_the_identifier_learns_from_what_its_answer_lacks():
     [
         (neural, "Neural.step", diagrams.CONTROLLER),
         (neural_probe, "absorb", diagrams.IDENTIFIER),
+        (hybrid, "Hybrid.step", fig_4_03.PLACES),
     ],
 )
 def test_every_step_has_a_place_and_every_place_a_step(module, function, places):
@@ -67,6 +70,6 @@ def test_networks_are_drawn_with_all_their_neurons_and_inputs():
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)])
 def test_a_wire_ends_at_the_edges_of_its_blocks(start):
     end = (4.0, 3.0) if start != (1.0, 0.0) else (1.0, 3.0)
-    points = diagrams.route(start, end)
+    points = diagram.route(start, end)
     for (x, y), (cx, cy) in ((points[0], start), (points[-1], end)):
-        assert np.isclose(abs(x - cx), diagrams.WIDTH / 2) or np.isclose(abs(y - cy), diagrams.HEIGHT / 2)
+        assert np.isclose(abs(x - cx), diagram.WIDTH / 2) or np.isclose(abs(y - cy), diagram.HEIGHT / 2)

@@ -15,6 +15,7 @@ MEMORIES = ("memory", "signals", "deltas")
 """Arrays that a step changes in place: the next step that names them follows it."""
 LETTERS = {
     "self.kf": "K_fp",
+    "self.ki": "K_fi",
     "task.x": "x_d",
     "task.f": "f_d",
     "task.s": "S",
@@ -141,5 +142,12 @@ def values_written(module: ModuleType, function: str) -> list[str]:
 
 
 def blocks_of(module: ModuleType, function: str) -> dict[str, Block]:
-    """Blocks of a function of the program."""
-    return read_blocks(inspect.getsource(module), function)
+    """Blocks of a function of the program; one that names no equation has that of the law that it calls."""
+    blocks = read_blocks(inspect.getsource(module), function)
+    for name, block in blocks.items():
+        called = inspect.getmodule(getattr(module, block.law, None)) if block.law else None
+        definition = re.search(rf"def {block.law}\(.*", inspect.getsource(called)) if called else None
+        match = EQUATION.search(definition.group()) if definition else None
+        if match and not block.equation:
+            blocks[name] = block._replace(equation=match.group(1))
+    return blocks

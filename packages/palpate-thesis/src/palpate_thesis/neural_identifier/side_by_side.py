@@ -12,7 +12,7 @@ from palpate.records import Record
 from palpate_thesis.least_squares import press_runs
 from palpate_thesis.neural_identifier import network
 from palpate_thesis.neural_identifier.claims import RUBBER_BAND, SMALL
-from palpate_thesis.neural_identifier.network import NetworkPress
+from palpate_thesis.neural_identifier.network import NetworkChoice, NetworkPress
 from palpate_thesis.runs import Runs
 
 PRESSES = {"foam": network.FOAM, "rubber": network.RUBBER}
@@ -104,7 +104,7 @@ class Comparison(NamedTuple):
     answers: dict[str, list[Identified]]  # by method; the network's for each press and start
     pairs: list[Pair]
     other_inputs: list[float]  # K asked at the other surface's dummy inputs, over K asked at its own
-    unscaled: list[float]  # K of a network without scaling, over K of one with it
+    unscaled: list[float]  # slope of the force at rest of a network without scaling, over that of one with it
 
 
 def compare(runs: Runs, experiment: Experiment, surface: str) -> Comparison:
@@ -117,29 +117,37 @@ def compare(runs: Runs, experiment: Experiment, surface: str) -> Comparison:
         "other inputs": (choice._replace(scale=SETTINGS[surface].scale), other),
         "unscaled": (choice._replace(scale=(1.0, 1.0, 1.0)), surface),
     }
+
+    def learn(case: tuple[SharedPress, NetworkChoice, str, int]) -> tuple[Array, float]:
+        """K, B, M of a network along a press, shape (n, 3), and the slope of its force at rest [N/m]."""
+        shared, choice, settings, start = case
+        probe, curve = network.learn(shared.press._replace(surface=settings), choice, start)
+        return curve[:, :3], network.tangent(probe, shared.press.rest)
+
     learned = runs.map_each(
-        lambda case: network.learn(case[0].press._replace(surface=case[2]), case[1], case[3])[1][:, :3],
+        learn,
         {n: [(p, c, named, s) for p in presses for s in starts] for n, (c, named) in choices.items()},
     )
+    curves = [curve for curve, _ in learned["own"]]
     repeated = [press for press in presses for _ in starts]
     answers = {
         METHODS[0]: [identified(p, p.press.squares[:, ::-1]) for p in presses],
-        METHODS[1]: [identified(p, curve) for p, curve in zip(repeated, learned["own"], strict=True)],
+        METHODS[1]: [identified(p, curve) for p, curve in zip(repeated, curves, strict=True)],
         METHODS[2]: [identified(p, p.matched) for p in presses],
     }
+    own_K = np.array([answer.K for answer in answers[METHODS[1]]])
+    other_K = np.array(
+        [identified(p, c).K for p, (c, _) in zip(repeated, learned["other inputs"], strict=True)]
+    )
+    slopes, unscaled = (np.array([slope for _, slope in learned[name]]) for name in ("own", "unscaled"))
     squares = [answer for answer in answers[METHODS[0]] for _ in starts]
-    own = np.array([answer.K for answer in answers[METHODS[1]]])
-    ratios = {
-        name: [identified(p, curve).K for p, curve in zip(repeated, learned[name], strict=True)] / own
-        for name in ("other inputs", "unscaled")
-    }
     return Comparison(
         presses[0],
-        learned["own"][: min(5, len(starts))],
+        curves[: min(5, len(starts))],
         answers,
         [Pair(*both) for both in zip(squares, answers[METHODS[1]], strict=True)],
-        [*map(float, ratios["other inputs"])],
-        [*map(float, ratios["unscaled"])],
+        [*map(float, other_K / own_K)],
+        [*map(float, np.abs(unscaled / slopes))],
     )
 
 
