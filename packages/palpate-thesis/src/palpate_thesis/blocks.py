@@ -8,9 +8,9 @@ from types import ModuleType
 from typing import NamedTuple
 
 GIVEN = ("task", "sense", "state")
-"""What a control law is given at each tick: desired values, measured values, what it remembers."""
+"""Arguments of a control law at each tick: desired values, measured values, and its memory."""
 SAMPLE = {"phi", "y"}
-"""What an identifier is given: the regressor and the force."""
+"""Arguments of an identifier: the regressor and the force."""
 MEMORIES = ("memory", "signals", "deltas")
 """Arrays that a step changes in place: the next step that names them follows it."""
 LETTERS = {

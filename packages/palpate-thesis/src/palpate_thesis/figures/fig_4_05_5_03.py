@@ -63,14 +63,14 @@ class Diagram:
     draw: Any
 
     def run(self, _: Runs) -> None:
-        """Nothing is measured."""
+        """Nothing has to be measured."""
 
     def check(self, _: None) -> Sequence[ThesisClaim]:
         """No claim: a diagram says how the parts are connected."""
         return []
 
     def plot(self, _: None) -> Figure:
-        """The diagram."""
+        """The diagram of its number."""
         drawing: Figure = self.draw()
         return drawing
 
@@ -122,7 +122,7 @@ def control_network() -> Figure:
     return _neurons(layers_of(NET.sizes, NET.weights), inputs, outputs, 5.4)
 
 
-def identifying_network() -> Figure:
+def identifier_network() -> Figure:
     """Figure 5.3: the 3-4-1 network of the identifier, with the weights of its first start."""
     inputs = [
         f"{scale:g} × {channel}" for scale, channel in zip(SETTINGS["foam"].scale, CHANNELS, strict=True)
@@ -166,5 +166,5 @@ STUDIES = (
     Diagram("4.5", controller),
     Diagram("4.6", control_network),
     Diagram("5.2", identifier),
-    Diagram("5.3", identifying_network),
+    Diagram("5.3", identifier_network),
 )

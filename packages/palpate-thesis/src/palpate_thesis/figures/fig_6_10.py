@@ -30,15 +30,19 @@ class HybridAlone(ForceStudy):
     label, limit = "error at 20 N [N]", 20.0 * SHARE
 
     def measure(self, record: Record) -> Ends:
+        """Errors at the ends of the intervals."""
         return interval_ends(record)
 
-    def as_said(self, run: Ends) -> bool:
+    def agrees(self, run: Ends) -> bool:
+        """True if both levels are missed."""
         return misses(run)
 
     def size(self, run: Ends) -> float:
+        """Error at 20 N without its sign."""
         return abs(run.high)
 
     def numbers(self, data: Tracked) -> dict[str, Any]:
+        """Errors on foam and on rubber."""
         return {"foam": data.nominal, "rubber": data.varied["rubber"], "share": SHARE}
 
 

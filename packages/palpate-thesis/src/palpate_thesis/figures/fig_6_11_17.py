@@ -38,15 +38,19 @@ class Steps(ForceStudy):
     label, limit = "RMS error outside steps [N]", LIMIT
 
     def measure(self, record: Record) -> Tracking:
+        """Tracking error in the judged window."""
         return tracking.tracking(*self.judged)(record)
 
-    def as_said(self, run: Tracking) -> bool:
+    def agrees(self, run: Tracking) -> bool:
+        """True if it follows as the thesis states."""
         return run.follows is self.follows
 
     def size(self, run: Tracking) -> float:
+        """Error outside the steps [N]."""
         return run.settled
 
     def numbers(self, data: Tracked) -> dict[str, Any]:
+        """Errors and saturation in words."""
         limited = 100 * float(np.median([run.saturated for run in data.nominal]))
         described = tracking.describe(data.nominal)
         return {
@@ -84,7 +88,7 @@ class FromTheStart(Steps):
         ]
 
     def plot(self, data: Adapting) -> Figure:
-        """The beginning."""
+        """The first ten seconds of the force."""
         return super().plot(data.tracked)
 
     def beside(self, data: Adapting) -> Figure:

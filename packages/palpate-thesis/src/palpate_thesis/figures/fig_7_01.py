@@ -22,8 +22,8 @@ from palpate_thesis.neural_identifier.side_by_side import (
     METHODS,
     PRESSES,
     QUICK,
-    Comparison,
     Identified,
+    MethodComparison,
     Pair,
     fraction,
 )
@@ -97,9 +97,9 @@ ROWS: Mapping[str, tuple[Callable[[Pair], bool], Mapping[str, Value]]] = {
 
 
 class Data(NamedTuple):
-    """Both comparisons."""
+    """Comparisons of identifiers and of controllers."""
 
-    identified: dict[str, Comparison]  # by surface
+    identified: dict[str, MethodComparison]  # by surface
     force: ForceComparison
 
 
@@ -223,7 +223,7 @@ def plot(data: Data) -> Figure:
     return drawing
 
 
-def _coefficient(axis: Axes, c: Comparison, key: str) -> None:
+def _coefficient(axis: Axes, c: MethodComparison, key: str) -> None:
     label, scale = AXES[key]
     i = "KBM".index(key)
     t = np.arange(len(c.first.matched)) * network.TICK

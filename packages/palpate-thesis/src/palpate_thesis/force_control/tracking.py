@@ -160,7 +160,7 @@ class ForceStudy(ABC):
         """The metric of a run."""
 
     @abstractmethod
-    def as_said(self, run: Any) -> bool:
+    def agrees(self, run: Any) -> bool:
         """True if a run does what the thesis says."""
 
     @abstractmethod
@@ -181,8 +181,8 @@ class ForceStudy(ABC):
 
     def check(self, data: Any) -> list[ThesisClaim]:
         """Does the force do as the thesis says in enough of the runs?"""
-        good = often(map(self.as_said, data.nominal))
-        return [claim(self.id, good, where=stops_holding(data.varied, self.as_said), **self.numbers(data))]
+        good = often(map(self.agrees, data.nominal))
+        return [claim(self.id, good, where=stops_holding(data.varied, self.agrees), **self.numbers(data))]
 
     def plot(self, data: Any) -> Figure:
         """The force in the slot."""

@@ -96,7 +96,7 @@ class Pair(NamedTuple):
         return net_b < b, net_m < m
 
 
-class Comparison(NamedTuple):
+class MethodComparison(NamedTuple):
     """Answers of all methods on one surface."""
 
     first: SharedPress  # of the first noise seed
@@ -107,7 +107,7 @@ class Comparison(NamedTuple):
     unscaled: list[float]  # slope of the force at rest of a network without scaling, over that of one with it
 
 
-def compare(runs: Runs, experiment: Experiment, surface: str) -> Comparison:
+def compare(runs: Runs, experiment: Experiment, surface: str) -> MethodComparison:
     """Run all methods on one press a noise seed, the network from every start."""
     presses = runs.over_seeds(experiment, lambda record: shared_press(record, surface))
     choice, starts = network.chosen_network(runs), network.starts(runs)
@@ -141,7 +141,7 @@ def compare(runs: Runs, experiment: Experiment, surface: str) -> Comparison:
     )
     slopes, unscaled = (np.array([slope for _, slope in learned[name]]) for name in ("own", "unscaled"))
     squares = [answer for answer in answers[METHODS[0]] for _ in starts]
-    return Comparison(
+    return MethodComparison(
         presses[0],
         curves[: min(5, len(starts))],
         answers,
