@@ -1,4 +1,4 @@
-"""What the figures of the controllers stand on: changes in mid-run, the linear force loop, and their measures."""
+"""What the figures of the controllers stand on: the linear force loop, and friction compensation."""
 
 from functools import reduce
 
@@ -6,75 +6,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate._vector import Vec3
-from palpate.bench import build, load, with_values
-from palpate.environments import KelvinVoigt
+from palpate.bench import load, with_values
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
 from palpate_thesis.explanations import e6_friction_compensation as compensation
-from palpate_thesis.explanations.e6_friction_compensation import (
-    Recovery,
-    drawn_back,
-    measure_recovery,
-    recovery_claim,
-)
-from palpate_thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
 from palpate_thesis.figures.fig_4_03 import LoopParameters
-from palpate_thesis.figures.fig_4_19 import CoupledAndDecoupled, Stray, press_with_jumps, stray
-from palpate_thesis.force_control.interventions import (
-    Disturbance,
-    desired_pose,
-    other_surface,
-    run_with,
-    surface_back,
-)
-from palpate_thesis.force_control.tracking import since_contact
 from palpate_thesis.runs import SHORT, Runs, rougher
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
-RUBBER = KelvinVoigt(34500.0, 480.0, 0.05)
-
-
-def around(record, name, at):
-    """Mean of a column over the 20 ms before and after a time since contact; a row shows the step before it."""
-    t, column = since_contact(record), record[name]
-    return column[(t >= at - 0.02) & (t < at - 5e-7)].mean(), column[
-        (t >= at + 0.002) & (t < at + 0.02)
-    ].mean()
-
-
-def test_a_run_without_turns_is_the_benchs_own_bit_for_bit():
-    ours = run_with(FOAM, 3, [])
-    theirs = build(FOAM).run(FOAM.run.duration, 3, press=FOAM.run.press)
-    for name in theirs.columns:
-        assert np.array_equal(ours[name], theirs[name]), name
-
-
-def test_another_surface_takes_over_the_force():
-    record = run_with(FOAM, 0, [Disturbance(0.6, other_surface(RUBBER))])
-    before, after = around(record, "force", 0.6)
-    assert after == pytest.approx(before, abs=0.3)
-    deep, shallow = around(record, "penetration", 0.6)
-    assert shallow / deep == pytest.approx(5200.0 / 34500.0, rel=0.05)
-
-
-def test_a_surface_drawn_back_is_lost_and_found():
-    record = run_with(FOAM, 0, [Disturbance(0.6, surface_back(0.006))])
-    before, after = around(record, "force", 0.6)
-    assert before > 15.0
-    assert after < 2.0
-    one = measure_recovery(drawn_back(0))
-    assert one.times == 1
-    assert 1.0 < one.took < 15.0
-
-
-def test_a_jump_of_the_desired_pose_moves_the_error_and_not_the_rate():
-    record = run_with(FOAM, 0, [Disturbance(0.6, desired_pose(Vec3(0.0, 0.005, 0.0)))])
-    before, after = around(record, "y_measured", 0.6)
-    assert after - before == pytest.approx(-0.005, abs=3e-4)
-    before, after = around(record, "x_measured", 0.6)
-    assert after == pytest.approx(before, abs=1e-4)
-    assert abs(around(record, "vy_measured", 0.6)[1]) < 0.03  # 5 mm in a tick would be 5 m/s
 
 
 def swings(loop, stiffness, seconds=3.0, physics=20000):
@@ -154,63 +93,8 @@ def test_a_hopeless_loop_has_no_limit():
     assert np.isnan(LoopParameters(400.0, 0.003, 60.0, 8.2).limit())
 
 
-def test_without_friction_the_arm_is_the_target_spring_and_damper():
-    e = with_values(fig_2_02.PARAMETERS, fig_2_02.FREE)
-    found = fig_2_02.estimate_impedance(fig_2_02.record_jumps(e, 0))
-    assert pytest.approx(1.0, abs=0.05) == found.K
-    assert pytest.approx(1.0, abs=0.25) == found.B
-    assert pytest.approx(1.0 - 600.0 * 0.007 / 5.0, abs=0.15) == found.M  # the velocity's lag takes the rest
-    rough = fig_2_02.estimate_impedance(fig_2_02.record_jumps(fig_2_02.PARAMETERS, 0))
-    assert abs(rough.K - 1.0) > 0.3
-
-
-def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
-    ideal = fig_2_02.ideal_trace()
-    for i, depth in enumerate(fig_2_02.DEPTHS):
-        end = ideal["force"][1000 * (i + 1) - 1]
-        assert end == pytest.approx(depth * 2000.0 * 5200.0 / 7200.0, rel=0.01)
-
-
-def test_without_friction_a_step_of_force_turns_the_tip_less_when_decoupled():
-    world = with_values(fig_4_19.PARAMETERS, fig_4_19.FREE)
-    coupled = stray(press_with_jumps(with_values(world, fig_4_19.COUPLED), 0))
-    decoupled = stray(press_with_jumps(world, 0))
-    assert decoupled.phi < 0.6 * coupled.phi
-    assert decoupled.lost == 0
-
-
-def stray_of(y=1.0, phi=1.0, force=0.01, lost=0):
-    return Stray(y, phi, force, lost)
-
-
-@pytest.mark.parametrize(
-    ("decoupled", "angle", "force"),
-    [
-        (stray_of(phi=0.4), True, True),
-        (stray_of(phi=0.6), False, True),
-        (stray_of(phi=0.4, force=0.2), True, False),
-        (stray_of(phi=0.4, lost=1), False, False),
-    ],
-)
-def test_what_counts_as_decoupled(decoupled, angle, force):
-    pair = CoupledAndDecoupled(stray_of(), decoupled, 5200.0)
-    assert fig_4_19.angle_kept(pair) == angle
-    assert fig_4_19.force_kept(pair) == force
-
-
-def test_the_original_is_unstable_near_the_stretched_arm_and_not_where_the_experiments_are():
-    everywhere = np.ones((len(fig_2_01.YS), len(fig_2_01.XS)), dtype=bool)
-    growth = fig_2_01.growth_over(1.0, everywhere)
-    line = growth[np.argmin(np.abs(fig_2_01.YS))]
-    where = (fig_2_01.XS >= 0.40) & (fig_2_01.XS <= 0.49)
-    assert np.isfinite(line[where]).all()
-    assert line[where].max() < fig_2_01.GROWS
-    unstable = growth > fig_2_01.GROWS
-    assert 0.005 < unstable.sum() / np.isfinite(growth).sum() < 0.1
-
-
 def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
-    record = run_with(compensation.PLAIN, 0, [])
+    record = Runs((0,)).record(compensation.PLAIN)
     assert compensation.listing_factor(record) < 1e-6
     slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
     finer = with_values(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
@@ -222,7 +106,7 @@ def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
 
 def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
     plain, wide, short = (
-        compensation.held_in(run_with(e, 0, []))
+        compensation.held_in(Runs((0,)).record(e))
         for e in (
             compensation.PLAIN,
             compensation.PARAMETERS,
@@ -231,42 +115,6 @@ def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
     )
     assert wide.error < 0.5 * plain.error
     assert short.shaking > 5 * plain.shaking
-
-
-def test_a_regain_that_is_late_hard_or_missing_is_not_well():
-    good = Recovery(8.0, 0.02, 1.05, 1)
-    assert recovery_claim([good] * 10).verdict == "reproduced"
-    for bad in (
-        Recovery(12.0, 0.02, 1.05, 1),
-        Recovery(8.0, 0.02, 1.5, 1),
-        Recovery(np.inf, np.inf, np.inf, 1),
-    ):
-        assert recovery_claim([bad] * 10).verdict == "differs"
-
-
-@pytest.mark.long
-def test_the_network_alone_follows_and_an_untaught_one_does_not():
-    assert fig_2_04.by_network(fig_2_04.FOAM, 5e-5, 0).follows
-    assert not fig_2_04.by_network(fig_2_04.FOAM, 1e-7, 0).follows
-
-
-@pytest.mark.long
-def test_the_turn_of_figure_2_5_changes_the_surface():
-    """Its controller is compiled for this alone; above, another surface takes over under the bench's own."""
-    record = fig_2_05.turned_into_rubber(0)
-    t, force, depth = since_contact(record), record["force"], record["penetration"]
-    for at, stiffness in ((4.9, 5200.0), (9.9, 34500.0)):
-        late = (t > at - 0.2) & (t < at)
-        assert force[late].mean() / depth[late].mean() == pytest.approx(stiffness, rel=0.03)
-
-
-def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
-    case = (60.0, 1.0, 0.003)
-    stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
-    runs = Runs((0,))
-    free = with_values(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
-    assert not fig_4_03.stays_quiet(runs.record(free))
-    assert fig_4_03.stays_quiet(runs.record(fig_4_03.press_of(case, stiffness, 1.0)))
 
 
 def test_rougher_friction_is_what_it_says():

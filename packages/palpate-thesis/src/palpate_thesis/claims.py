@@ -3,12 +3,14 @@
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import Any, Literal
 
 import numpy as np
+
+from palpate.report.page import Table
 
 Verdict = Literal["reproduced", "differs", "not checkable"]
 ENOUGH = 0.9
@@ -44,13 +46,23 @@ class ThesisClaim:
 
 @dataclass
 class Done:
-    """Study that has been measured, with its claims."""
+    """Study that has been measured, with its claims.
+
+    Args:
+        number, title, caption: of its figure.
+        claims: decided by it.
+        seconds: that it took.
+        beside: what the folded figure shows; empty without one.
+        tables: shown under the figure.
+    """
 
     number: str
     title: str
     caption: str
     claims: list[ThesisClaim]
     seconds: float
+    beside: str = ""
+    tables: list[Table] = field(default_factory=list)
 
 
 def verdict_of(holds: bool) -> Verdict:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
-EXPERIMENTS = ("4.2", "4.4", "6.")
+EXPERIMENTS = ("4.2", "4.4", "6.", "7.")
 """Prefixes of the numbers of the figures that show the thesis' own experiments."""
 COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
 
@@ -84,7 +84,7 @@ def thesis(
     option = f" --laboratory {laboratory}" if name else ""
     command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
-        written = MeasurementFormat(command, drawn.endings, drawn.dpi)
+        written = MeasurementFormat(command, name or "bench", drawn.endings, drawn.dpi)
         _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:
         say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
@@ -140,7 +140,11 @@ def _measure(
         )
     claims = claims_of_studies(done)
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
-    table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
-    show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    if rows:
+        table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
+        show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    for study in done if len(done) == 1 else ():
+        for beside in study.tables:
+            show_table(screen, beside)
     screen.print(count_in_words(claims))
     place(screen, "page:", folder / "index.html")

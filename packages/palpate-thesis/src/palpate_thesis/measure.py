@@ -1,5 +1,6 @@
 """Measure the thesis study by study: each result is on disk at once, and an interrupted measurement resumes."""
 
+import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -19,6 +20,8 @@ from palpate_thesis.figure import FigureModule
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
+BESIDE = "-beside"
+"""End of the name of a folded figure's file."""
 
 
 @dataclass(frozen=True)
@@ -27,22 +30,26 @@ class MeasurementFormat:
 
     Args:
         command: command line that makes it again, for its page.
+        laboratory: its name, for the page.
         endings: of the figures' files, besides the PNG that the page shows.
         dpi: of a PNG; the usual one if None.
     """
 
     command: str
+    laboratory: str = "bench"
     endings: tuple[str, ...] = (".png",)
     dpi: int | None = None
 
 
 @dataclass
 class FolderState:
-    """Content of the folder, with the digest of its sources, seeds and laboratory (`stamp`)."""
+    """Content of the folder, with the digest of its sources, seeds and laboratory (`stamp`), whose values it names."""
 
     stamp: str
     wanted: list[str]
     command: str
+    laboratory: str = ""
+    values: dict[str, float] = field(default_factory=dict)
     done: dict[str, Done] = field(default_factory=dict)
 
 
@@ -65,7 +72,7 @@ def measure(
         InputError: the folder holds anything else, and `replace` is off; another process is writing there.
     """
     with kept_folder(folder, STATE, replace=replace):
-        state = _load_state(studies, runs, folder, written.command)
+        state = _load_state(studies, runs, folder, written)
         _save_state(state, folder)
         if state.done:
             resumed(len(state.done))
@@ -81,11 +88,19 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     start = time.perf_counter()
     data = study.run(runs)
     claims = [_with_note(claim, runs) for claim in study.check(data)]
+    beside, tables = getattr(study, "beside", None), getattr(study, "tables", None)
     with apply_look():
-        drawing = study.plot(data)
-        for ending in dict.fromkeys((".png", *written.endings)):
-            style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
-    return Done(study.NUMBER, *texts(study.NUMBER), claims, time.perf_counter() - start)
+        for name, draw in (("", study.plot), (BESIDE, beside)):
+            for ending in dict.fromkeys((".png", *written.endings)) if draw else ():
+                style.save(draw(data), folder / f"{study.NUMBER}{name}{ending}", written.dpi)
+    return Done(
+        study.NUMBER,
+        *texts(study.NUMBER),
+        claims,
+        time.perf_counter() - start,
+        inspect.getdoc(beside) or "" if beside else "",
+        tables(data) if tables else [],
+    )
 
 
 def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
@@ -97,14 +112,16 @@ def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
     return replace(claim, note=note)
 
 
-def _load_state(studies: Sequence[FigureModule], runs: Runs, folder: Path, command: str) -> FolderState:
+def _load_state(
+    studies: Sequence[FigureModule], runs: Runs, folder: Path, written: MeasurementFormat
+) -> FolderState:
     wanted = [study.NUMBER for study in studies]
     stamp = f"{sources_digest()} seeds {list(runs.seeds)}"
     if not runs.laboratory.is_bench:
         stamp += f" laboratory {runs.laboratory.numbers()}"
     path = folder / STATE
     if not path.exists():
-        return FolderState(stamp, wanted, command)
+        return FolderState(stamp, wanted, written.command, written.laboratory, runs.laboratory.numbers())
     check_place(path)
     try:
         state = msgspec.json.decode(path.read_bytes(), type=FolderState)
@@ -125,32 +142,30 @@ def _write_results(state: FolderState, folder: Path) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
     write_json(folder / "claims.json", [asdict(row) for row in claims_of_studies(done)])
-    pictures = {
-        study.number: data_address((folder / f"{study.number}.png").read_bytes(), "image/png")
-        for study in done
-    }
+    names = [f"{study.number}{end}" for study in done for end in ("", BESIDE if study.beside else "")]
+    pictures = {name: data_address((folder / f"{name}.png").read_bytes(), "image/png") for name in names}
     missing = [number for number in state.wanted if number not in state.done]
-    write_text(folder / "index.html", index_page(done, pictures, missing, state.command))
+    write_text(folder / "index.html", index_page(done, pictures, missing, state))
     _save_state(state, folder)
 
 
 TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
-_CHAPTERS = {"2": "Earlier schemes", "3": "The bench", "4": "The controllers"}
+_CHAPTERS = {"3": "The bench", "4": "The controllers", "5": "The identifiers", "7": "Conclusions"}
 _EXPLANATIONS = "Explanations"
 _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force control"}
 """By the number of the last figure in each."""
 
 
 def index_page(
-    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str
+    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], state: FolderState
 ) -> str:
     """The page as HTML, figures included; it opens without a network.
 
     Args:
         done: measured studies.
-        pictures: source of the image of each study, by its number.
+        pictures: source of each image, by the name of its file.
         missing: numbers of the studies still to come.
-        command: command line that measures them.
+        state: of the folder.
     """
     claims = [claim for study in done for claim in study.claims]
     verdicts = count_verdicts(claims)
@@ -170,7 +185,10 @@ def index_page(
         tones=TONES,
         pictures=pictures,
         missing=missing,
-        command=command,
+        command=state.command,
+        laboratory=state.laboratory,
+        values=state.values,
+        besides=BESIDE,
         seconds=sum(study.seconds for study in done),
         scripts=(text_of("index.js", "palpate_thesis"),),
     )

@@ -1,20 +1,16 @@
-"""Runs whose state is looked at or changed between ticks: the network's weights, the surface, the desired pose."""
+"""Runs in which the weights of the neural controller are looked at or changed between ticks."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench import Experiment, build
 from palpate.bench.force_input import COLUMNS
-from palpate.bench.plant import Loop, LoopState
-from palpate.bench.summary import CONTACT, DIVERGED, DONE, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
-from palpate.environments import KelvinVoigt, join
-from palpate.records import Record
 
 LOOK = 1000
 """Ticks between two looks at the weights, unless others are given."""
@@ -88,104 +84,3 @@ def hold(columns: slice) -> Callable[[WeightsAtMoment], None]:
             layers(moment.neural)[0][:, columns] = 0.0
 
     return look
-
-
-CONTACT_LOOK = 100
-"""Ticks between two looks for the first contact."""
-
-Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
-
-
-class Disturbance(NamedTuple):
-    """A change between two ticks.
-
-    Args:
-        at: time since the first contact [s], at least a tenth of a second.
-        change: returns the changed loop and state, of the same types, so that nothing is compiled again.
-    """
-
-    at: float
-    change: Change
-
-
-def run_with(experiment: Experiment, seed: int, disturbances: Sequence[Disturbance]) -> Record:
-    """Run like `Bench.run`, from the same random numbers, for `press` seconds of contact, with the disturbances.
-
-    Args:
-        experiment: any; it runs on after losses of contact.
-        seed: of the noise.
-        disturbances: in the order of their times.
-
-    Returns:
-        Rows up to the end, or to the first that is not finite; ``meta["disturbances"]`` has the times [s].
-    """
-    bench = build(experiment)
-    tick, march = bench.loop.tick, bench.simulation(seed)
-    rows = [march.advance(CONTACT_LOOK)]
-    while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
-        rows.append(march.advance(CONTACT_LOOK))
-    contact = march.ticks if march.contact is None else march.contact
-    for at, change in [(t.at, t.change) for t in disturbances] + [(experiment.run.press, None)]:
-        remaining = contact + round(at / tick) - march.ticks
-        if remaining > 0 and _finite(rows):
-            rows.append(march.advance(remaining))
-        if change is not None:
-            march.loop, march.state = change(march.loop, march.state)
-    table = np.concatenate(rows)
-    finite = np.isfinite(table).all(axis=1)
-    table = table if finite.all() else table[: int(np.argmin(finite))]
-    columns = {name: table[:, i].copy() for i, name in enumerate(COLUMNS)}
-    times = [contact * tick + disturbance.at for disturbance in disturbances]
-    end = DONE if finite.all() else DIVERGED
-    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "end": end, "disturbances": times})
-
-
-def _finite(rows: Sequence[np.ndarray]) -> bool:
-    return bool(np.isfinite(rows[-1]).all())
-
-
-def other_surface(surface: KelvinVoigt) -> Change:
-    """Replace the surface under the tip, at the depth at which the new spring carries the present force."""
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        arm: Any = loop.plant.arm
-        tip = arm.pose(state.plant.q).x
-        deep = state.felt.normal / surface.stiffness
-        plant = loop.plant._replace(surface=join(surface), wall=tip - deep)
-        touched = state.plant.surface._replace(deflection=deep, internal=0.0)
-        return loop._replace(plant=plant), state._replace(plant=state.plant._replace(surface=touched))
-
-    return change
-
-
-def surface_back(by: float) -> Change:
-    """Retract the surface by a distance [m]."""
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        return loop._replace(plant=loop.plant._replace(wall=loop.plant.wall + by)), state
-
-    return change
-
-
-def desired_pose(by: Vec3) -> Change:
-    """Let the desired pose jump [m, m, rad], as the arm sees it.
-
-    A task has one pose. So the arm is moved by the opposite of the jump at an unchanged rate, and the controller's
-    memory of the previous tick with it: the error then develops as after a jump of the desired pose.
-    """
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        arm: Any = loop.plant.arm
-        motion: Any = loop.conditioning.motion
-        q = state.plant.q
-        there = arm.inverse(arm.pose(q) - by, 1.0 if q.y >= 0.0 else -1.0)
-        past, by_q = state.conditioning, there - q
-        settled = motion.start_at(by_q.z)
-        past = past._replace(
-            q=past.q + by_q,
-            x=past.x - by,
-            angle=type(past.angle)(past.angle.s1 + settled.s1, past.angle.s2 + settled.s2),
-        )
-        return loop, state._replace(plant=state.plant._replace(q=there), conditioning=past)
-
-    return change
