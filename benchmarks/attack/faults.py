@@ -132,7 +132,7 @@ COMMANDS = {
         record=("rec/record.parquet", "rec/press.json"),
     ),
     "study": Command(("study", "study.toml", "--out=out")),
-    "thesis": Command(("thesis", "2.2", "--out=out")),
+    "thesis": Command(("thesis", "3.7", "--out=out")),
     "laboratory": Command(_SEARCH, prepare=_inference),
 }
 """Every command that writes a file; palpate live writes none."""

@@ -3,9 +3,9 @@
     python packages/palpate-thesis/benchmarks/stability.py [--dampings 60 200 480]
 
 The loop is that of figure 4.3 at 1 kHz: a tip on a spring and a damper, the sensor's low-pass, its delay, the
-controller's filter, force gain and integral. Hybrid control has the thesis' two sets of gains. The direct network of
-Yabuta and Yamada and the network in the thesis' loop are, to first order, integrals whose gain changes as they learn:
-their proof is of every gain from half of what they start from to half as much again, changing from tick to tick.
+controller's filter, force gain and integral. Hybrid control has the thesis' two sets of gains. The network in the
+thesis' loop is, to first order, an integral whose gain changes as it learns: its proof is of every gain from half of
+what it starts from to half as much again, changing from tick to tick.
 
 A cell of stiffnesses has one norm in which the ticks of its corners contract. A tick is affine in the integral gain,
 and in the matrix exponential of the plant; the distance of that from the hull of its corners is bounded by its second
@@ -24,7 +24,6 @@ from palpate.arrays import Array
 from palpate.controllers import Neural
 from palpate.force.lyapunov import common
 from palpate_thesis.figures.fig_4_03 import TICK, TIP, LoopParameters
-from palpate_thesis.one_joint import JOINT_2, direct_neural
 
 LOW, HIGH, SHARE = 300.0, 3e6, 0.99
 """Softest surface and stiffest that is looked at [N/m], and how far up the exact interval the proof goes."""
@@ -57,18 +56,12 @@ class StabilityCell(NamedTuple):
 
 def laws() -> list[ForceLaw]:
     """Those of the thesis, with its gains."""
-    lever = JOINT_2.lever
-    own = direct_neural()
-    start = own.start()
-    own.step(start, 20.0, 20.0, 0.0)  # no error, nothing is learned
-    direct = own.gain(start) / lever
     network = Neural.thesis().network
     state = network.start()
     network.forward(state)
     return [
         ForceLaw("hybrid, foam", 1.0, (0.003, 0.003), TIP),
         ForceLaw("hybrid, rubber", 0.25, (0.0015, 0.0015), TIP),
-        ForceLaw("Yabuta and Yamada", 0.0, around(direct), JOINT_2.inertia / lever**2),
         ForceLaw("network in the loop", 0.25, around(network.gain(state, 0)), TIP),
     ]
 

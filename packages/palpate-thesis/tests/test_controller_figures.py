@@ -18,7 +18,7 @@ from palpate_thesis.explanations.e6_friction_compensation import (
     measure_recovery,
     recovery_claim,
 )
-from palpate_thesis.figures import fig_2_01, fig_2_02, fig_2_04, fig_2_05, fig_4_03, fig_4_19
+from palpate_thesis.figures import fig_4_03, fig_4_19
 from palpate_thesis.figures.fig_4_03 import LoopParameters
 from palpate_thesis.figures.fig_4_19 import CoupledAndDecoupled, Stray, press_with_jumps, stray
 from palpate_thesis.force_control.interventions import (
@@ -154,23 +154,6 @@ def test_a_hopeless_loop_has_no_limit():
     assert np.isnan(LoopParameters(400.0, 0.003, 60.0, 8.2).limit())
 
 
-def test_without_friction_the_arm_is_the_target_spring_and_damper():
-    e = with_values(fig_2_02.PARAMETERS, fig_2_02.FREE)
-    found = fig_2_02.estimate_impedance(fig_2_02.record_jumps(e, 0))
-    assert pytest.approx(1.0, abs=0.05) == found.K
-    assert pytest.approx(1.0, abs=0.25) == found.B
-    assert pytest.approx(1.0 - 600.0 * 0.007 / 5.0, abs=0.15) == found.M  # the velocity's lag takes the rest
-    rough = fig_2_02.estimate_impedance(fig_2_02.record_jumps(fig_2_02.PARAMETERS, 0))
-    assert abs(rough.K - 1.0) > 0.3
-
-
-def test_the_target_impedance_itself_settles_at_what_two_springs_agree_on():
-    ideal = fig_2_02.ideal_trace()
-    for i, depth in enumerate(fig_2_02.DEPTHS):
-        end = ideal["force"][1000 * (i + 1) - 1]
-        assert end == pytest.approx(depth * 2000.0 * 5200.0 / 7200.0, rel=0.01)
-
-
 def test_without_friction_a_step_of_force_turns_the_tip_less_when_decoupled():
     world = with_values(fig_4_19.PARAMETERS, fig_4_19.FREE)
     coupled = stray(press_with_jumps(with_values(world, fig_4_19.COUPLED), 0))
@@ -196,17 +179,6 @@ def test_what_counts_as_decoupled(decoupled, angle, force):
     pair = CoupledAndDecoupled(stray_of(), decoupled, 5200.0)
     assert fig_4_19.angle_kept(pair) == angle
     assert fig_4_19.force_kept(pair) == force
-
-
-def test_the_original_is_unstable_near_the_stretched_arm_and_not_where_the_experiments_are():
-    everywhere = np.ones((len(fig_2_01.YS), len(fig_2_01.XS)), dtype=bool)
-    growth = fig_2_01.growth_over(1.0, everywhere)
-    line = growth[np.argmin(np.abs(fig_2_01.YS))]
-    where = (fig_2_01.XS >= 0.40) & (fig_2_01.XS <= 0.49)
-    assert np.isfinite(line[where]).all()
-    assert line[where].max() < fig_2_01.GROWS
-    unstable = growth > fig_2_01.GROWS
-    assert 0.005 < unstable.sum() / np.isfinite(growth).sum() < 0.1
 
 
 def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
@@ -242,22 +214,6 @@ def test_a_regain_that_is_late_hard_or_missing_is_not_well():
         Recovery(np.inf, np.inf, np.inf, 1),
     ):
         assert recovery_claim([bad] * 10).verdict == "differs"
-
-
-@pytest.mark.long
-def test_the_network_alone_follows_and_an_untaught_one_does_not():
-    assert fig_2_04.by_network(fig_2_04.FOAM, 5e-5, 0).follows
-    assert not fig_2_04.by_network(fig_2_04.FOAM, 1e-7, 0).follows
-
-
-@pytest.mark.long
-def test_the_turn_of_figure_2_5_changes_the_surface():
-    """Its controller is compiled for this alone; above, another surface takes over under the bench's own."""
-    record = fig_2_05.turned_into_rubber(0)
-    t, force, depth = since_contact(record), record["force"], record["penetration"]
-    for at, stiffness in ((4.9, 5200.0), (9.9, 34500.0)):
-        late = (t > at - 0.2) & (t < at)
-        assert force[late].mean() / depth[late].mean() == pytest.approx(stiffness, rel=0.03)
 
 
 def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():

@@ -336,7 +336,7 @@ def test_the_listings_weights_stay_where_a_figure_has_others():
     ("command", "told"),
     [
         (["thesis", "--laboratory", "nowhere"], "unknown laboratory 'nowhere'"),
-        (["thesis", "2.2", "--laboratory", "lab.toml"], "shows no experiment of the thesis' own laboratory"),
+        (["thesis", "3.7", "--laboratory", "lab.toml"], "shows no experiment of the thesis' own laboratory"),
         (["laboratory", "--tries", "3"], "tries"),
     ],
 )

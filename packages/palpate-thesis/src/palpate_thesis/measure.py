@@ -135,7 +135,7 @@ def _write_results(state: FolderState, folder: Path) -> None:
 
 
 TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
-_CHAPTERS = {"2": "Earlier schemes", "3": "The bench", "4": "The controllers"}
+_CHAPTERS = {"3": "The bench", "4": "The controllers", "5": "The identifiers", "7": "Conclusions"}
 _EXPLANATIONS = "Explanations"
 _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force control"}
 """By the number of the last figure in each."""
