@@ -42,9 +42,9 @@ def test_a_median_may_move_within_the_range_and_nothing_else_may():
     assert changes(f"1 foam {moved}; 2 of 3")
     assert changes(f"1 foam {spread([4.0, 5.0, 6.0], 'kN')}; 3 of 3")
     assert changes(f"1 foam {spread([4.0, 5.0, 6.0, 5.0], 'N')}; 3 of 3")
-    assert "reproduced" in changes(verdict="differs")[0]
+    assert "reproduced" in changes(verdict="contradicted")[0]
     assert list(differences({}, [ONE])) == ["a.K: new"]
-    assert list(differences({"b": "differs: 1"}, [])) == ["b: gone"]
+    assert list(differences({"b": "contradicted: 1"}, [])) == ["b: gone"]
 
 
 @pytest.mark.timeout(900)  # of one run of minutes, on a machine that others use

@@ -254,7 +254,7 @@ def fractions_of(laboratory: Laboratory) -> tuple[float, ...]:
 
 
 def load_laboratory(name: str) -> Laboratory:
-    """A laboratory by its name ("bench", "inferred", "printed-facts"), or from a TOML file.
+    """A laboratory by its name ("bench", or one of `laboratories/`), or from a TOML file.
 
     Raises:
         InputError: no such laboratory or file, TOML that does not parse, an unknown key, a value out of range.
@@ -269,6 +269,16 @@ def load_laboratory(name: str) -> Laboratory:
     if not isinstance(values, dict):
         raise InputError(f"{name}: no table [unknowns]; a laboratory has its values there")
     return laboratory_from(values, name)
+
+
+def describe_laboratory(name: str) -> str:
+    """What a laboratory is, in a sentence or two, from its file."""
+    if name == "bench":
+        return "Laboratory: the bench, chosen by hand."
+    about = str(read_toml(FILES.source(name), name).get("about", ""))
+    if name == "inferred":
+        about += " " + str(read_toml(FILES.source("calibrated"), "calibrated")["about"])
+    return f"Laboratory: {name}. {about}".rstrip()
 
 
 def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:

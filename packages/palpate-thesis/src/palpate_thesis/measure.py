@@ -1,8 +1,12 @@
 """Measure the thesis study by study: each result is on disk at once, and an interrupted measurement resumes."""
 
 import time
+import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +17,19 @@ from palpate.files import check_place, kept_folder, with_author, write_json, wri
 from palpate.report import style
 from palpate.report.look.assets import text_of
 from palpate.report.page import data_address, render
-from palpate_thesis.claims import Done, ThesisClaim, claims_of_studies, count_in_words, count_verdicts, texts
+from palpate_thesis.claims import (
+    VERDICTS,
+    Done,
+    ThesisClaim,
+    claims_of_studies,
+    count_in_words,
+    plausible_laboratories,
+    tables,
+    texts,
+)
 from palpate_thesis.drawing import apply_look
-from palpate_thesis.figure import FigureModule
+from palpate_thesis.figure import FigureModule, is_experiment
+from palpate_thesis.laboratory import BENCH, Laboratory
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
@@ -29,11 +43,13 @@ class MeasurementFormat:
         command: command line that makes it again, for its page.
         endings: of the figures' files, besides the PNG that the page shows.
         dpi: of a PNG; the usual one if None.
+        about: the laboratory of the experiments, in words.
     """
 
     command: str
     endings: tuple[str, ...] = (".png",)
     dpi: int | None = None
+    about: str = ""
 
 
 @dataclass
@@ -58,6 +74,8 @@ def measure(
 ) -> list[Done]:
     """Run the studies, and write claims.json, index.html and each figure into the folder after each study.
 
+    The figures of experiments are of the laboratory of `runs`, all others of the bench.
+
     A folder with an unfinished measurement of the same sources, studies and seeds is continued; `resumed` is then
     called with the number of studies that are done.
 
@@ -73,14 +91,16 @@ def measure(
             if study.NUMBER not in state.done:
                 started(study)
                 state.done[study.NUMBER] = _measure_study(study, runs, folder, written)
-                _write_results(state, folder)
+                _write_results(state, folder, written.about)
     return [state.done[number] for number in state.wanted]
 
 
 def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: MeasurementFormat) -> Done:
     start = time.perf_counter()
+    if not is_experiment(study.NUMBER):
+        runs = replace(runs, laboratory=BENCH)
     data = study.run(runs)
-    claims = [_with_note(claim, runs) for claim in study.check(data)]
+    claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
     with apply_look():
         drawing = study.plot(data)
         for ending in dict.fromkeys((".png", *written.endings)):
@@ -88,13 +108,35 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     return Done(study.NUMBER, *texts(study.NUMBER), claims, time.perf_counter() - start)
 
 
-def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
-    """Replace the note in a laboratory other than the bench: the notes of the figures are about the bench."""
-    if runs.laboratory.is_bench:
+def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
+    """Replace the note in a laboratory other than the bench: the notes of the figures are about the bench.
+
+    The reason of claims.toml stands for one that does not hold; then the laboratory in which it does, and the unknowns
+    that decide it.
+    """
+    if laboratory.is_bench:
         return claim
-    values = ", ".join(f"{name} {value:.3g}" for name, value in runs.laboratory.numbers().items())
-    note = f"In this laboratory: {values}. The reason on the hand-chosen bench is in that measurement."
-    return replace(claim, note=note)
+    parts = []
+    if claim.verdict != "reproduced":
+        parts.append(tables()["claims"][claim.id].get("reason", ""))
+        elsewhere = plausible_laboratories().get(claim.id)
+        if elsewhere:
+            parts.append(f"It holds with --laboratory {elsewhere}, which keeps the printed values too.")
+    deciding = [name for name, ids in sensitivity().items() if claim.id in ids]
+    if deciding:
+        parts.append(f"Of the unknowns, changed one at a time, these decide it: {', '.join(deciding)}.")
+    else:
+        parts.append("No unknown, changed alone, decides it.")
+    parts.append("The note on the hand-chosen bench: --laboratory bench.")
+    return replace(claim, note=" ".join(part for part in parts if part))
+
+
+@cache
+def sensitivity() -> Mapping[str, Sequence[str]]:
+    """By unknown, the sentences whose truth it changes in the inferred laboratory: see `palpate laboratory`."""
+    text = (resources.files("palpate_thesis") / "inference" / "sensitivity.toml").read_text("utf-8")
+    table: Mapping[str, Sequence[str]] = tomllib.loads(text)
+    return table
 
 
 def _load_state(studies: Sequence[FigureModule], runs: Runs, folder: Path, command: str) -> FolderState:
@@ -121,7 +163,7 @@ def _save_state(state: FolderState, folder: Path) -> None:
     write_json(folder / STATE, with_author(asdict(state)))
 
 
-def _write_results(state: FolderState, folder: Path) -> None:
+def _write_results(state: FolderState, folder: Path, about: str) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
     write_json(folder / "claims.json", [asdict(row) for row in claims_of_studies(done)])
@@ -130,11 +172,11 @@ def _write_results(state: FolderState, folder: Path) -> None:
         for study in done
     }
     missing = [number for number in state.wanted if number not in state.done]
-    write_text(folder / "index.html", index_page(done, pictures, missing, state.command))
+    write_text(folder / "index.html", index_page(done, pictures, missing, state.command, about))
     _save_state(state, folder)
 
 
-TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
+TONES = dict(zip(VERDICTS, ("ok", "part", "warn", "none"), strict=True))
 _CHAPTERS = {"3": "The bench", "4": "The controllers", "5": "The identifiers", "7": "Conclusions"}
 _EXPLANATIONS = "Explanations"
 _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force control"}
@@ -142,7 +184,7 @@ _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force
 
 
 def index_page(
-    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str
+    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str, about: str = ""
 ) -> str:
     """The page as HTML, figures included; it opens without a network.
 
@@ -151,9 +193,10 @@ def index_page(
         pictures: source of the image of each study, by its number.
         missing: numbers of the studies still to come.
         command: command line that measures them.
+        about: the laboratory, in words.
     """
     claims = [claim for study in done for claim in study.claims]
-    verdicts = count_verdicts(claims)
+    verdicts = Counter(claim.verdict for claim in claims)
     chapters: dict[str, list[dict[str, Any]]] = {}
     for study in done:
         row = {"study": study, "claims": study.claims}
@@ -165,7 +208,8 @@ def index_page(
         title="The thesis, measured again",
         chapters=[{"title": title, "studies": studies} for title, studies in chapters.items()],
         count=verdicts.total(),
-        told=count_in_words(claims),
+        counts=count_in_words(claims),
+        about=about,
         verdicts=verdicts,
         tones=TONES,
         pictures=pictures,

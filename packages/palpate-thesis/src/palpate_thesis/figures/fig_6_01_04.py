@@ -83,7 +83,6 @@ def _settling_claim(data: Data, surface: str, id_: str, limit: float, key: str) 
         surface=surface,
         times=times[surface],
         others="".join(f"; {name} {spread(times[name], 's')}" for name in others),
-        within="of its largest value after 10 ms, counted from" if key == "M" else "of",
         half=HALF_DIGIT,
         edge=_edge(times[surface], limit + HALF_DIGIT),
         relaxing=RELAXING.format(others[0]) if others else "",

@@ -1,11 +1,10 @@
-"""Runs whose state is looked at or changed between ticks: the network's weights, the surface, the desired pose."""
+"""Runs whose state is looked at or changed between ticks: the network's weights, the surface."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from palpate._vector import Vec3
 from palpate.arrays import Array
 from palpate.bench import Experiment, build
 from palpate.bench.force_input import COLUMNS
@@ -13,7 +12,6 @@ from palpate.bench.plant import Loop, LoopState
 from palpate.bench.summary import CONTACT, DIVERGED, DONE, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
-from palpate.environments import KelvinVoigt, join
 from palpate.records import Record
 
 LOOK = 1000
@@ -144,48 +142,10 @@ def _finite(rows: Sequence[np.ndarray]) -> bool:
     return bool(np.isfinite(rows[-1]).all())
 
 
-def other_surface(surface: KelvinVoigt) -> Change:
-    """Replace the surface under the tip, at the depth at which the new spring carries the present force."""
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        arm: Any = loop.plant.arm
-        tip = arm.pose(state.plant.q).x
-        deep = state.felt.normal / surface.stiffness
-        plant = loop.plant._replace(surface=join(surface), wall=tip - deep)
-        touched = state.plant.surface._replace(deflection=deep, internal=0.0)
-        return loop._replace(plant=plant), state._replace(plant=state.plant._replace(surface=touched))
-
-    return change
-
-
 def surface_back(by: float) -> Change:
     """Retract the surface by a distance [m]."""
 
     def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
         return loop._replace(plant=loop.plant._replace(wall=loop.plant.wall + by)), state
-
-    return change
-
-
-def desired_pose(by: Vec3) -> Change:
-    """Let the desired pose jump [m, m, rad], as the arm sees it.
-
-    A task has one pose. So the arm is moved by the opposite of the jump at an unchanged rate, and the controller's
-    memory of the previous tick with it: the error then develops as after a jump of the desired pose.
-    """
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        arm: Any = loop.plant.arm
-        motion: Any = loop.conditioning.motion
-        q = state.plant.q
-        there = arm.inverse(arm.pose(q) - by, 1.0 if q.y >= 0.0 else -1.0)
-        past, by_q = state.conditioning, there - q
-        settled = motion.start_at(by_q.z)
-        past = past._replace(
-            q=past.q + by_q,
-            x=past.x - by,
-            angle=type(past.angle)(past.angle.s1 + settled.s1, past.angle.s2 + settled.s2),
-        )
-        return loop, state._replace(plant=state.plant._replace(q=there), conditioning=past)
 
     return change

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -32,7 +33,7 @@ from palpate_thesis.runs import sources_digest
 
 Fractions = tuple[float, ...]
 """A point of the search: for each unknown the fraction of its prior below the value, 0 to 1."""
-STATE, INFERRED = "laboratory.json", "inferred.toml"
+STATE, INFERRED, SENSITIVITY = "laboratory.json", "inferred.toml", "sensitivity.toml"
 GENERATION = 16
 """Laboratories tried before parents are chosen again; fixed, so that no result depends on the number of threads."""
 PRIOR_FRACTION = 0.25
@@ -171,9 +172,10 @@ class LaboratorySearch:
             wanted = halves()["calibration" if self.half else "all"]
             inferred = max(judged, key=lambda lab: lab.count_true(wanted))
             plausible = self._find_plausible(state, inferred)
-            self._write(inferred, plausible)
             sensitivity = self._find_sensitivity(inferred.laboratory)
-            return SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
+            result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
+            self._write(result)
+            return result
 
     def propose(self, tried: Sequence[TriedLaboratory]) -> list[Fractions]:
         """Points of the next generation: the start and the prior at first, then children of the best.
@@ -304,16 +306,27 @@ class LaboratorySearch:
     def _save(self, state: SearchState) -> None:
         write_json(self.folder / STATE, with_author(msgspec.to_builtins(state)))
 
-    def _write(
-        self, inferred: JudgedLaboratory, plausible: Sequence[tuple[Laboratory, tuple[str, ...]]]
-    ) -> None:
-        about = f"{len(sentences())} sentences of the thesis; {inferred.count_true(sentences())} hold."
-        texts = {INFERRED: laboratory_text(inferred.laboratory, about, self.command)}
-        for number, (laboratory, ids) in enumerate(plausible, 1):
-            about = "Sentences that do not hold in the inferred laboratory and hold here."
+    def _write(self, result: SearchResult) -> None:
+        texts = {INFERRED: laboratory_text(result.inferred.laboratory, self._about(result), self.command)}
+        for number, (laboratory, ids) in enumerate(result.plausible, 1):
+            about = "Keeps the printed values too; chosen for sentences that do not hold in the inferred one."
             texts[f"plausible-{number}.toml"] = laboratory_text(laboratory, about, self.command, ids)
+        by_unknown = [f"{name} = {json.dumps(ids)}" for name, ids in result.sensitivity.items()]
+        texts[SENSITIVITY] = "\n".join(by_unknown) + "\n"
         for name, text in texts.items():
             write_text(self.folder / name, f"{MADE} laboratory --laboratory\n{text}")
+
+    def _about(self, result: SearchResult) -> str:
+        """Counts of the inferred laboratory, and which of them are in-sample."""
+        counts = {name: (result.inferred.count_true(among), len(among)) for name, among in halves().items()}
+        if self.half:
+            (searched, first), (kept_out, second) = counts["calibration"], counts["validation"]
+            return (
+                f"A search by {first} of the sentences alone reached {searched} of these, "
+                f"and {kept_out} of the {second} that were kept out of it."
+            )
+        true, total = counts["all"]
+        return f"{true} of {total} sentences hold, in-sample: all took part in its search."
 
 
 def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:

@@ -9,7 +9,7 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.runs import VARIED_SEEDS, Runs, move_wall, rougher
+from palpate_thesis.runs import NEAREST_WALL, VARIED_SEEDS, Runs, move_wall, rougher
 
 T = TypeVar("T")
 
@@ -132,7 +132,7 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
     by: dict[str, Mapping[str, Any]] = {
         "friction halved": rougher(experiment, 0.5, "coulomb", "static"),
         "friction doubled": rougher(experiment, 2.0, "coulomb", "static"),
-        "wall at 0.40 m": move_wall(experiment, 0.40),
+        "wall at 0.457 m": move_wall(experiment, NEAREST_WALL),
         "wall at 0.49 m": move_wall(experiment, 0.49),
         "B halved": {"surface.damping": 0.5 * surface.damping},
         "B doubled": {"surface.damping": 2.0 * surface.damping},
