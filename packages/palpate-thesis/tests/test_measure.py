@@ -344,7 +344,8 @@ def test_a_claim_measured_in_parts_has_a_row_of_its_own():
         return ThesisClaim(name, "sec. 1", f"says {name}", "1", "1", "none", verdict, "why")
 
     parts = [
-        claim("A.K", "reproduced"), claim("A.B", "contradicted"), claim("B", "reproduced"), claim("B.K", "contradicted"),
+        claim("A.K", "reproduced"), claim("A.B", "contradicted"), claim("B", "reproduced"),
+        claim("B.K", "contradicted"),
         claim("C.K", "reproduced"), claim("C.B", "reproduced"),
     ]  # fmt: skip
     rows = {row.id: row.verdict for row in with_wholes(parts)}

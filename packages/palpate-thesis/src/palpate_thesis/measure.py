@@ -97,8 +97,7 @@ def measure(
 
 def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: MeasurementFormat) -> Done:
     start = time.perf_counter()
-    if not is_experiment(study.NUMBER):
-        runs = replace(runs, laboratory=BENCH)
+    runs = runs_for(study.NUMBER, runs)
     data = study.run(runs)
     claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
     with apply_look():
@@ -106,6 +105,11 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
         for ending in dict.fromkeys((".png", *written.endings)):
             style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
     return Done(study.NUMBER, *texts(study.NUMBER), claims, time.perf_counter() - start)
+
+
+def runs_for(number: str, runs: Runs) -> Runs:
+    """Runs of a study: of an experiment in the chosen laboratory, of another figure on the bench."""
+    return runs if is_experiment(number) else replace(runs, laboratory=BENCH)
 
 
 def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:

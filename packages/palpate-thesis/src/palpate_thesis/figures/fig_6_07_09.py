@@ -93,7 +93,8 @@ class NetworkFirstSeconds:
         """One press a noise seed, all starts on each; then the network and the conditions varied."""
         presses = network.presses(runs, self.PARAMETERS, self.surface)
         own = network.chosen_network(runs)
-        curves = [network.learn(presses[0], own, start)[1] for start in network.STARTS[:SHOWN_STARTS]]
+        starts = list(dict.fromkeys((*network.starts(runs), *network.STARTS)))[:SHOWN_STARTS]
+        curves = [network.learn(presses[0], own, start)[1] for start in starts]
         return Data(presses[0], curves, grounds(runs, self.PARAMETERS, self.surface, presses))
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:
@@ -119,7 +120,7 @@ class NetworkError(NetworkFirstSeconds):
         drawing, axes = panels.grid(1)
         slow = f"Error with amplitude {SLOW.amplitude:g} N, weights to {SLOW.weights:g}"
         for axis, error, letter, title in (
-            (axes[0], data.curves[0][:, 3], "a", "Error as chosen: amplitude 40 N, weights to 0.5"),
+            (axes[0], data.curves[0][:, 3], "a", "Error of the network of figure 6.7"),
             (axes[1], network.learn(data.press, SLOW, 0)[1][:, 3], "b", slow),
         ):
             axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
