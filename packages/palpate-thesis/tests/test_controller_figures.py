@@ -10,21 +10,12 @@ from palpate.bench import build, load, with_values
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
 from palpate_thesis.explanations import e6_friction_compensation as compensation
-from palpate_thesis.explanations.e6_friction_compensation import (
-    Recovery,
-    drawn_back,
-    measure_recovery,
-    recovery_claim,
-)
-from palpate_thesis.figures import fig_4_03
 from palpate_thesis.figures.fig_4_03 import LoopParameters
 from palpate_thesis.force_control.interventions import (
-    Disturbance,
     run_with,
-    surface_back,
 )
 from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.runs import SHORT, Runs, rougher
+from palpate_thesis.runs import SHORT, rougher
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
 
@@ -42,16 +33,6 @@ def test_a_run_without_turns_is_the_benchs_own_bit_for_bit():
     theirs = build(FOAM).run(FOAM.run.duration, 3, press=FOAM.run.press)
     for name in theirs.columns:
         assert np.array_equal(ours[name], theirs[name]), name
-
-
-def test_a_surface_drawn_back_is_lost_and_found():
-    record = run_with(FOAM, 0, [Disturbance(0.6, surface_back(0.006))])
-    before, after = around(record, "force", 0.6)
-    assert before > 15.0
-    assert after < 2.0
-    one = measure_recovery(drawn_back(0))
-    assert one.times == 1
-    assert 1.0 < one.took < 15.0
 
 
 def swings(loop, stiffness, seconds=3.0, physics=20000):
@@ -153,26 +134,6 @@ def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
     )
     assert wide.error < 0.5 * plain.error
     assert short.shaking > 5 * plain.shaking
-
-
-def test_a_regain_that_is_late_hard_or_missing_is_not_well():
-    good = Recovery(8.0, 0.02, 1.05, 1)
-    assert recovery_claim([good] * 10).verdict == "reproduced"
-    for bad in (
-        Recovery(12.0, 0.02, 1.05, 1),
-        Recovery(8.0, 0.02, 1.5, 1),
-        Recovery(np.inf, np.inf, np.inf, 1),
-    ):
-        assert recovery_claim([bad] * 10).verdict == "contradicted"
-
-
-def test_the_arm_with_friction_bears_stiffer_surfaces_than_the_one_without():
-    case = (60.0, 1.0, 0.003)
-    stiffness = 2.0 * fig_4_03.loop(1.0, 0.003, 60.0).limit()
-    runs = Runs((0,))
-    free = with_values(fig_4_03.press_of(case, stiffness, fig_4_03.FREE), fig_4_03.FREE_SIDE)
-    assert not fig_4_03.stays_quiet(runs.record(free))
-    assert fig_4_03.stays_quiet(runs.record(fig_4_03.press_of(case, stiffness, 1.0)))
 
 
 def test_rougher_friction_is_what_it_says():

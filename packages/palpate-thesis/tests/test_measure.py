@@ -17,6 +17,7 @@ from frozen import kept
 from palpate.bench import load, with_values
 from palpate.cli import main
 from palpate.errors import InputError
+from palpate.report.page import Table
 from palpate_thesis.claims import (
     VERDICTS,
     ThesisClaim,
@@ -119,18 +120,18 @@ def test_often_is_nine_runs_of_ten():
 
 def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     folder = tmp_path / "runs" / "thesis"
-    done = measured([toy("2.1", []), toy("2.2", [])], folder)
-    assert [d.number for d in done] == ["2.1", "2.2"]
+    done = measured([toy("3.5", []), toy("3.7", [])], folder)
+    assert [d.number for d in done] == ["3.5", "3.7"]
     assert names(folder) == {
         "claims.json",
         "index.html",
         STATE,
-        "2.1.png",
-        "2.2.png",
+        "3.5.png",
+        "3.7.png",
     }
     claims = json.loads((folder / "claims.json").read_text("utf-8"))
     assert [list(claim) for claim in claims] == [FIELDS, FIELDS]
-    assert [claim["id"] for claim in claims] == ["T2-1", "T2-2"]
+    assert [claim["id"] for claim in claims] == ["T3-5", "T3-7"]
     assert {claim["verdict"] for claim in claims} <= set(VERDICTS)
     page = (folder / "index.html").read_text("utf-8")
     assert "&lt;it&gt; holds &amp; is told" in page
@@ -138,6 +139,29 @@ def test_a_measurement_is_claims_a_page_and_a_figure_each(tmp_path):
     assert "://" not in re.sub(r"http://www\.w3\.org\S*|https://github\.com/leeoniya/uPlot", "", page), (
         "the page opens without a network"
     )
+
+
+def test_the_page_names_the_laboratory_and_folds_what_a_figure_depends_on(tmp_path):
+    study = toy("4.5", [])
+    study.check = lambda data: []
+
+    def beside(data):
+        """Error under each <variation>."""
+        return study.plot(data)
+
+    study.beside = beside
+    study.tables = lambda data: [Table("side by side", ("method", "K"), [["squares", "1 (0 to 2, 3 seeds)"]])]
+    written = MeasurementFormat("palpate thesis 4.5", "mine")
+    done = measured([study], tmp_path / "t", written=written)
+    page = (tmp_path / "t" / "index.html").read_text("utf-8")
+    assert "Laboratory: <b>mine</b>" in page
+    assert "<td>1 (0 to 2, 3 seeds)</td>" in page
+    folded = page.index("<summary>What it depends on</summary>")
+    assert folded < page.index("Error under each &lt;variation&gt;.") < page.index("</details>", folded)
+    assert (tmp_path / "t" / "4.5-beside.png").exists()
+    state = json.loads((tmp_path / "t" / STATE).read_text("utf-8"))
+    assert state["done"]["4.5"]["tables"][0]["rows"] == [["squares", "1 (0 to 2, 3 seeds)"]]
+    assert done[0].claims == []
 
 
 def test_there_is_one_count_of_claims(tmp_path, capsys):
@@ -164,10 +188,12 @@ def test_there_is_one_count_of_claims(tmp_path, capsys):
     ("number", "chapter"),
     [
         ("3.7", "The bench"),
-        ("4.3", "The controllers"),
+        ("4.5", "The controllers"),
+        ("5.2", "The identifiers"),
         ("6.5", "Least squares"),
         ("6.9", "Neural identifier"),
         ("6.10", "Force control"),
+        ("7.1", "Conclusions"),
         ("why-negative-mass", "Explanations"),
     ],
 )
@@ -179,12 +205,12 @@ def test_figures_stand_in_their_chapters(number, chapter):
 def test_what_is_done_is_kept_and_not_done_again(tmp_path, error):
     folder, done = tmp_path / "thesis", []
     with pytest.raises(error):
-        measured([toy("2.1", done), toy("2.2", done, error), toy("2.4", done)], folder)
-    assert done == ["2.1", "2.2"]
-    assert [c["id"] for c in json.loads((folder / "claims.json").read_text())] == ["T2-1"]
+        measured([toy("3.5", done), toy("3.7", done, error), toy("4.2", done)], folder)
+    assert done == ["3.5", "3.7"]
+    assert [c["id"] for c in json.loads((folder / "claims.json").read_text())] == ["T3-5"]
     assert "Unfinished" in (folder / "index.html").read_text("utf-8")
-    measured([toy("2.1", done), toy("2.2", done), toy("2.4", done)], folder)
-    assert done == ["2.1", "2.2", "2.2", "2.4"]
+    measured([toy("3.5", done), toy("3.7", done), toy("4.2", done)], folder)
+    assert done == ["3.5", "3.7", "3.7", "4.2"]
     assert "Unfinished" not in (folder / "index.html").read_text("utf-8")
     assert len(json.loads((folder / "claims.json").read_text())) == 3
 
@@ -192,23 +218,23 @@ def test_what_is_done_is_kept_and_not_done_again(tmp_path, error):
 def test_other_seeds_or_figures_are_another_measurement(tmp_path):
     folder, done = tmp_path / "thesis", []
     with pytest.raises(KeyboardInterrupt):
-        measured([toy("2.1", done), toy("2.2", done, KeyboardInterrupt)], folder)
+        measured([toy("3.5", done), toy("3.7", done, KeyboardInterrupt)], folder)
     before = (folder / "claims.json").read_bytes()
     with pytest.raises(InputError, match="--replace"):
-        measured([toy("2.1", done), toy("2.2", done)], folder, seeds=range(12))
+        measured([toy("3.5", done), toy("3.7", done)], folder, seeds=range(12))
     with pytest.raises(InputError, match="--replace"):
-        measured([toy("2.1", done)], folder)
+        measured([toy("3.5", done)], folder)
     assert (folder / "claims.json").read_bytes() == before
-    assert done == ["2.1", "2.2"]
+    assert done == ["3.5", "3.7"]
 
 
 def test_a_finished_measurement_is_replaced_only_when_asked(tmp_path):
     folder, done = tmp_path / "thesis", []
-    measured([toy("2.1", done)], folder)
+    measured([toy("3.5", done)], folder)
     with pytest.raises(InputError, match="--replace"):
-        measured([toy("2.1", done)], folder)
-    measured([toy("2.1", done)], folder, replace=True)
-    assert done == ["2.1", "2.1"]
+        measured([toy("3.5", done)], folder)
+    measured([toy("3.5", done)], folder, replace=True)
+    assert done == ["3.5", "3.5"]
 
 
 @pytest.mark.parametrize("replace", [False, True])
@@ -216,7 +242,7 @@ def test_a_folder_of_something_else_is_never_touched(tmp_path, replace):
     (tmp_path / "letters.txt").write_text("dear")
     done = []
     with pytest.raises(InputError, match="palpate did not write" if replace else "holds other files"):
-        measured([toy("2.1", done)], tmp_path, replace=replace)
+        measured([toy("3.5", done)], tmp_path, replace=replace)
     assert names(tmp_path) == {"letters.txt"}
     assert not done
 
@@ -225,7 +251,7 @@ def test_a_folder_of_something_else_is_never_touched(tmp_path, replace):
 def test_a_broken_state_is_no_measurement(tmp_path, content):
     (tmp_path / STATE).write_text(content, encoding="latin-1")
     with pytest.raises(InputError, match="palpate did not write it"):
-        measured([toy("2.1", [])], tmp_path)
+        measured([toy("3.5", [])], tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -234,13 +260,13 @@ def test_a_broken_state_is_no_measurement(tmp_path, content):
 def test_a_spoiled_state_is_no_measurement(tmp_path, rest):
     (tmp_path / STATE).write_text(f'{{"written_by": "palpate 0.1.0"{rest}}}')
     with pytest.raises(InputError, match="another --out"):
-        measured([toy("2.1", [])], tmp_path)
+        measured([toy("3.5", [])], tmp_path)
 
 
 def test_a_file_in_the_place_is_refused(tmp_path):
     (tmp_path / "thesis").touch()
     with pytest.raises(InputError, match="not a folder"):
-        measured([toy("2.1", [])], tmp_path / "thesis")
+        measured([toy("3.5", [])], tmp_path / "thesis")
 
 
 @pytest.mark.parametrize(
@@ -391,14 +417,14 @@ def test_ctrl_c_stops_the_runs_of_all_threads():
 def test_the_program_says_that_it_goes_on(tmp_path, capsys, monkeypatch):
     """After a Ctrl-C where what is done is, and at the next start how much of it there is."""
     done = []
-    toys = [toy("2.1", done), toy("2.2", done, KeyboardInterrupt)]
+    toys = [toy("3.5", done), toy("3.7", done, KeyboardInterrupt)]
     monkeypatch.setattr(palpate_thesis.figure, "studies", lambda: toys)
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 130
     told = capsys.readouterr().err
     assert told.count("\n") == 1
     assert "are saved in" in told
     assert "the same command resumes" in told
-    toys[1] = toy("2.2", done)
+    toys[1] = toy("3.7", done)
     assert main(["thesis", "--out", str(tmp_path / "t")]) == 0
     assert "1 of 2 are measured already" in " ".join(capsys.readouterr().out.split())
-    assert done == ["2.1", "2.2", "2.2"]
+    assert done == ["3.5", "3.7", "3.7"]

@@ -3,22 +3,27 @@
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import Any, Literal, get_args
 
 import numpy as np
 
+from palpate.report.page import Table
+
 Verdict = Literal["reproduced", "reproduced in a plausible laboratory", "contradicted", "not checkable"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 Of = Literal["experiment", "cited", "ours"]
-KINDS: Mapping[Of, str] = {
+CONCLUSION = "conclusion"
+"""Beginning of the names of the claims of section 7.1, which are of the experiments, too, and counted apart."""
+KINDS: Mapping[str, str] = {
     "experiment": "about the experiments",
+    CONCLUSION: "of the conclusions, section 7.1",
     "cited": "about the set-up and the schemes that it cites",
     "ours": "that we add, checks and explanations",
 }
-"""What the sentences of each kind are about, in the order in which they are counted; the counts are never summed."""
+"""What the sentences are about that are counted together, in the order of the counts, which are never summed."""
 ENOUGH = 0.9
 """Fraction of the runs in which a claim has to hold."""
 
@@ -36,7 +41,7 @@ class ThesisClaim:
         tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
         verdict: one of `VERDICTS`.
         note: one paragraph: the reason, the chosen values and their effect, the range of validity.
-        of: one of `KINDS`.
+        of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
         group: True if the row only sums up its parts; then it is not counted.
     """
 
@@ -54,13 +59,23 @@ class ThesisClaim:
 
 @dataclass
 class Done:
-    """Study that has been measured, with its claims."""
+    """Study that has been measured, with its claims.
+
+    Args:
+        number, title, caption: of its figure.
+        claims: decided by it.
+        seconds: that it took.
+        beside: what the folded figure shows; empty without one.
+        tables: shown under the figure.
+    """
 
     number: str
     title: str
     caption: str
     claims: list[ThesisClaim]
     seconds: float
+    beside: str = ""
+    tables: list[Table] = field(default_factory=list)
 
 
 def verdict_of(id_: str, holds: bool) -> Verdict:
@@ -163,7 +178,7 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
     row.pop("reason", None)
     filled: dict[str, Any] = {"of": "ours", **{name: text.format(**values) for name, text in row.items()}}
-    if id_ in experiment_sentences():
+    if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
         filled["of"] = "experiment"
     return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)
 
@@ -190,22 +205,26 @@ def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
     return rows
 
 
-def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[Of, Counter[str]]:
+def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:
     """Number of claims by kind and verdict, without the rows that sum up others; kinds without a claim are left out."""
-    counted = {of: Counter(c.verdict for c in claims if c.of == of and not c.group) for of in KINDS}
-    return {of: counts for of, counts in counted.items() if counts}
+
+    def kind(claim: ThesisClaim) -> str:
+        return CONCLUSION if claim.id.startswith(CONCLUSION) else claim.of
+
+    counted = {name: Counter(c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS}
+    return {name: counts for name, counts in counted.items() if counts}
 
 
 def count_in_words(claims: Sequence[ThesisClaim]) -> list[str]:
     """A line for each kind: "49 sentences about the experiments: 41 reproduced, 4 contradicted"."""
     lines = []
-    for of, counts in count_verdicts(claims).items():
+    for kind, counts in count_verdicts(claims).items():
         parts = ", ".join(
             f"{counts[verdict]} {verdict}"
             for verdict in VERDICTS
             if counts[verdict] or verdict == "reproduced"
         )
-        lines.append(f"{counts.total()} sentence{'s' * (counts.total() != 1)} {KINDS[of]}: {parts}")
+        lines.append(f"{counts.total()} sentence{'s' * (counts.total() != 1)} {KINDS[kind]}: {parts}")
     return lines
 
 

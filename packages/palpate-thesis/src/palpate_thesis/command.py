@@ -86,7 +86,7 @@ def thesis(
     command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
         about = describe_laboratory(laboratory)
-        written = MeasurementFormat(command, drawn.endings, drawn.dpi, about)
+        written = MeasurementFormat(command, name or "inferred", drawn.endings, drawn.dpi, about)
         _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:
         say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
@@ -124,6 +124,10 @@ def _measure(
     for line in count_in_words(claims):
         screen.print(line)
     screen.print(written.about)
-    table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
-    show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    if rows:
+        table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
+        show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
+    for study in done if len(done) == 1 else ():
+        for beside in study.tables:
+            show_table(screen, beside)
     place(screen, "page:", folder / "index.html")

@@ -1,6 +1,6 @@
 """One look for all figures: sizes, colours and frames, and the panels that figures are made of."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +23,11 @@ __all__ = [
     "Figure",
     "across",
     "apply_look",
-    "force_panel",
+    "force_figure",
     "legend_inside",
     "limits",
     "panels",
+    "strip",
 ]
 
 LIMIT_LINE: dict[str, Any] = {"color": style.INK, "linewidth": 1, "linestyle": "--"}
@@ -82,15 +83,26 @@ def across(row: Sequence[Axes]) -> Axes:
     return axis
 
 
-def force_panel(axis: Axes, shown: Record) -> None:
-    """Measured, true and desired force, and where a motor is at its limit."""
+def force_figure(shown: Record) -> Figure:
+    """Measured and desired force over the whole width, as the thesis draws them, and where a motor is at its limit."""
+    drawing, ((axis,),) = panels([3.2])
     t = shown["t"]
-    axis.plot(t, shown["force_measured"], color=style.MEASURED, linewidth=0.7, label="measured")
-    axis.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
-    axis.plot(t, shown["force_desired"], **style.KNOWN, label="desired")
+    axis.plot(t, shown["force_measured"], color=style.INK, linewidth=0.8, label="measured")
+    axis.plot(t, shown["force_desired"], color=style.MEASURED, linewidth=1.1, label="desired")
     limits(axis, shown)
     axis.set(ylabel="force [N]", xlabel="time since contact [s]", xlim=(t[0], t[-1]))
     style.legend(axis)
+    return drawing
+
+
+def strip(axis: Axes, values: Mapping[str, Sequence[float]], label: str, limit: float | None = None) -> None:
+    """A dot a run for each variation, and the limit of a claim."""
+    for place, runs in enumerate(values.values()):
+        axis.plot([place] * len(runs), runs, "o", color=style.SERIES[0], markersize=4)
+    if limit is not None:
+        axis.axhline(limit, **LIMIT_LINE)
+    axis.set_xticks(range(len(values)), list(values))
+    axis.set(ylabel=label, ylim=(0.0, None))
 
 
 def limits(axis: Axes, shown: Record) -> None:

@@ -14,7 +14,7 @@
       left += fits;
     }
     for (const study of all("section.study")) {
-      const some = all(".claim", study).some((node) => !node.hidden);
+      const own = all(".claim", study), some = own.some((node) => !node.hidden) || (!own.length && !verdict && !word);
       study.hidden = !some;
       for (const line of all(`[data-of="${CSS.escape(study.id)}"]`)) line.hidden = !some;
     }

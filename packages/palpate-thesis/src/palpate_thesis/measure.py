@@ -1,5 +1,6 @@
 """Measure the thesis study by study: each result is on disk at once, and an interrupted measurement resumes."""
 
+import inspect
 import time
 import tomllib
 from collections import Counter
@@ -23,6 +24,7 @@ from palpate_thesis.claims import (
     ThesisClaim,
     claims_of_studies,
     count_in_words,
+    experiment_sentences,
     plausible_laboratories,
     tables,
     texts,
@@ -33,6 +35,8 @@ from palpate_thesis.laboratory import BENCH, Laboratory
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
+BESIDE = "-beside"
+"""End of the name of a folded figure's file."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +45,14 @@ class MeasurementFormat:
 
     Args:
         command: command line that makes it again, for its page.
+        laboratory: its name, for the page.
         endings: of the figures' files, besides the PNG that the page shows.
         dpi: of a PNG; the usual one if None.
         about: the laboratory of the experiments, in words.
     """
 
     command: str
+    laboratory: str = "bench"
     endings: tuple[str, ...] = (".png",)
     dpi: int | None = None
     about: str = ""
@@ -54,11 +60,14 @@ class MeasurementFormat:
 
 @dataclass
 class FolderState:
-    """Content of the folder, with the digest of its sources, seeds and laboratory (`stamp`)."""
+    """Content of the folder, with the digest of its sources, seeds and laboratory (`stamp`), whose values it names."""
 
     stamp: str
     wanted: list[str]
     command: str
+    laboratory: str = ""
+    about: str = ""
+    values: dict[str, float] = field(default_factory=dict)
     done: dict[str, Done] = field(default_factory=dict)
 
 
@@ -83,7 +92,7 @@ def measure(
         InputError: the folder holds anything else, and `replace` is off; another process is writing there.
     """
     with kept_folder(folder, STATE, replace=replace):
-        state = _load_state(studies, runs, folder, written.command)
+        state = _load_state(studies, runs, folder, written)
         _save_state(state, folder)
         if state.done:
             resumed(len(state.done))
@@ -91,7 +100,7 @@ def measure(
             if study.NUMBER not in state.done:
                 started(study)
                 state.done[study.NUMBER] = _measure_study(study, runs, folder, written)
-                _write_results(state, folder, written.about)
+                _write_results(state, folder)
     return [state.done[number] for number in state.wanted]
 
 
@@ -100,11 +109,19 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     runs = runs_for(study.NUMBER, runs)
     data = study.run(runs)
     claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
+    beside, tables = getattr(study, "beside", None), getattr(study, "tables", None)
     with apply_look():
-        drawing = study.plot(data)
-        for ending in dict.fromkeys((".png", *written.endings)):
-            style.save(drawing, folder / f"{study.NUMBER}{ending}", written.dpi)
-    return Done(study.NUMBER, *texts(study.NUMBER), claims, time.perf_counter() - start)
+        for name, draw in (("", study.plot), (BESIDE, beside)):
+            for ending in dict.fromkeys((".png", *written.endings)) if draw else ():
+                style.save(draw(data), folder / f"{study.NUMBER}{name}{ending}", written.dpi)
+    return Done(
+        study.NUMBER,
+        *texts(study.NUMBER),
+        claims,
+        time.perf_counter() - start,
+        inspect.getdoc(beside) or "" if beside else "",
+        tables(data) if tables else [],
+    )
 
 
 def runs_for(number: str, runs: Runs) -> Runs:
@@ -118,7 +135,7 @@ def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
     The reason of claims.toml stands for one that does not hold; then the laboratory in which it does, and the unknowns
     that decide it.
     """
-    if laboratory.is_bench:
+    if laboratory.is_bench or claim.id not in experiment_sentences():
         return claim
     parts = []
     if claim.verdict != "reproduced":
@@ -143,14 +160,18 @@ def sensitivity() -> Mapping[str, Sequence[str]]:
     return table
 
 
-def _load_state(studies: Sequence[FigureModule], runs: Runs, folder: Path, command: str) -> FolderState:
+def _load_state(
+    studies: Sequence[FigureModule], runs: Runs, folder: Path, written: MeasurementFormat
+) -> FolderState:
     wanted = [study.NUMBER for study in studies]
     stamp = f"{sources_digest()} seeds {list(runs.seeds)}"
     if not runs.laboratory.is_bench:
         stamp += f" laboratory {runs.laboratory.numbers()}"
     path = folder / STATE
     if not path.exists():
-        return FolderState(stamp, wanted, command)
+        return FolderState(
+            stamp, wanted, written.command, written.laboratory, written.about, runs.laboratory.numbers()
+        )
     check_place(path)
     try:
         state = msgspec.json.decode(path.read_bytes(), type=FolderState)
@@ -167,16 +188,14 @@ def _save_state(state: FolderState, folder: Path) -> None:
     write_json(folder / STATE, with_author(asdict(state)))
 
 
-def _write_results(state: FolderState, folder: Path, about: str) -> None:
+def _write_results(state: FolderState, folder: Path) -> None:
     """Write claims.json, the page and the state, each file whole or as it was."""
     done = [state.done[number] for number in state.wanted if number in state.done]
     write_json(folder / "claims.json", [asdict(row) for row in claims_of_studies(done)])
-    pictures = {
-        study.number: data_address((folder / f"{study.number}.png").read_bytes(), "image/png")
-        for study in done
-    }
+    names = [f"{study.number}{end}" for study in done for end in ("", BESIDE if study.beside else "")]
+    pictures = {name: data_address((folder / f"{name}.png").read_bytes(), "image/png") for name in names}
     missing = [number for number in state.wanted if number not in state.done]
-    write_text(folder / "index.html", index_page(done, pictures, missing, state.command, about))
+    write_text(folder / "index.html", index_page(done, pictures, missing, state))
     _save_state(state, folder)
 
 
@@ -188,16 +207,15 @@ _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force
 
 
 def index_page(
-    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], command: str, about: str = ""
+    done: Sequence[Done], pictures: Mapping[str, str], missing: Sequence[str], state: FolderState
 ) -> str:
     """The page as HTML, figures included; it opens without a network.
 
     Args:
         done: measured studies.
-        pictures: source of the image of each study, by its number.
+        pictures: source of each image, by the name of its file.
         missing: numbers of the studies still to come.
-        command: command line that measures them.
-        about: the laboratory, in words.
+        state: of the folder.
     """
     claims = [claim for study in done for claim in study.claims]
     verdicts = Counter(claim.verdict for claim in claims)
@@ -213,12 +231,15 @@ def index_page(
         chapters=[{"title": title, "studies": studies} for title, studies in chapters.items()],
         count=verdicts.total(),
         counts=count_in_words(claims),
-        about=about,
+        about=state.about,
         verdicts=verdicts,
         tones=TONES,
         pictures=pictures,
         missing=missing,
-        command=command,
+        command=state.command,
+        laboratory=state.laboratory,
+        values=state.values,
+        besides=BESIDE,
         seconds=sum(study.seconds for study in done),
         scripts=(text_of("index.js", "palpate_thesis"),),
     )

@@ -110,12 +110,9 @@ RELAXING_FOAM = {
         "branch_time": 0.23,
     }
 }
-RUBBER_SURFACE = {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}}
-
-
 SURFACES: Mapping[str, Mapping[str, Any]] = {
     "foam": {},
-    "rubber": RUBBER_SURFACE,
+    "rubber": {"surface": {"kind": "kelvin-voigt", "stiffness": 34500.0, "damping": 480.0, "mass": 0.05}},
     "relaxing\nfoam": RELAXING_FOAM,
 }
 

@@ -1,4 +1,4 @@
-"""Friction compensation: as printed (without effect), and effective; loss and recovery of contact."""
+"""Friction compensation: as printed (without effect), and effective."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -7,14 +7,12 @@ import numpy as np
 
 from palpate._vector import Vec3
 from palpate.bench import Experiment, load, with_values
-from palpate.bench.summary import CONTACT, LOST, losses
+from palpate.bench.summary import losses
 from palpate.instruments import Encoder
 from palpate.records import Record
 from palpate.report import style
-from palpate.studies.metrics.following import SHARE
 from palpate_thesis.claims import ThesisClaim, claim, often
 from palpate_thesis.drawing import ZERO, Axes, Figure, across, panels
-from palpate_thesis.force_control.interventions import Disturbance, run_with, surface_back
 from palpate_thesis.force_control.tracking import since_contact, slot
 from palpate_thesis.runs import (
     SHORT,
@@ -25,71 +23,6 @@ from palpate_thesis.runs import (
     friction_and_pose,
     stops_holding,
 )
-
-LOSS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 15.0})
-RETREAT_TIME, RETREAT = 2.5, 0.005
-"""Time after contact at which the surface retracts [s], and its distance [m]."""
-MAX_RECOVERY, MAX_SETTLING, MAX_PEAK = 10.0, 3.0, 1.25
-"""Limits of the time to regain contact, of the time from there to the desired force [s], and of the relative force."""
-
-
-class Recovery(NamedTuple):
-    """Outcome of a lost contact."""
-
-    took: float  # from loss to contact [s]; infinite if never
-    off: float  # relative error of the force `MAX_SETTLING` seconds later
-    peak: float  # largest true force after the loss, over the desired one
-    times: int  # losses
-
-    @property
-    def well(self) -> bool:
-        """True if contact came back in time, and gently."""
-        return self.times == 1 and self.took <= MAX_RECOVERY and self.off <= SHARE and self.peak <= MAX_PEAK
-
-
-def recovery_claim(recoveries: Sequence[Recovery]) -> ThesisClaim:
-    """Claim that contact comes back in time, and gently."""
-    return claim(
-        "contact-regained",
-        often(recovery.well for recovery in recoveries),
-        found=recoveries,
-        again=MAX_SETTLING,
-        within=MAX_RECOVERY,
-        share=SHARE,
-        limit=MAX_PEAK,
-    )
-
-
-def loss_panel(axis: Axes, record: Record) -> None:
-    """Draw the true force, and shade the time without contact."""
-    axis.plot(record["t"], record["force"], color=style.F, linewidth=1.1, label="true force")
-    shade: dict[str, Any] = {"transform": axis.get_xaxis_transform(), "color": style.GRID, "linewidth": 0}
-    lost = record["phase"] != CONTACT
-    axis.fill_between(record["t"], 0.0, 1.0, where=lost, label="lost, waiting, looking", **shade)
-    axis.set(xlabel="time since contact [s]", xlim=(0.0, LOSS.run.press))
-    axis.set(ylabel="true force [N]", ylim=(-0.5, 24.0))
-    style.legend(axis)
-
-
-def drawn_back(seed: int) -> Record:
-    """Press whose surface retracts."""
-    return run_with(LOSS, seed, [Disturbance(RETREAT_TIME, surface_back(RETREAT))])
-
-
-def measure_recovery(record: Record) -> Recovery:
-    """Outcome of the contact after its first loss."""
-    t, phase, force = since_contact(record), record["phase"], record["force"]
-    lost = np.flatnonzero((phase[1:] == LOST) & (phase[:-1] == CONTACT)) + 1
-    if not len(lost):
-        return Recovery(np.inf, np.inf, np.inf, 0)
-    after = np.flatnonzero((phase == CONTACT) & (t > t[lost[0]]))
-    if not len(after):
-        return Recovery(np.inf, np.inf, np.inf, len(lost))
-    back = t[after[0]]
-    late = (t >= back + MAX_SETTLING - 0.1) & (t < back + MAX_SETTLING + 0.1)
-    off = abs(float(force[late].mean()) / 20.0 - 1.0) if late.any() else np.inf
-    return Recovery(float(back - t[lost[0]]), off, float(force[lost[0] :].max()) / 20.0, len(lost))
-
 
 NUMBER = "friction-compensation"
 LEVEL = (3.0, 0.25, 0.03)
@@ -131,12 +64,10 @@ class Data(NamedTuple):
     printed_blend: list[Held]
     sweep: dict[float, list[Held]]  # by BLENDS
     varied: dict[str, list[Ratio]]
-    regains: list[Recovery]
-    regain: Record
 
 
 def run(runs: Runs) -> Data:
-    """Presses without compensation, over blends, in other worlds; and presses whose surface goes."""
+    """Presses without compensation, over blends, and in other worlds."""
     plain = runs.over_seeds(PLAIN, held_in)
     hammer = runs.over_seeds(with_blend(PARAMETERS, PRINTED_BLEND), held_in)
     sweep = runs.by_name({b: with_blend(PARAMETERS, b) for b in BLENDS}, held_in, VARIED_SEEDS)
@@ -145,12 +76,11 @@ def run(runs: Runs) -> Data:
         "blend 0.002 rad/s, acting": slot(runs.record(with_blend(PARAMETERS, PRINTED_BLEND))),
         "blend 0.05 rad/s": slot(runs.record(PARAMETERS)),
     }
-    regains = runs.map(lambda seed: measure_recovery(drawn_back(seed)), list(runs.seeds))
-    return Data(traces, plain, hammer, sweep, _ratios(runs), regains, slot(drawn_back(runs.seeds[0])))
+    return Data(traces, plain, hammer, sweep, _ratios(runs))
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """The listing's rule; a blend that acts; the blend of the listing, acting; loss and regain."""
+    """The listing's rule; a blend that acts; the blend of the listing, acting."""
     nominal = data.varied["foam"]
     best = min(BLENDS, key=lambda blend: np.median([h.error for h in data.sweep[blend]]))
     pairs = zip(data.printed_blend, data.plain, strict=True)
@@ -172,23 +102,21 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             plain=data.plain,
             shakes=SHAKES,
         ),
-        recovery_claim(data.regains),
     ]
 
 
 def plot(data: Data) -> Figure:
-    """The press, the blends, the loss."""
-    drawing, grid = panels([2.3, 2.4, 2.2], 2, 11.0)
-    wide = [across(grid[i]) for i in (0, 2)]
+    """The press and the blends."""
+    drawing, grid = panels([2.3, 2.4], 2, 11.0)
+    wide = across(grid[0])
     for name, trace in data.traces.items():
-        wide[0].plot(trace["t"], trace["force"], linewidth=1.0, label=name)
-    wide[0].axhline(20.0, **style.KNOWN)
-    wide[0].set(xlabel="time since contact [s]", xlim=(0.0, PLAIN.run.press))
-    wide[0].set(ylabel="true force [N]", ylim=(14.0, 23.0))
-    style.legend(wide[0])
+        wide.plot(trace["t"], trace["force"], linewidth=1.0, label=name)
+    wide.axhline(20.0, **style.KNOWN)
+    wide.set(xlabel="time since contact [s]", xlim=(0.0, PLAIN.run.press))
+    wide.set(ylabel="true force [N]", ylim=(14.0, 23.0))
+    style.legend(wide)
     _blend_panel(grid[1][0], data, lambda h: h.error, "force error [N]")
     _blend_panel(grid[1][1], data, lambda h: h.shaking, "shaking of the force [N]")
-    loss_panel(wide[1], data.regain)
     return drawing
 
 

@@ -1,4 +1,4 @@
-"""Figure 4.3: the loop of the hybrid controller's block diagram, and the stiffest surface on which it is stable."""
+"""Figure 4.3: the hybrid controller's block diagram, and the stiffest surface on which its force loop is stable."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.bench import Experiment, load, with_values
-from palpate.bench.summary import losses
-from palpate.records import Record
+from palpate.bench import load, with_values
+from palpate.controllers import hybrid
 from palpate.report import style
 from palpate.signals.filters import butterworth2
-from palpate_thesis.claims import ThesisClaim, claim, often
+from palpate_thesis.blocks import blocks_of
+from palpate_thesis.claims import ThesisClaim, claim
+from palpate_thesis.diagram import loop_diagram
 from palpate_thesis.drawing import LIMIT_LINE, Axes, Figure, panels
-from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.runs import SHORT, VARIED_SEEDS, Runs, rougher
+from palpate_thesis.runs import SHORT, Runs
 
 TICK = 1e-3
 """[s]"""
@@ -122,6 +122,14 @@ def _exponential(A: Array) -> Array:
 
 
 NUMBER = "4.3"
+PLACES = {
+    "u_x": (2.3, 3.6),
+    "error": (2.3, 2.2),
+    "integral": (4.6, 1.2),
+    "u_f": (6.6, 2.2),
+    "return": (8.6, 3.2),
+}
+"""Places of the steps of `Hybrid.step`."""
 PARAMETERS = with_values(load("foam-hybrid"), {**SHORT, "run.press": 3.0})
 TIP = 8.2
 """Effective mass of the arm along x at the wall, rotors included [kg]."""
@@ -129,13 +137,6 @@ GAINS = {"K_fp 1, K_fi 0.003 (foam)": (1.0, 0.003), "K_fp 0.25, K_fi 0.0015 (rub
 STUDY = {(60.0, 1.0): 12e3, (60.0, 0.25): 31e3, (480.0, 1.0): 95e3, (480.0, 0.25): 410e3}
 """Limits of an earlier study of ours [N/m], by damping [N s/m] and K_fp."""
 NEAR = 0.15
-BELOW, ABOVE = 0.8, 1.25
-"""Fractions of the limit at which the whole arm has to be stable, and unstable."""
-SHAKES = 1.0
-"""Standard deviation of the true force in the third second of a press that counts as unstable [N]."""
-FREE, FREE_SIDE = 0.02, {"wall.side_friction": 0.0}
-STIFFER = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Multiples of the limit that the arm with its friction is put on."""
 DAMPINGS = np.geomspace(20.0, 1000.0, 18)
 CUTOFFS = np.geomspace(8.0, 300.0, 16)
 SURFACES = {"foam": (200.0, 5.2e3), "rubber": (480.0, 34.5e3)}
@@ -150,13 +151,10 @@ class Data(NamedTuple):
     limits: dict[Case, float]  # linear, by damping and K_fp [N/m]
     curves: dict[str, Array]  # by gains, over DAMPINGS [N/m]
     filtered: dict[str, Array]  # by gains, over CUTOFFS, on the damping of the foam [N/m]
-    below: dict[Case, list[bool]]  # whether the arm was stable, a run each
-    above: dict[Case, list[bool]]
-    rough: dict[Case, list[float]]  # largest multiple of the limit that the arm bore with its friction
 
 
-def run(runs: Runs) -> Data:
-    """The linear loop over damping and cut-off; the whole arm next to its limits."""
+def run(_: Runs) -> Data:
+    """The linear loop over damping and cut-off."""
     limits = {(b, kf): loop(kf, ki, b).limit() for b, kf, ki in _cases()}
     return Data(
         limits,
@@ -165,21 +163,13 @@ def run(runs: Runs) -> Data:
             name: np.array([loop(*g, 200.0, smoothing=c).limit() for c in CUTOFFS])
             for name, g in GAINS.items()
         },
-        _stable(runs, limits, BELOW),
-        _stable(runs, limits, ABOVE),
-        _rough(runs, limits),
     )
 
 
 def check(data: Data) -> Sequence[ThesisClaim]:
-    """The linear limits against earlier ones; the arm against the linear limits; a low cut-off against a high one."""
+    """The linear limits against earlier ones; a low cut-off against a high one."""
     limits = ", ".join(f"{data.limits[case] / 1e3:.3g}" for case in STUDY)
     slow, fast = (_at(data, cutoff) for cutoff in (10.0, 120.0))
-    stable = {c: sum(data.below[c]) for c in data.below}
-    lost = {c: len(data.above[c]) - sum(data.above[c]) for c in data.above}
-    holds = all(often(data.below[c]) and often(not a for a in data.above[c]) for c in stable)
-    n = len(next(iter(data.below.values())))
-    friction = ", ".join(f"{min(v):.2g} to {max(v):.2g}" for v in data.rough.values())
     return [
         claim(
             "force-loop-stable",
@@ -188,18 +178,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             near=NEAR,
             tip=TIP,
             needed=_least_damping(data),
-        ),
-        claim(
-            "force-loop-stable.whole-arm",
-            holds,
-            below=BELOW,
-            stable=", ".join(map(str, stable.values())),
-            runs=n,
-            above=ABOVE,
-            lost=", ".join(map(str, lost.values())),
-            shakes=SHAKES,
-            friction=friction,
-            stiffer=STIFFER[-1],
         ),
         claim(
             "low-pass-destabilises",
@@ -212,8 +190,13 @@ def check(data: Data) -> Sequence[ThesisClaim]:
     ]
 
 
-def plot(data: Data) -> Figure:
-    """Limits against damping and cut-off."""
+def plot(_: Data) -> Figure:
+    """The steps of the hybrid controller around the arm on the surface."""
+    return loop_diagram(blocks_of(hybrid, "Hybrid.step"), PLACES, "foam-hybrid")
+
+
+def beside(data: Data) -> Figure:
+    """Stiffest surface on which the linear loop is stable, against its damping and against the force filter."""
     drawing, grid = panels([3.4], 2, 11.0)
     _damping_panel(grid[0][0], data)
     _cutoff_panel(grid[0][1], data)
@@ -226,12 +209,7 @@ def _damping_panel(axis: Axes, data: Data) -> None:
         axis.loglog(DAMPINGS, data.curves[name] / 1e3, color=color, label=name)
         for case, limit in data.limits.items():
             if case[1] == kf:
-                for share, runs in ((BELOW, data.below), (ABOVE, data.above)):
-                    stable = often(runs[case])
-                    face = color if stable else "white"
-                    axis.plot(
-                        case[0], share * limit / 1e3, "o", color=color, markerfacecolor=face, markersize=6
-                    )
+                axis.plot(case[0], limit / 1e3, "o", color=color, markersize=6)
     for name, (damping, stiffness) in SURFACES.items():
         axis.plot(damping, stiffness / 1e3, "s", color=style.MEASURED, markersize=5)
         axis.annotate(name, (damping, stiffness / 1e3), (5, -10), textcoords="offset points")
@@ -271,32 +249,3 @@ def _least_damping(data: Data) -> float:
     """The damping from which the foam's gains bear 44 kN/m [N s/m]."""
     curve = next(iter(data.curves.values()))
     return float(np.exp(np.interp(np.log(44e3), np.log(curve), np.log(DAMPINGS))))
-
-
-def press_of(case: tuple[float, float, float], stiffness: float, friction: float) -> Experiment:
-    """A press with this damping and these gains on a surface of this stiffness [N/m], the friction times a share."""
-    damping, kf, ki = case
-    surface = {"surface.stiffness": stiffness, "surface.damping": damping, "surface.mass": 0.05}
-    return with_values(
-        PARAMETERS,
-        {**rougher(PARAMETERS, friction), **surface, "controller.kf": kf, "controller.ki": ki},
-    )
-
-
-def stays_quiet(record: Record) -> bool:
-    """True if contact is kept and the true force rests from two seconds on."""
-    late = since_contact(record) >= 2.0
-    return losses(record) == 0 and bool(late.any()) and float(record["force"][late].std()) <= SHAKES
-
-
-def _stable(runs: Runs, limits: dict[Case, float], share: float) -> dict[Case, list[bool]]:
-    presses = {c[:2]: with_values(press_of(c, share * limits[c[:2]], FREE), FREE_SIDE) for c in _cases()}
-    return runs.by_name(presses, stays_quiet)
-
-
-def _rough(runs: Runs, limits: dict[Case, float]) -> dict[Case, list[float]]:
-    """Largest of STIFFER, seed by seed, up to which the arm with its own friction stays quiet; 0 if at none."""
-    tried = {(c[:2], k): press_of(c, k * limits[c[:2]], 1.0) for c in _cases() for k in STIFFER}
-    quiet = runs.by_name(tried, stays_quiet, VARIED_SEEDS)
-    rows = {c: np.transpose([quiet[c, k] for k in STIFFER]) for c in limits}
-    return {c: [max([0.0, *np.array(STIFFER)[np.cumprod(row) > 0]]) for row in rows[c]] for c in limits}

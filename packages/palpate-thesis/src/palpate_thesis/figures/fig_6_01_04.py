@@ -157,15 +157,18 @@ class LeastSquaresFirstSeconds:
     def plot(self, data: Data) -> Figure:
         """The thesis' six panels, with the limit of the time to settle."""
         drawing, axes = panels.grid(3)
-        panels.six(axes, data.shown, "thesis", (0.0, press_runs.FIRST))
-        presses = list(data.shown.values())
-        panels.calm_limits(axes[4], *map(panels.calm_ratio, presses))
+        press = data.shown[self.surface]
+        panels.six(axes, {self.surface: press}, "thesis", (0.0, press_runs.FIRST))
+        panels.calm_limits(axes[4], panels.calm_ratio(press))
         for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
-            curves = [scale * panels.calm(p, f"{key}_thesis", press_runs.FIRST) for p in presses]
-            panels.calm_limits(axis, *curves)
+            panels.calm_limits(axis, scale * panels.calm(press, f"{key}_thesis", press_runs.FIRST))
         for axis in axes:
             axis.axvline(self.limit, **STATED)
         return drawing
+
+    def beside(self, data: Data) -> Figure:
+        """Time until K_e is settled under each varied condition; dashed: the limit."""
+        return panels.settling(data.presses | data.varied, self.limit)
 
 
 FOAM = LeastSquaresFirstSeconds("6.1", press_runs.FOAMS, "plain foam", "least-squares-foam-settles", 0.12)

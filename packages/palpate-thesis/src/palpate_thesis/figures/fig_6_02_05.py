@@ -12,7 +12,8 @@ from palpate.bench import Experiment
 from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.drawing import ZERO, Axes, Figure
+from palpate_thesis.drawing import STATED, ZERO, Axes, Figure
+from palpate_thesis.drawing import panels as rows_of_panels
 from palpate_thesis.least_squares import panels, press_runs
 from palpate_thesis.least_squares.press_runs import PressEstimates, median
 from palpate_thesis.runs import Runs
@@ -127,7 +128,7 @@ def _ratio_claim(data: Data, id_: str) -> ThesisClaim:
 
 def _ratios(axis: Axes, data: Data) -> None:
     surface = next(iter(data.presses))
-    panels.set_title(axis, "g", f"Ratios of single samples (bars: 8 of 10), {surface}")
+    axis.set_title(f"Ratios of single samples (bars: 8 of 10), {surface}")
     for i, key in enumerate("KBM"):
         low, middle, high = np.median(data.ratios[key], axis=0) / data.truth[key]
         axis.plot([low, high], [i, i], color=style.MEASURED, linewidth=6, solid_capstyle="butt")
@@ -193,21 +194,23 @@ class Later:
         return least <= press.apart <= most
 
     def plot(self, data: Data) -> Figure:
-        """The thesis' six panels in the later slot; under them the ratios of single samples."""
-        drawing, axes = panels.grid(4)
-        panels.six(axes, data.shown, "thesis", press_runs.SLOT)
+        """The thesis' six panels in the later slot."""
+        drawing, axes = panels.grid(3)
+        press = data.shown[self.judged]
+        panels.six(axes, {self.judged: press}, "thesis", press_runs.SLOT)
         axes[5].set_ylim(*axes[4].get_ylim())
-        for name, press in data.shown.items():
-            level = 1e-3 * press_runs.ratio(press)
-            for axis in axes[4:6]:
-                axis.axhline(level, color=panels.COLORS[name], linewidth=0.9, linestyle="--")
-        presses = data.shown.values()
+        for axis in axes[4:6]:
+            axis.axhline(1e-3 * press_runs.ratio(press), **STATED)
+        inside = press_runs.between(press, *press_runs.SLOT)
         for axis, key in ((axes[1], "M"), (axes[3], "B")):
-            slots = (press[f"{key}_thesis"][press_runs.between(press, *press_runs.SLOT)] for press in presses)
-            panels.calm_limits(axis, np.zeros(1), *slots)
+            panels.calm_limits(axis, np.zeros(1), press[f"{key}_thesis"][inside])
             axis.axhline(0.0, **ZERO)
-        _ratios(axes[6], data)
-        axes[7].remove()
+        return drawing
+
+    def beside(self, data: Data) -> Figure:
+        """Estimates from single samples by the ratios of section 5.1."""
+        drawing, ((axis,),) = rows_of_panels([2.4])
+        _ratios(axis, data)
         return drawing
 
 

@@ -117,13 +117,11 @@ def _raw_signs(data: Data) -> list[ThesisClaim]:
 def plot(data: Data) -> Figure:
     """The six panels from raw signals."""
     drawing, axes = panels.grid(3)
-    shown = data.later.shown
-    panels.six(axes, shown, "raw", (0.0, press_runs.FIRST))
-    panels.calm_limits(axes[4], *(panels.calm_ratio(p, "force_sampled") for p in shown.values()))
+    surface, press = next(iter(data.later.shown.items()))
+    panels.six(axes, {surface: press}, "raw", (0.0, press_runs.FIRST))
+    panels.calm_limits(axes[4], panels.calm_ratio(press, "force_sampled"))
+    late = press_runs.between(press, 0.1, press_runs.FIRST)
     for axis, (key, (_, scale)) in zip(axes[1:6:2], panels.PARAMETERS.items(), strict=True):
-        curves = [
-            scale * p[f"{key}_raw"][press_runs.between(p, 0.1, press_runs.FIRST)] for p in shown.values()
-        ]
-        panels.calm_limits(axis, np.zeros(1), *curves)
+        panels.calm_limits(axis, np.zeros(1), scale * press[f"{key}_raw"][late])
         axis.axhline(0.0, **ZERO)
     return drawing

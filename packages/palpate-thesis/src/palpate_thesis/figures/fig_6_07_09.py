@@ -13,6 +13,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.drawing import STATED, Axes, Figure
+from palpate_thesis.drawing import panels as rows_of_panels
 from palpate_thesis.least_squares import panels
 from palpate_thesis.neural_identifier import claims, network
 from palpate_thesis.neural_identifier.claims import ClaimPart, Grounds
@@ -68,8 +69,8 @@ def _others(axes: list[Axes], data: Data, color: str) -> None:
     for axis, key, (_, scale) in zip(axes, "MBK", panels.PARAMETERS.values(), strict=True):
         column = "KBM".index(key)
         curves = [scale * curve[:, column] for curve in data.curves]
-        for other in curves[1:]:
-            axis.plot(t, other, color=color, linewidth=0.8, alpha=0.35)
+        for other in curves:
+            axis.plot(t, other, color=color, linewidth=0.8, alpha=0.6)
         squares = scale * data.press.squares[:, "MBK".index(key)]
         axis.plot(t, squares, color=style.MEASURED, linewidth=1.0, linestyle="--")
         panels.calm_limits(axis, *(c[CALM:] for c in curves), squares[200:], margin=0.1)
@@ -106,8 +107,18 @@ class NetworkFirstSeconds:
         drawing, axes = panels.grid(3)
         name = NAMES[data.grounds.surface]
         panels.six(axes, {name: _record(data)}, "probe", (0.0, network.PRESS))
-        _others(axes[1::2], data, panels.COLORS[name])
+        for axis, (_, scale), i in zip(axes[1::2], panels.PARAMETERS.values(), (2, 1, 0), strict=True):
+            panels.calm_limits(axis, scale * data.curves[0][CALM:, i])
         panels.calm_limits(axes[4], 1e-3 * data.press.force[CALM:] / data.press.inputs[CALM:, 0])
+        return drawing
+
+    def beside(self, data: Data) -> Figure:
+        """M, B and K of five starts, by least squares (dashed), and f/x (dotted)."""
+        drawing, rows = rows_of_panels([1.8, 1.8, 1.8])
+        axes = [row[0] for row in rows]
+        _others(axes, data, panels.COLORS[NAMES[data.grounds.surface]])
+        for axis, (label, _) in zip(axes, panels.PARAMETERS.values(), strict=True):
+            axis.set(ylabel=label, xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]")
         return drawing
 
 
@@ -117,17 +128,18 @@ class NetworkError(NetworkFirstSeconds):
 
     def plot(self, data: Data) -> Figure:
         """The error along a press."""
-        drawing, axes = panels.grid(1)
-        slow = f"Error with amplitude {SLOW.amplitude:g} N, weights to {SLOW.weights:g}"
-        for axis, error, letter, title in (
-            (axes[0], data.curves[0][:, 3], "a", "Error of the network of figure 6.7"),
-            (axes[1], network.learn(data.press, SLOW, 0)[1][:, 3], "b", slow),
-        ):
-            axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
-            axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
-            axis.axvline(0.6, **STATED)
-            axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
-            panels.set_title(axis, letter, title)
+        return self._error(data.curves[0][:, 3])
+
+    def beside(self, data: Data) -> Figure:
+        """The error with an amplitude of 25 N and weights to 0.01, which brings it near 0.6 s."""
+        return self._error(network.learn(data.press, SLOW, 0)[1][:, 3])
+
+    def _error(self, error: Array) -> Figure:
+        drawing, ((axis,),) = rows_of_panels([2.6])
+        axis.plot(np.arange(len(error)) * network.TICK, error, color=style.SERIES[0], linewidth=0.7)
+        axis.axhspan(-network.GONE, network.GONE, color=style.OK, alpha=0.15, linewidth=0)
+        axis.axvline(0.6, **STATED)
+        axis.set(xlim=(0.0, network.PRESS), xlabel="time since 5 N [s]", ylabel="error [N]")
         return drawing
 
 

@@ -1,21 +1,19 @@
 """Figure 6.10: the hybrid controller alone, without integral, on foam."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.bench import with_values
 from palpate.records import Record
 from palpate.studies.metrics.following import SHARE
-from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.drawing import Figure, force_panel, panels
-from palpate_thesis.force_control.tracking import FOAM, RUBBER, robustness, since_contact, slot
-from palpate_thesis.runs import Runs, stops_holding
+from palpate_thesis.force_control.tracking import FOAM, RUBBER, ForceStudy, Tracked, since_contact
 
-NUMBER = "6.10"
-HYBRID = {"controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0}}
-PARAMETERS = with_values(FOAM, {**HYBRID, "run.press": 15.0})
+HYBRID = {
+    "controller": {"kind": "hybrid", "kp": 400.0, "kv": 80.0, "kf": 0.25, "ki": 0.0},
+    "run.press": 15.0,
+}
+PARAMETERS = with_values(FOAM, HYBRID)
 SHOWN, FROM = (5.0, 15.0), 5.0
 
 
@@ -26,42 +24,26 @@ class Ends(NamedTuple):
     low: float  # at 10 N
 
 
-class Data(NamedTuple):
-    """Measured values for `check` and `plot`."""
+class HybridAlone(ForceStudy):
+    """Both levels have to be missed by more than a tenth of the desired force."""
 
-    shown: Record
-    nominal: list[Ends]
-    varied: dict[str, list[Ends]]
+    label, limit = "error at 20 N [N]", 20.0 * SHARE
 
+    def measure(self, record: Record) -> Ends:
+        """Errors at the ends of the intervals."""
+        return interval_ends(record)
 
-def run(runs: Runs) -> Data:
-    """Fifteen seconds of contact; the same on rubber and under the variations."""
-    nominal = runs.over_seeds(PARAMETERS, interval_ends)
-    varied = robustness(runs, PARAMETERS, nominal, interval_ends)
-    rubber = with_values(RUBBER, {**HYBRID, "run.press": 15.0})
-    varied["rubber"] = runs.over_seeds(rubber, interval_ends)
-    return Data(slot(runs.record(PARAMETERS), *SHOWN), nominal, varied)
+    def agrees(self, run: Ends) -> bool:
+        """True if both levels are missed."""
+        return misses(run)
 
+    def size(self, run: Ends) -> float:
+        """Error at 20 N without its sign."""
+        return abs(run.high)
 
-def check(data: Data) -> Sequence[ThesisClaim]:
-    """At both levels the error has to exceed a tenth of the desired force."""
-    return [
-        claim(
-            "hybrid-alone-falls-short",
-            often(map(misses, data.nominal)),
-            foam=data.nominal,
-            rubber=data.varied["rubber"],
-            share=SHARE,
-            where=stops_holding(data.varied, misses),
-        )
-    ]
-
-
-def plot(data: Data) -> Figure:
-    """Draw the two cycles of the figure."""
-    drawing, ((force,),) = panels([3.2])
-    force_panel(force, data.shown)
-    return drawing
+    def numbers(self, data: Tracked) -> dict[str, Any]:
+        """Errors on foam and on rubber."""
+        return {"foam": data.nominal, "rubber": data.varied["rubber"], "share": SHARE}
 
 
 def misses(ends: Ends) -> bool:
@@ -75,3 +57,10 @@ def interval_ends(record: Record) -> Ends:
     late = (t >= FROM) & (np.mod(t + 5e-7, 2.5) >= 1.5)
     error, desired = record["force"] - record["force_desired"], record["force_desired"]
     return Ends(float(error[late & (desired == 20.0)].mean()), float(error[late & (desired == 10.0)].mean()))
+
+
+STUDIES = (
+    HybridAlone(
+        "6.10", "hybrid-alone-falls-short", PARAMETERS, SHOWN, {"rubber": with_values(RUBBER, HYBRID)}
+    ),
+)

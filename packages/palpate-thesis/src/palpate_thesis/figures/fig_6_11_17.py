@@ -1,8 +1,7 @@
 """Figures 6.11 to 6.13, 6.16, 6.17: the neural controller follows steps, with a sine on top too, on foam and rubber."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,11 +9,11 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, with_values
 from palpate.records import Record
 from palpate.studies.metrics.following import LIMIT
-from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.drawing import LIMIT_LINE, Figure, force_panel, panels
+from palpate_thesis.claims import ThesisClaim, claim
+from palpate_thesis.drawing import LIMIT_LINE, Figure, panels
 from palpate_thesis.force_control import tracking
-from palpate_thesis.force_control.tracking import FOLLOWS, Tracked, Tracking, describe, since_contact, track
-from palpate_thesis.runs import Runs, stops_holding
+from palpate_thesis.force_control.tracking import FOLLOWS, ForceStudy, Tracked, Tracking, since_contact
+from palpate_thesis.runs import Runs
 
 JUDGED = (10.0, 15.0)
 SLOW_RATE = {"controller.learning_rate": 1e-5}
@@ -26,42 +25,40 @@ Window = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
-    """The figure of one surface and one desired force."""
+class Steps(ForceStudy):
+    """The figure of one surface and one desired force.
 
-    NUMBER: str
-    id: str  # of its claim
-    PARAMETERS: Experiment
-    shown: Window = (9.5, 13.5)  # time after contact [s]
+    Args:
+        judged: from when to when after contact the force is measured [s].
+        follows: statement of the thesis.
+    """
+
     judged: Window = JUDGED
-    follows: bool = True  # statement of the thesis
+    follows: bool = True
+    label, limit = "RMS error outside steps [N]", LIMIT
 
-    def run(self, runs: Runs) -> Tracked:
-        """All seeds, drawn and judged, and the variations."""
-        return track(runs, self.PARAMETERS, self.shown, self.judged)
+    def measure(self, record: Record) -> Tracking:
+        """Tracking error in the judged window."""
+        return tracking.tracking(*self.judged)(record)
 
-    def check(self, data: Tracked) -> Sequence[ThesisClaim]:
-        """The force has to follow, or not to follow, by the same limits for every desired force."""
-        return [
-            claim(
-                self.id,
-                often(map(self._as_said, data.nominal)),
-                described=describe(data.nominal),
-                limited=100 * float(np.median([run.saturated for run in data.nominal])),
-                follows=FOLLOWS,
-                following=tracking.FOLLOWING,
-                where=stops_holding(data.varied, self._as_said),
-            )
-        ]
-
-    def plot(self, data: Tracked) -> Figure:
-        """The force in the slot."""
-        drawing, ((force,),) = panels([3.2])
-        force_panel(force, data.shown)
-        return drawing
-
-    def _as_said(self, run: Tracking) -> bool:
+    def agrees(self, run: Tracking) -> bool:
+        """True if it follows as the thesis states."""
         return run.follows is self.follows
+
+    def size(self, run: Tracking) -> float:
+        """Error outside the steps [N]."""
+        return run.settled
+
+    def numbers(self, data: Tracked) -> dict[str, Any]:
+        """Errors and saturation in words."""
+        limited = 100 * float(np.median([run.saturated for run in data.nominal]))
+        described = tracking.describe(data.nominal)
+        return {
+            "described": described,
+            "limited": limited,
+            "follows": FOLLOWS,
+            "following": tracking.FOLLOWING,
+        }
 
 
 class Adapting(NamedTuple):
@@ -76,13 +73,13 @@ class Adapting(NamedTuple):
 class FromTheStart(Steps):
     """Steps judged from the first touch on, and how long adapting takes: the second of two cycles is settled."""
 
-    def run(self, runs: Runs) -> Adapting:  # type: ignore[override]
+    def run(self, runs: Runs) -> Adapting:
         """Two cycles; the second is the reference of the first."""
         away = runs.over_seeds(self.PARAMETERS, away_from_settled)
         t = np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64)
         return Adapting(super().run(runs), t, away[0], [adapted_at(distance) for distance in away])
 
-    def check(self, data: Adapting) -> Sequence[ThesisClaim]:  # type: ignore[override]
+    def check(self, data: Adapting) -> list[ThesisClaim]:
         """The force has to follow from the start; and adapting has to take from 2.5 to 7.5 s."""
         adapts = 2.5 <= float(np.median(data.adapted)) <= 7.5
         return [
@@ -90,15 +87,17 @@ class FromTheStart(Steps):
             claim(f"{self.id}.adapts", adapts, adapted=data.adapted, smoothed=SMOOTHED, limit=LIMIT),
         ]
 
-    def plot(self, data: Adapting) -> Figure:  # type: ignore[override]
-        """The beginning, and the way to the settled cycle."""
-        drawing, ((force,), (away,)) = panels([3.2, 1.5])
-        force_panel(force, data.tracked.shown)
+    def plot(self, data: Adapting) -> Figure:
+        """The first ten seconds of the force."""
+        return super().plot(data.tracked)
+
+    def beside(self, data: Adapting) -> Figure:
+        """Distance of the force from the settled cycles, mean over 0.25 s; dashed: the limit of adapted."""
+        drawing, ((away,),) = panels([2.2])
         shown = data.t < self.shown[1]
         away.plot(data.t[shown], data.away[shown])
         away.axhline(LIMIT, **LIMIT_LINE)
         away.set(xlabel="time since contact [s]", ylabel="deviation [N]", xlim=self.shown, ylim=(0.0, None))
-        away.set_title("from the settled cycle, mean over 0.25 s; dashed: limit of adapted")
         return drawing
 
 
@@ -126,10 +125,15 @@ FIRST = (0.0, 10.0)
 FOAM = Steps("6.11", "neural-foam-steps", _pressing(tracking.FOAM, 15.0))
 SINE = Steps("6.12", "neural-foam-sine", _pressing(tracking.FOAM, 15.0, **tracking.SINE), (9.75, 15.0))
 SLOW = Steps(
-    "6.13", "neural-slow-rate.first", _pressing(tracking.FOAM, 10.0, **SLOW_RATE), FIRST, FIRST, follows=False
+    "6.13",
+    "neural-slow-rate.first",
+    _pressing(tracking.FOAM, 10.0, **SLOW_RATE),
+    FIRST,
+    judged=FIRST,
+    follows=False,
 )
 RUBBER = Steps("6.16", "neural-rubber-steps", _pressing(tracking.RUBBER, 15.0))
 RUBBER_SINE = FromTheStart(
-    "6.17", "neural-rubber-sine", _pressing(tracking.RUBBER, 20.0, **tracking.SINE), FIRST, FIRST
+    "6.17", "neural-rubber-sine", _pressing(tracking.RUBBER, 20.0, **tracking.SINE), FIRST, judged=FIRST
 )
 STUDIES = (FOAM, SINE, SLOW, RUBBER, RUBBER_SINE)

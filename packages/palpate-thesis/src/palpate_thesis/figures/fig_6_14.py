@@ -13,7 +13,7 @@ from palpate.report import style
 from palpate.studies.metrics.following import LIMIT
 from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, spread
-from palpate_thesis.drawing import LIMIT_LINE, Figure, force_panel, panels
+from palpate_thesis.drawing import LIMIT_LINE, Figure, force_figure, panels
 from palpate_thesis.figures.fig_6_11_17 import SLOW_RATE
 from palpate_thesis.force_control.tracking import (
     FOAM,
@@ -83,9 +83,13 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """Six seconds after three minutes, and the course of the error."""
-    drawing, ((force,), (course,)) = panels([3.2, 2.4])
-    force_panel(force, data.shown)
+    """Six seconds after three minutes."""
+    return force_figure(data.shown)
+
+
+def beside(data: Data) -> Figure:
+    """Error outside the steps by cycles of 5 s, beside the equivalent integral controller; crosses: contact is lost."""
+    drawing, ((course,),) = panels([2.4])
     for (name, runs), color in zip(data.courses.items(), style.SERIES[:3], strict=True):
         for i, run in enumerate(runs):
             t = CYCLE * (np.arange(len(run.error)) + 0.5)

@@ -10,7 +10,7 @@ from palpate.records import Record
 from palpate.report import style
 from palpate.studies.metrics.window import rms
 from palpate_thesis.claims import ThesisClaim, claim, often
-from palpate_thesis.drawing import Axes, Figure, panels
+from palpate_thesis.drawing import Axes, Figure, panels, strip
 from palpate_thesis.force_control.tracking import FOAM, RUBBER, since_contact, slot
 from palpate_thesis.runs import Runs, by_condition, rougher
 
@@ -82,17 +82,23 @@ def check(data: Data) -> Sequence[ThesisClaim]:
 
 
 def plot(data: Data) -> Figure:
-    """The four signals of the thesis' figure, and the causes."""
+    """The four signals of the thesis' figure."""
     drawing, ((desired,), (force,), (y,), (phi,)) = panels([0.9, 1.3, 1.0, 1.0])
     shown, t = data.shown, data.shown["t"]
     _signal(desired, t, shown["force_desired"], "(a) desired\nforce [N]", style.INK)
     _signal(force, t, shown["force_measured"], "(b) measured\nforce [N]", style.MEASURED)
-    force.plot(t, shown["force"], color=style.F, linewidth=1.6, label="true")
     _signal(y, t, 1e3 * shown["y_measured"], "(c) y error\n[mm]", style.SERIES[0])
     _signal(phi, t, np.degrees(shown["phi_measured"]), "(d) angle\nerror [degrees]", style.SERIES[0])
     for axis in (y, phi):
         axis.axhline(0.0, **style.KNOWN)
     phi.set_xlabel("time since contact [s]")
+    return drawing
+
+
+def beside(data: Data) -> Figure:
+    """Error of y with one cause changed at a time."""
+    drawing, ((axis,),) = panels([2.2])
+    strip(axis, {name: [1e3 * e.y for e in runs] for name, runs in data.varied.items()}, "RMS of y [mm]")
     return drawing
 
 

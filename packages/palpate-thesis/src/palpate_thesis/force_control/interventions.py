@@ -140,12 +140,3 @@ def run_with(experiment: Experiment, seed: int, disturbances: Sequence[Disturban
 
 def _finite(rows: Sequence[np.ndarray]) -> bool:
     return bool(np.isfinite(rows[-1]).all())
-
-
-def surface_back(by: float) -> Change:
-    """Retract the surface by a distance [m]."""
-
-    def change(loop: Loop, state: LoopState) -> tuple[Loop, LoopState]:
-        return loop._replace(plant=loop.plant._replace(wall=loop.plant.wall + by)), state
-
-    return change

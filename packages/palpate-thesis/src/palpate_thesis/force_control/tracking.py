@@ -1,7 +1,9 @@
 """Experiments of force control, the criterion of following, and varied conditions."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -12,8 +14,9 @@ from palpate.records import Record
 from palpate.studies.metrics import Window
 from palpate.studies.metrics.following import LIMIT, SHARE, interval_error
 from palpate.studies.metrics.window import SETTLE, rms
-from palpate_thesis.claims import often, spread
-from palpate_thesis.runs import RELAXING_FOAM, SHORT, VARIED_SEEDS, Runs, friction_and_pose
+from palpate_thesis.claims import ThesisClaim, claim, often, spread
+from palpate_thesis.drawing import Figure, force_figure, panels, strip
+from palpate_thesis.runs import RELAXING_FOAM, SHORT, VARIED_SEEDS, Runs, friction_and_pose, stops_holding
 
 T = TypeVar("T")
 
@@ -125,26 +128,69 @@ def robustness(
 
 
 class Tracked(NamedTuple):
-    """Data of a figure of force tracking."""
+    """Data of a figure of force control."""
 
     shown: Record
-    nominal: list[Tracking]
-    varied: dict[str, list[Tracking]]
+    nominal: list[Any]  # what `ForceStudy.measure` returns, one a seed
+    varied: dict[str, list[Any]]  # the same by variation
 
 
-def track(
-    runs: Runs, experiment: Experiment, shown: tuple[float, float], judged: tuple[float, float]
-) -> Tracked:
-    """Runs an experiment over the seeds and under its variations.
+@dataclass(frozen=True, eq=False)
+class ForceStudy(ABC):
+    """A figure of the force: an experiment, a metric, a threshold and a panel.
 
     Args:
-        runs: of how many seeds.
-        experiment: long enough for both windows.
+        NUMBER: of the figure.
+        id: of its claim.
+        PARAMETERS: experiment, long enough for all windows.
         shown: from when to when after contact the force is drawn [s].
-        judged: from when to when it is measured [s].
+        others: experiments that are measured over all seeds as well, among the variations.
     """
-    measure = tracking(*judged)
-    nominal = runs.over_seeds(experiment, measure)
-    return Tracked(
-        slot(runs.record(experiment), *shown), nominal, robustness(runs, experiment, nominal, measure)
-    )
+
+    NUMBER: str
+    id: str
+    PARAMETERS: Experiment
+    shown: tuple[float, float] = (9.5, 13.5)
+    others: Mapping[str, Experiment] = field(default_factory=dict)
+    label: ClassVar[str]
+    limit: ClassVar[float]
+
+    @abstractmethod
+    def measure(self, record: Record) -> Any:
+        """The metric of a run."""
+
+    @abstractmethod
+    def agrees(self, run: Any) -> bool:
+        """True if a run does what the thesis says."""
+
+    @abstractmethod
+    def size(self, run: Any) -> float:
+        """Number of a run that is drawn beside `limit`, under the `label`."""
+
+    @abstractmethod
+    def numbers(self, data: Tracked) -> dict[str, Any]:
+        """Values of the placeholders in the claim's texts."""
+
+    def run(self, runs: Runs) -> Any:
+        """All seeds, and the variations."""
+        nominal = runs.over_seeds(self.PARAMETERS, self.measure)
+        varied = robustness(runs, self.PARAMETERS, nominal, self.measure) | runs.by_name(
+            self.others, self.measure
+        )
+        return Tracked(slot(runs.record(self.PARAMETERS), *self.shown), nominal, varied)
+
+    def check(self, data: Any) -> list[ThesisClaim]:
+        """Does the force do as the thesis says in enough of the runs?"""
+        good = often(map(self.agrees, data.nominal))
+        return [claim(self.id, good, where=stops_holding(data.varied, self.agrees), **self.numbers(data))]
+
+    def plot(self, data: Any) -> Figure:
+        """The force in the slot."""
+        return force_figure(data.shown)
+
+    def beside(self, data: Any) -> Figure:
+        """Error of each run under each variation; dashed: the limit."""
+        drawing, ((axis,),) = panels([2.2])
+        sizes = {name: list(map(self.size, runs)) for name, runs in data.varied.items()}
+        strip(axis, sizes, self.label, self.limit)
+        return drawing

@@ -1,15 +1,16 @@
 """The six panels in which the thesis shows an identification, two a row, and rows of ours under them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.records import Record
 from palpate.report import style
-from palpate_thesis.drawing import Axes, Figure
+from palpate_thesis.drawing import Axes, Figure, strip
+from palpate_thesis.drawing import panels as rows_of_panels
 from palpate_thesis.least_squares import press_runs
-from palpate_thesis.least_squares.press_runs import between
+from palpate_thesis.least_squares.press_runs import PressEstimates, between
 
 COLORS = {"plain foam": style.SERIES[0], "relaxing foam": style.SERIES[1], "rubber": style.SERIES[2]}
 PARAMETERS = {"M": ("$M_e$ [kg]", 1.0), "B": ("$B_e$ [N s/m]", 1.0), "K": ("$K_e$ [kN/m]", 1e-3)}
@@ -66,6 +67,14 @@ def _lines(
     left[2].plot(t, 1e-3 * force / far, color=color, linewidth=0.7)
     for axis, (key, (_, scale)) in zip(right, PARAMETERS.items(), strict=True):
         axis.plot(t, scale * press[f"{key}_{front}"][rows], color=color, linewidth=1.1)
+
+
+def settling(presses: Mapping[str, Sequence[PressEstimates]], limit: float) -> Figure:
+    """Time until K_e is settled, a dot a press, by surface and condition; dashed: the limit [s]."""
+    drawing, ((axis,),) = rows_of_panels([2.2])
+    times = {name.replace(" ", "\n", 1): [p.settled_K for p in each] for name, each in presses.items()}
+    strip(axis, times, "K_e settled after [s]", limit)
+    return drawing
 
 
 def calm_limits(axis: Axes, *curves: Array, margin: float = 0.25) -> None:
