@@ -247,7 +247,7 @@ def laboratory_at(fractions: Sequence[float]) -> Laboratory:
     return Laboratory(**{u.name: u.quantile(f) for u, f in zip(UNKNOWNS, fractions, strict=True)})
 
 
-def fractions_of(laboratory: Laboratory) -> tuple[float, ...]:
+def prior_fractions(laboratory: Laboratory) -> tuple[float, ...]:
     """Fractions of the priors below a laboratory's values, in the order of `UNKNOWNS`; 1 for a value that is absent."""
     values = laboratory.numbers()
     return tuple(u.fraction(values[u.name]) if u.name in values else 1.0 for u in UNKNOWNS)

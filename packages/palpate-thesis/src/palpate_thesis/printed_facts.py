@@ -13,7 +13,7 @@ from palpate.identifiers.neural_probe import SETTINGS
 from palpate.robots.arm3 import Arm3
 from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_15
 from palpate_thesis.laboratory import Laboratory
-from palpate_thesis.neural_identifier.network import network_of
+from palpate_thesis.neural_identifier.network import identifier_network
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     "press on foam": load("foam-rls"),
@@ -78,7 +78,7 @@ def subjects(laboratory: Laboratory) -> dict[str, Any]:
     """The arm, every experiment, the identifier and its probes in a laboratory, by name."""
     return {
         "arm": Arm3(),
-        "identifier": network_of(laboratory),
+        "identifier": identifier_network(laboratory),
         **{f"probe on {surface}": setting for surface, setting in SETTINGS.items()},
         **{name: laboratory.adapt(experiment) for name, experiment in EXPERIMENTS.items()},
     }

@@ -23,10 +23,10 @@ from palpate_thesis.laboratory import (
     BENCH,
     UNKNOWNS,
     Laboratory,
-    fractions_of,
     laboratory_at,
     laboratory_text,
     load_laboratory,
+    prior_fractions,
 )
 from palpate_thesis.printed_facts import contradictions
 from palpate_thesis.runs import sources_digest
@@ -187,7 +187,7 @@ class LaboratorySearch:
             sobol = Sobol(len(UNKNOWNS), self.seed)
             points = [tuple(sobol.point(number)) for number in range(done, done + GENERATION)]
             if done == 0 and self.start is not None:
-                points[0] = fractions_of(load_laboratory(self.start))
+                points[0] = prior_fractions(load_laboratory(self.start))
             return points
         parents = sorted(tried, key=lambda laboratory: -len(laboratory.true))[:PARENTS]
         rng = np.random.default_rng([self.seed, done])
@@ -237,8 +237,8 @@ class LaboratorySearch:
             for tried in [laboratory for laboratory in ranked if name in laboratory.true][:ATTEMPTS]:
                 laboratory = laboratory_at(tried.fractions)
                 among = [s for s in missing.values() if s.id in tried.true]
-                held = self._count_seeds(state, laboratory, among)
-                true = tuple(s.id for s in among if s.is_true(held[s.id], len(SEEDS)))
+                counts = self._count_seeds(state, laboratory, among)
+                true = tuple(s.id for s in among if s.is_true(counts[s.id], len(SEEDS)))
                 if name in true:
                     plausible.append((laboratory, true))
                     missing = {key: s for key, s in missing.items() if key not in true}
@@ -247,7 +247,7 @@ class LaboratorySearch:
 
     def _find_sensitivity(self, laboratory: Laboratory) -> dict[str, tuple[str, ...]]:
         """Change one unknown at a time to values of its prior, and find the sentences whose truth changes."""
-        reference, point = self._true_once(laboratory), list(fractions_of(laboratory))
+        reference, point = self._true_once(laboratory), list(prior_fractions(laboratory))
         changed: dict[str, tuple[str, ...]] = {}
         for i, u in enumerate(UNKNOWNS):
             others = [laboratory_at([*point[:i], fraction, *point[i + 1 :]]) for fraction in VALUES]

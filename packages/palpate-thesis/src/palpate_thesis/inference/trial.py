@@ -114,7 +114,7 @@ class Trial:
         """K, B and M of this laboratory's network over a press, at a learning rate."""
         lab = self.laboratory
         return network.answer(
-            press, network.network_of(lab, rate), int(self.seed if lab.start is None else lab.start)
+            press, network.identifier_network(lab, rate), int(self.seed if lab.start is None else lab.start)
         )
 
     @cached_property

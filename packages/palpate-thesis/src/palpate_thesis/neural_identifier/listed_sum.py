@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from palpate._jit import kernel, law
-from palpate._jit.typed_edge import machine_code
+from palpate.bench import kernel, law
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
 from palpate.networks.network import backward, descend, forward, sigmoid
 
@@ -43,9 +42,7 @@ class ListedSumProbe(NeuralProbe):
         return float(self._net.amplitude[0] * said)
 
     def _bind(self) -> None:
-        self._follow = machine_code(
-            _follow, *self._arguments, np.empty((0, 3)), np.empty(0), np.empty((0, 4))
-        )
+        self._follow = _follow
 
 
 @law

@@ -116,10 +116,10 @@ class NetworkChoice(NamedTuple):
 
 def chosen_network(runs: Runs) -> NetworkChoice:
     """The network of the runs' laboratory."""
-    return network_of(runs.laboratory)
+    return identifier_network(runs.laboratory)
 
 
-def network_of(laboratory: Laboratory, rate: float = 1e-4) -> NetworkChoice:
+def identifier_network(laboratory: Laboratory, rate: float = 1e-4) -> NetworkChoice:
     """The network of a laboratory."""
     lab = laboratory
     return NetworkChoice(lab.amplitude, lab.weights, rate=rate, listed_sum=lab.output_sum == 1.0)
