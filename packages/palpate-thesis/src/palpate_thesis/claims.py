@@ -211,7 +211,9 @@ def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:
     def kind(claim: ThesisClaim) -> str:
         return CONCLUSION if claim.id.startswith(CONCLUSION) else claim.of
 
-    counted = {name: Counter(c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS}
+    counted = {
+        name: Counter[str](c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS
+    }
     return {name: counts for name, counts in counted.items() if counts}
 
 

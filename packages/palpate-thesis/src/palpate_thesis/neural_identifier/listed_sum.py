@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate.bench import kernel, law
 from palpate.identifiers.neural_probe import NeuralProbe, Probed
@@ -34,7 +35,7 @@ class ListedSumProbe(NeuralProbe):
         at_zero = self.force((0.0, 0.0, 0.0))
         return Probed(pressed / x, (moving - pressed) / v, mass, at_zero, self._warnings(np.array([x, v, a])))
 
-    def force(self, regressor) -> float:
+    def force(self, regressor: ArrayLike) -> float:
         """Force of the network for displacement, velocity and acceleration, shape (3,) [N]."""
         signals = self._memory.signals.copy()
         x, v, a = self.scale * np.asarray(regressor, dtype=np.float64)
