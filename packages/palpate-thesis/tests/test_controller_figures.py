@@ -1,4 +1,4 @@
-"""What the figures of the controllers stand on: changes in mid-run, the linear force loop, and their measures."""
+"""What the figures of the controllers stand on: the linear force loop, and friction compensation."""
 
 from functools import reduce
 
@@ -6,33 +6,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from palpate.bench import build, load, with_values
+from palpate.bench import load, with_values
 from palpate.instruments import force_sensor
 from palpate.signals.filters import butterworth2
 from palpate_thesis.explanations import e6_friction_compensation as compensation
 from palpate_thesis.figures.fig_4_03 import LoopParameters
-from palpate_thesis.force_control.interventions import (
-    run_with,
-)
-from palpate_thesis.force_control.tracking import since_contact
-from palpate_thesis.runs import SHORT, rougher
+from palpate_thesis.runs import SHORT, Runs, rougher
 
 FOAM = with_values(load("foam-hybrid"), {**SHORT, "run.press": 1.2})
-
-
-def around(record, name, at):
-    """Mean of a column over the 20 ms before and after a time since contact; a row shows the step before it."""
-    t, column = since_contact(record), record[name]
-    return column[(t >= at - 0.02) & (t < at - 5e-7)].mean(), column[
-        (t >= at + 0.002) & (t < at + 0.02)
-    ].mean()
-
-
-def test_a_run_without_turns_is_the_benchs_own_bit_for_bit():
-    ours = run_with(FOAM, 3, [])
-    theirs = build(FOAM).run(FOAM.run.duration, 3, press=FOAM.run.press)
-    for name in theirs.columns:
-        assert np.array_equal(ours[name], theirs[name]), name
 
 
 def swings(loop, stiffness, seconds=3.0, physics=20000):
@@ -113,7 +94,7 @@ def test_a_hopeless_loop_has_no_limit():
 
 
 def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
-    record = run_with(compensation.PLAIN, 0, [])
+    record = Runs((0,)).record(compensation.PLAIN)
     assert compensation.listing_factor(record) < 1e-6
     slow = {f"q{i}": record[f"q{i}"] for i in (1, 2, 3)}
     finer = with_values(compensation.PLAIN, {"encoders.counts": (6.144e8, 4.096e8, 2e6)})
@@ -125,7 +106,7 @@ def test_the_listings_rule_stays_at_zero_and_would_show_if_it_did_not():
 
 def test_compensation_that_acts_lessens_the_error_and_a_short_blend_shakes():
     plain, wide, short = (
-        compensation.held_in(run_with(e, 0, []))
+        compensation.held_in(Runs((0,)).record(e))
         for e in (
             compensation.PLAIN,
             compensation.PARAMETERS,

@@ -1,6 +1,6 @@
-"""Runs whose state is looked at or changed between ticks: the network's weights, the surface."""
+"""Runs in which the weights of the neural controller are looked at or changed between ticks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,11 +8,9 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.bench import Experiment, build
 from palpate.bench.force_input import COLUMNS
-from palpate.bench.plant import Loop, LoopState
-from palpate.bench.summary import CONTACT, DIVERGED, DONE, LOST
+from palpate.bench.summary import CONTACT, LOST
 from palpate.controllers import alone
 from palpate.controllers.neural import NeuralState
-from palpate.records import Record
 
 LOOK = 1000
 """Ticks between two looks at the weights, unless others are given."""
@@ -86,57 +84,3 @@ def hold(columns: slice) -> Callable[[WeightsAtMoment], None]:
             layers(moment.neural)[0][:, columns] = 0.0
 
     return look
-
-
-CONTACT_LOOK = 100
-"""Ticks between two looks for the first contact."""
-
-Change = Callable[[Loop, LoopState], tuple[Loop, LoopState]]
-
-
-class Disturbance(NamedTuple):
-    """A change between two ticks.
-
-    Args:
-        at: time since the first contact [s], at least a tenth of a second.
-        change: returns the changed loop and state, of the same types, so that nothing is compiled again.
-    """
-
-    at: float
-    change: Change
-
-
-def run_with(experiment: Experiment, seed: int, disturbances: Sequence[Disturbance]) -> Record:
-    """Run like `Bench.run`, from the same random numbers, for `press` seconds of contact, with the disturbances.
-
-    Args:
-        experiment: any; it runs on after losses of contact.
-        seed: of the noise.
-        disturbances: in the order of their times.
-
-    Returns:
-        Rows up to the end, or to the first that is not finite; ``meta["disturbances"]`` has the times [s].
-    """
-    bench = build(experiment)
-    tick, march = bench.loop.tick, bench.simulation(seed)
-    rows = [march.advance(CONTACT_LOOK)]
-    while march.ticks < round(experiment.run.duration / tick) and _finite(rows) and march.contact is None:
-        rows.append(march.advance(CONTACT_LOOK))
-    contact = march.ticks if march.contact is None else march.contact
-    for at, change in [(t.at, t.change) for t in disturbances] + [(experiment.run.press, None)]:
-        remaining = contact + round(at / tick) - march.ticks
-        if remaining > 0 and _finite(rows):
-            rows.append(march.advance(remaining))
-        if change is not None:
-            march.loop, march.state = change(march.loop, march.state)
-    table = np.concatenate(rows)
-    finite = np.isfinite(table).all(axis=1)
-    table = table if finite.all() else table[: int(np.argmin(finite))]
-    columns = {name: table[:, i].copy() for i, name in enumerate(COLUMNS)}
-    times = [contact * tick + disturbance.at for disturbance in disturbances]
-    end = DONE if finite.all() else DIVERGED
-    return Record(columns, COLUMNS, {**bench.meta, "seed": seed, "end": end, "disturbances": times})
-
-
-def _finite(rows: Sequence[np.ndarray]) -> bool:
-    return bool(np.isfinite(rows[-1]).all())
