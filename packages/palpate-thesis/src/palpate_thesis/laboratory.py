@@ -53,7 +53,8 @@ class Unknown:
     def quantile(self, fraction: float) -> float:
         """The value below which this fraction of the prior lies, 0 to 1."""
         if self.prior == "log-even":
-            return math.exp((1.0 - fraction) * math.log(self.low) + fraction * math.log(self.high))
+            value = math.exp((1.0 - fraction) * math.log(self.low) + fraction * math.log(self.high))
+            return min(max(value, self.low), self.high)  # rounding passes the ends
         if self.prior == "even":
             return (1.0 - fraction) * self.low + fraction * self.high
         values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
