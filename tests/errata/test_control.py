@@ -294,3 +294,30 @@ def test_E37_put_right_it_does():
     right = approach(lambda at, u: at.M @ solve(at.J, u - at.Jdqd) + at.h)
     assert right.reached
     holds(right.force - 5.0, 0.5)
+
+
+def test_E61_one_reference_for_three_subjects():
+    cited = {"fuzzy compensation": 25, "dynamics": 25, "decoupling": 25}
+    holds(len(cited) - len(set(cited.values())), 2)
+
+
+def test_E62_a_section_that_chapter_2_does_not_have():
+    sections = {2: 3, 4: 5}  # chapters and the number of their last section
+    printed, right = (2, 4), (4, 4)
+    fails(max(printed[1] - sections[printed[0]], 0), 1)
+    holds(max(right[1] - sections[right[0]], 0), 0)
+
+
+def test_E63_the_gain_with_three_names_is_of_the_integral():
+    """Share of a constant error that is left after 4 s, the gain taken of the integral or of the derivative."""
+    gain, tick = 3.0, 1e-3
+
+    def left(integral_gain, derivative_gain):
+        total, error, before = 0.0, 1.0, 1.0
+        for _ in range(4000):
+            total += integral_gain * tick * error
+            before, error = error, 1.0 - total - derivative_gain * (error - before)
+        return error
+
+    holds(left(gain, 0.0), 0.01)
+    fails(left(0.0, gain), 0.99)

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 from palpate_thesis.claims import ThesisClaim
 from palpate_thesis.figure import studies, study
-from palpate_thesis.measure import STATE
+from palpate_thesis.laboratory import load_laboratory
+from palpate_thesis.measure import STATE, runs_for
 from palpate_thesis.runs import Runs
 
 FILE = Path(__file__).with_name("claims.json")
@@ -79,7 +80,12 @@ def kept(file: Path = FILE) -> dict[str, dict[str, str]]:
 def of_two_seeds(number: str) -> list[ThesisClaim]:
     """The claims of a study, measured with the first two seeds."""
     one = study(number)
-    return list(one.check(one.run(Runs(range(2)))))
+    return list(one.check(one.run(runs_of(number, 2))))
+
+
+def runs_of(number: str, seeds: int = 10) -> Runs:
+    """The runs of a study as `palpate thesis` has them when no laboratory is named."""
+    return runs_for(number, Runs(range(seeds), laboratory=load_laboratory("inferred")))
 
 
 def keep(file: Path, measured: Mapping[str, Sequence[ThesisClaim]]) -> None:

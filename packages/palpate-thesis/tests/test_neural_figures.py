@@ -128,9 +128,14 @@ def test_an_error_that_changes_sign_is_still_an_error():
     assert fig_6_15.measure_free_errors(record).y == pytest.approx(2e-3)
 
 
+@pytest.mark.parametrize("restart", [0.0, 5.0])
 @pytest.mark.parametrize("adapts", [1.0, 4.0])
-def test_the_time_of_adapting_is_found(adapts):
-    record = pressed(lambda t, d: d - np.where(t < adapts, 5.0, 0.0), seconds=20.0)
+def test_the_time_of_adapting_is_found_whether_the_clock_restarts_or_not(adapts, restart):
+    def force(t, d):
+        sine = 3.0 * np.sin(np.pi * (np.mod(t, restart) if restart else t))
+        return d + sine - np.where(t < adapts, 5.0, 0.0)
+
+    record = pressed(force, seconds=20.0)
     assert fig_6_11_17.adapted_at(fig_6_11_17.away_from_settled(record)) == pytest.approx(
         adapts, abs=fig_6_11_17.SMOOTHED
     )

@@ -29,7 +29,7 @@ def test_it_opens_alone_and_is_no_wider_than_the_screen(browser, index, width, s
 def test_claims_of_one_verdict_are_shown(browser, index):
     with open_page(browser, index) as page:
         every = page.locator(".claim").count()
-        page.click("#filter button[value=differs]")
+        page.click("#filter button[value=contradicted]")
         left = page.locator(".claim:visible").count()
         assert 0 < left < every
         assert page.locator("#shown").text_content() == f"{left} of {every} shown"

@@ -6,13 +6,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from palpate.report.page import Table
 
-Verdict = Literal["reproduced", "differs", "not checkable"]
+Verdict = Literal["reproduced", "reproduced in a plausible laboratory", "contradicted", "not checkable"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+Of = Literal["experiment", "cited", "ours"]
+CONCLUSION = "conclusion"
+"""Beginning of the names of the claims of section 7.1, which are of the experiments, too, and counted apart."""
+KINDS: Mapping[str, str] = {
+    "experiment": "about the experiments",
+    CONCLUSION: "of the conclusions, section 7.1",
+    "cited": "about the set-up and the schemes that it cites",
+    "ours": "that we add, checks and explanations",
+}
+"""What the sentences are about that are counted together, in the order of the counts, which are never summed."""
 ENOUGH = 0.9
 """Fraction of the runs in which a claim has to hold."""
 
@@ -28,8 +39,9 @@ class ThesisClaim:
         thesis: its value, with unit; or "in words" where it gives none.
         measured: ours, with spread over the seeds, unit and seeds: see `spread`.
         tolerance: the threshold that decides, stated before looking: "within 10 % of the value at 4 s by 0.12 s".
-        verdict: reproduced, differs, or not checkable.
+        verdict: one of `VERDICTS`.
         note: one paragraph: the reason, the chosen values and their effect, the range of validity.
+        of: sentence of the thesis about its experiments; about its set-up or a cited scheme; or ours.
         group: True if the row only sums up its parts; then it is not counted.
     """
 
@@ -41,6 +53,7 @@ class ThesisClaim:
     tolerance: str
     verdict: Verdict
     note: str
+    of: Of = "ours"
     group: bool = False
 
 
@@ -65,9 +78,31 @@ class Done:
     tables: list[Table] = field(default_factory=list)
 
 
-def verdict_of(holds: bool) -> Verdict:
-    """Verdict of a claim that can be checked."""
-    return "reproduced" if holds else "differs"
+def verdict_of(id_: str, holds: bool) -> Verdict:
+    """Verdict of a claim that can be checked, in the laboratory of its runs.
+
+    A sentence about an experiment that does not hold there may hold in another shipped laboratory, which keeps all
+    printed values too and was found for it: see `plausible_laboratories`.
+    """
+    if holds:
+        return "reproduced"
+    return "reproduced in a plausible laboratory" if id_ in plausible_laboratories() else "contradicted"
+
+
+@cache
+def plausible_laboratories() -> Mapping[str, str]:
+    """Name of the laboratory that was chosen for a sentence, by the sentence; see `sentences` in its file."""
+    folder = resources.files("palpate_thesis") / "laboratories"
+    files = {f.name.removesuffix(".toml"): tomllib.loads(f.read_text("utf-8")) for f in folder.iterdir()}
+    return {id_: name for name, file in sorted(files.items()) for id_ in file.get("sentences", ())}
+
+
+@cache
+def experiment_sentences() -> frozenset[str]:
+    """Names of the sentences of the thesis about its experiments: those of halves.toml."""
+    text = (resources.files("palpate_thesis") / "inference" / "halves.toml").read_text("utf-8")
+    figures = tomllib.loads(text).values()
+    return frozenset(id_ for figure in figures for id_ in (*figure["claims"], *figure.get("besides", ())))
 
 
 def often(holds: Iterable[bool]) -> bool:
@@ -141,8 +176,11 @@ def claim(id_: str, holds: bool | Verdict, /, **numbers: Any) -> ThesisClaim:
     while "like" in row:
         row = {**tables()["claims"][row.pop("like")], **row}
     values = {k: _Spread(v) if isinstance(v, list | np.ndarray) else v for k, v in numbers.items()}
-    filled: dict[str, Any] = {name: text.format(**values) for name, text in row.items()}
-    return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(holds), **filled)
+    row.pop("reason", None)
+    filled: dict[str, Any] = {"of": "ours", **{name: text.format(**values) for name, text in row.items()}}
+    if id_ in experiment_sentences() or id_.startswith(CONCLUSION):
+        filled["of"] = "experiment"
+    return ThesisClaim(id=id_, verdict=holds if isinstance(holds, str) else verdict_of(id_, holds), **filled)
 
 
 def claims_of_studies(studies: Sequence[Done]) -> list[ThesisClaim]:
@@ -153,7 +191,8 @@ def claims_of_studies(studies: Sequence[Done]) -> list[ThesisClaim]:
 def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
     """Insert a row "a" before the first of the parts "a.K", "a.B" of a claim that was measured in parts only.
 
-    Such a row is reproduced if all its parts are; "not checkable" if all are not checkable.
+    Such a row has the last of the verdicts of its parts, in the order of `VERDICTS`, but what cannot be checked
+    decides only where all of its parts are such.
     """
     ids = {claim.id for claim in claims}
     rows: list[ThesisClaim] = []
@@ -166,17 +205,29 @@ def with_wholes(claims: Sequence[ThesisClaim]) -> list[ThesisClaim]:
     return rows
 
 
-def count_verdicts(claims: Sequence[ThesisClaim]) -> Counter[str]:
-    """Number of claims by verdict, without the rows that sum up others."""
-    return Counter(claim.verdict for claim in claims if not claim.group)
+def count_verdicts(claims: Sequence[ThesisClaim]) -> dict[str, Counter[str]]:
+    """Number of claims by kind and verdict, without the rows that sum up others; kinds without a claim are left out."""
+
+    def kind(claim: ThesisClaim) -> str:
+        return CONCLUSION if claim.id.startswith(CONCLUSION) else claim.of
+
+    counted = {
+        name: Counter[str](c.verdict for c in claims if kind(c) == name and not c.group) for name in KINDS
+    }
+    return {name: counts for name, counts in counted.items() if counts}
 
 
-def count_in_words(claims: Sequence[ThesisClaim]) -> str:
-    """The counts as a sentence: "87 claims measured: 48 reproduced, 38 differ, 1 not checkable"."""
-    counts = count_verdicts(claims)
-    words = {"reproduced": "reproduced", "differs": "differ", "not checkable": "not checkable"}
-    parts = ", ".join(f"{counts[verdict]} {word}" for verdict, word in words.items())
-    return f"{counts.total()} claim{'s' * (counts.total() != 1)} measured: {parts}"
+def count_in_words(claims: Sequence[ThesisClaim]) -> list[str]:
+    """A line for each kind: "49 sentences about the experiments: 41 reproduced, 4 contradicted"."""
+    lines = []
+    for kind, counts in count_verdicts(claims).items():
+        parts = ", ".join(
+            f"{counts[verdict]} {verdict}"
+            for verdict in VERDICTS
+            if counts[verdict] or verdict == "reproduced"
+        )
+        lines.append(f"{counts.total()} sentence{'s' * (counts.total() != 1)} {KINDS[kind]}: {parts}")
+    return lines
 
 
 def _name(claim: ThesisClaim) -> str:
@@ -186,7 +237,7 @@ def _name(claim: ThesisClaim) -> str:
 
 def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
     verdicts = {part.verdict for part in parts}
-    verdict: Verdict = verdicts.pop() if len(verdicts) == 1 else "differs"
+    verdict = max(verdicts - {"not checkable"} or verdicts, key=VERDICTS.index)
     measured = [f"{part.id.rpartition('.')[2]}: {part.verdict}" for part in parts]
     return ThesisClaim(
         id=name,
@@ -198,5 +249,6 @@ def _whole(name: str, parts: Sequence[ThesisClaim]) -> ThesisClaim:
         verdict=verdict,
         note="One sentence of the thesis makes several claims. Each is measured separately: see the rows "
         f"{', '.join(part.id for part in parts)}.",
+        of=parts[0].of,
         group=True,
     )

@@ -11,7 +11,6 @@ from cyclopts import Group, Parameter, validators
 
 from palpate.cli.options.common import WRITTEN, FigureOptions
 from palpate.cli.toolkit import COMPILING, bar, console, place, print_lines, say, show_table
-from palpate.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,10 +19,12 @@ if TYPE_CHECKING:
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
-EXPERIMENTS = ("4.2", "4.4", "6.", "7.")
-"""Prefixes of the numbers of the figures that show the thesis' own experiments."""
-COLORS = {"reproduced": "green", "differs": "yellow", "not checkable": "bright_black"}
-
+COLORS = {
+    "reproduced": "green",
+    "reproduced in a plausible laboratory": "cyan",
+    "contradicted": "yellow",
+    "not checkable": "bright_black",
+}
 
 _MEASURED = Group("Measurement", sort_key=1)
 
@@ -32,7 +33,7 @@ def thesis(
     figure: str | None = None,
     /,
     *,
-    laboratory: Annotated[str, Parameter(group=_MEASURED)] = "bench",
+    laboratory: Annotated[str, Parameter(group=_MEASURED)] = "inferred",
     seeds: Annotated[int, Parameter(group=_MEASURED, validator=validators.Number(gte=10, lte=1000))] = 10,
     list_: Annotated[bool, Parameter(group=_MEASURED, name="--list", negative="")] = False,
     out: Annotated[Path | None, Parameter(group=WRITTEN)] = None,
@@ -52,8 +53,8 @@ def thesis(
     figure
         The number of one figure, "6.11", or the name of one explanation; all of them when left out.
     laboratory
-        "bench", chosen by hand; "inferred" from the thesis; or a TOML file as `palpate laboratory` writes. In the
-        latter two, only the figures of the thesis' own experiments are measured.
+        Where the thesis' own experiments are measured: "inferred" from its sentences, with all printed values;
+        "bench", chosen by hand; or a TOML file as `palpate laboratory` writes. Other figures are of the bench.
     seeds
         Noise seeds for every measured claim.
     list_
@@ -65,8 +66,8 @@ def thesis(
         Replace an existing measurement.
     """
     from palpate_thesis.claims import texts
-    from palpate_thesis.figure import studies
-    from palpate_thesis.laboratory import load_laboratory
+    from palpate_thesis.figure import studies, study
+    from palpate_thesis.laboratory import describe_laboratory, load_laboratory
     from palpate_thesis.measure import MeasurementFormat
     from palpate_thesis.runs import Runs
 
@@ -78,39 +79,19 @@ def thesis(
     drawn = drawn or FigureOptions()
     drawn.check()
     values = load_laboratory(laboratory)
-    name = "" if values.is_bench else Path(laboratory).stem
-    chosen = _select_studies(figure, laboratory, everything=values.is_bench)
+    name = "" if laboratory == "inferred" else Path(laboratory).stem
+    chosen = studies() if figure is None else [study(figure)]
     folder = out or Path("runs") / "-".join(part for part in ("thesis", figure, name) if part)
     option = f" --laboratory {laboratory}" if name else ""
     command = f"palpate thesis{f' {figure}' if figure else ''}{option} --seeds {seeds}"
     try:
-        written = MeasurementFormat(command, name or "bench", drawn.endings, drawn.dpi)
+        about = describe_laboratory(laboratory)
+        written = MeasurementFormat(command, name or "inferred", drawn.endings, drawn.dpi, about)
         _measure(chosen, folder, Runs(range(seeds), laboratory=values), written, replace)
     except KeyboardInterrupt:
         say(f"interrupted; the measured claims are saved in {folder}; the same command resumes")
         return 130
     return 0
-
-
-def _select_studies(figure: str | None, laboratory: str, *, everything: bool) -> Sequence[FigureModule]:
-    """The studies to measure; in a laboratory other than the bench, those of the thesis' own experiments.
-
-    Raises:
-        InputError: no such figure, or one that is no experiment of the thesis.
-    """
-    from palpate_thesis.figure import studies, study
-
-    chosen = studies() if figure is None else [study(figure)]
-    if everything:
-        return chosen
-    experiments = [entry for entry in chosen if entry.NUMBER.startswith(EXPERIMENTS)]
-    if not experiments:
-        known = ", ".join(entry.NUMBER for entry in studies() if entry.NUMBER.startswith(EXPERIMENTS))
-        raise InputError(
-            f"figure {figure} shows no experiment of the thesis' own laboratory; leave out --laboratory "
-            f"{laboratory}, or choose one of {known}"
-        )
-    return experiments
 
 
 def _measure(
@@ -140,11 +121,13 @@ def _measure(
         )
     claims = claims_of_studies(done)
     rows = [(claim.id, claim.thesis, claim.measured, claim.verdict) for claim in claims]
+    for line in count_in_words(claims):
+        screen.print(line)
+    screen.print(written.about)
     if rows:
         table = Table("", ("claim", "thesis", "measured", "verdict"), rows)
         show_table(screen, table, [COLORS[claim.verdict] for claim in claims])
     for study in done if len(done) == 1 else ():
         for beside in study.tables:
             show_table(screen, beside)
-    screen.print(count_in_words(claims))
     place(screen, "page:", folder / "index.html")

@@ -45,6 +45,15 @@ def studies() -> list[FigureModule]:
     return [*sorted(_studies_in(figures), key=number), *_studies_in(explanations)]
 
 
+EXPERIMENTS = ("4.2", "4.4", "6.", "7.")
+"""Beginnings of the numbers of the figures that show the thesis' own experiments."""
+
+
+def is_experiment(number: str) -> bool:
+    """True if the figure shows an experiment, which is measured in the chosen laboratory; others are on the bench."""
+    return number.startswith(EXPERIMENTS)
+
+
 def study(number: str) -> FigureModule:
     """The figure or explanation of this number.
 

@@ -12,17 +12,17 @@ from typing import Any, Literal
 
 from palpate.bench import Experiment, with_values
 from palpate.bench.toml_parts import TomlFiles
-from palpate.controllers.neural import NeuralController
+from palpate.controllers.hybrid import HybridController
 from palpate.environments import KelvinVoigtSurface
 from palpate.errors import InputError, unknown
 from palpate.files import read_toml
 
 FILES = TomlFiles("laboratory", "a", "palpate_thesis", ("laboratories",))
-KEYS = {"about", "command", "unknowns"}
+KEYS = {"about", "command", "sentences", "unknowns"}
 LINEAR, RELAXING, STIFFENING = 0.0, 1.0, 2.0
 """Laws of the foam: spring and damper, standard linear solid, Hunt and Crossley."""
-LISTING = -1.0
-"""Controller weights that are those of the listing; other values are seeds of random weights."""
+LISTED_START = 0.454
+"""x from which the listed approach starts [m]."""
 SWITCH, DESIRED = 5.0, 20.0
 """Forces between which a stiffness is a secant; a damping is given at the second [N]."""
 FOAM_LIMIT = 15000.0
@@ -53,11 +53,21 @@ class Unknown:
     def quantile(self, fraction: float) -> float:
         """The value below which this fraction of the prior lies, 0 to 1."""
         if self.prior == "log-even":
-            return math.exp((1.0 - fraction) * math.log(self.low) + fraction * math.log(self.high))
+            value = math.exp((1.0 - fraction) * math.log(self.low) + fraction * math.log(self.high))
+            return min(max(value, self.low), self.high)  # rounding passes the ends
         if self.prior == "even":
             return (1.0 - fraction) * self.low + fraction * self.high
         values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
         return float(values[min(int(fraction * len(values)), len(values) - 1)])
+
+    def fraction(self, value: float) -> float:
+        """Fraction of the prior below a value: the inverse of `quantile`, or the middle of the choice."""
+        if self.prior == "log-even":
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        if self.prior == "even":
+            return (value - self.low) / (self.high - self.low)
+        values = self.choices or tuple(range(int(self.low), int(self.high) + 1))
+        return (values.index(value) + 0.5) / len(values)
 
     def check(self, value: Any, where: str) -> float:
         """Return a value as a number.
@@ -113,13 +123,13 @@ class Laboratory:
     beyond: float = 0.0
     roughness: float = 0.0
     covariance: float = 1e10
-    initial_stiffness: float = 2e5
+    compensation: float = 0.0
+    blend: float = 0.002
     amplitude: float = 40.0
     weights: float = 0.5
+    output_sum: float = 0.0
     start: float | None = None
-    controller_weights: float = LISTING
     wall: float = 0.465
-    motor2: float = 2.5
     arm_stiffness: float = math.inf
     arm_frequency: float = 100.0
     arm_damping: float = 0.02
@@ -138,7 +148,7 @@ class Laboratory:
         """The experiment as this laboratory would have run it."""
         if self.is_bench:
             return experiment
-        parts = (self._friction, self._place, self._sensor, self._identification, self._controller)
+        parts = (self._friction, self._place, self._sensor, self._identification)
         changes = {key: value for part in parts for key, value in part(experiment).items()}
         if isinstance(experiment.surface, KelvinVoigtSurface):  # other laws are tried by figures on purpose
             changes["surface"] = self._surface(experiment.surface)
@@ -163,13 +173,12 @@ class Laboratory:
 
     def _place(self, e: Experiment) -> dict[str, Any]:
         offset, (x, y, phi) = self.wall - BENCH.wall, e.robot.start
-        first, second, third = e.robot.torque_limits
+        moved = 0.0 if x == LISTED_START else offset  # a shortened approach stays as near to the surface
         place: dict[str, Any] = {
             "wall.x": e.wall.x + offset,
-            "robot.start": (x + offset, y, phi),
-            "approach.first": e.approach.first + offset,
+            "robot.start": (x + moved, y, phi),
+            "approach.first": e.approach.first + moved,
             "wall.side_friction": e.wall.side_friction * self.sticking / BENCH.sticking,
-            "robot.torque_limits": (first, second * self.motor2 / BENCH.motor2, third),
         }
         if math.isfinite(self.arm_stiffness):
             place["elastic"] = {
@@ -187,18 +196,16 @@ class Laboratory:
         }
 
     def _identification(self, e: Experiment) -> dict[str, Any]:
-        mass, damping, _ = e.identification.initial
-        return {
-            "identification.covariance": e.identification.covariance * self.covariance / BENCH.covariance,
-            "identification.initial": (mass, damping, self.initial_stiffness),
+        changes: dict[str, Any] = {
+            "identification.covariance": e.identification.covariance * self.covariance / BENCH.covariance
         }
-
-    def _controller(self, e: Experiment) -> dict[str, Any]:
-        changes: dict[str, Any] = {"force.restart": self.restart} if e.force.restart > 0.0 else {}
-        has_listed_weights = isinstance(e.controller, NeuralController) and e.controller.weights == "thesis"
-        if has_listed_weights and self.controller_weights != LISTING:
-            changes["controller.weights"] = "random"
-            changes["controller.weights_seed"] = int(self.controller_weights)
+        if e.force.restart > 0.0:
+            changes["force.restart"] = self.restart
+        # Only the presses for identification have a constant force; their program is not printed, and (4.10) and
+        # (4.13) compensate friction. The printed program of the neural controller does not.
+        if isinstance(e.controller, HybridController) and e.force.second is None:
+            level = tuple(self.compensation * self.friction * c for c in e.friction.coulomb)
+            changes |= {"compensation.level": level, "compensation.blend": (self.blend,) * 3}
         return changes
 
     def _surface(self, surface: KelvinVoigtSurface) -> dict[str, Any]:
@@ -241,8 +248,14 @@ def laboratory_at(fractions: Sequence[float]) -> Laboratory:
     return Laboratory(**{u.name: u.quantile(f) for u, f in zip(UNKNOWNS, fractions, strict=True)})
 
 
+def prior_fractions(laboratory: Laboratory) -> tuple[float, ...]:
+    """Fractions of the priors below a laboratory's values, in the order of `UNKNOWNS`; 1 for a value that is absent."""
+    values = laboratory.numbers()
+    return tuple(u.fraction(values[u.name]) if u.name in values else 1.0 for u in UNKNOWNS)
+
+
 def load_laboratory(name: str) -> Laboratory:
-    """A laboratory by its name ("bench" or "inferred"), or from a TOML file.
+    """A laboratory by its name ("bench", or one of `laboratories/`), or from a TOML file.
 
     Raises:
         InputError: no such laboratory or file, TOML that does not parse, an unknown key, a value out of range.
@@ -259,6 +272,16 @@ def load_laboratory(name: str) -> Laboratory:
     return laboratory_from(values, name)
 
 
+def describe_laboratory(name: str) -> str:
+    """What a laboratory is, in a sentence or two, from its file."""
+    if name == "bench":
+        return "Laboratory: the bench, chosen by hand."
+    about = str(read_toml(FILES.source(name), name).get("about", ""))
+    if name == "inferred":
+        about += " " + str(read_toml(FILES.source("calibrated"), "calibrated")["about"])
+    return f"Laboratory: {name}. {about}".rstrip()
+
+
 def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
     """A laboratory from named values; the others are the bench's.
 
@@ -272,8 +295,10 @@ def laboratory_from(values: Mapping[str, Any], where: str) -> Laboratory:
     return Laboratory(**{name: by_name[name].check(value, where) for name, value in values.items()})
 
 
-def laboratory_text(laboratory: Laboratory, about: str, command: str) -> str:
-    """A laboratory as a TOML file that `load_laboratory` reads."""
+def laboratory_text(laboratory: Laboratory, about: str, command: str, sentences: Sequence[str] = ()) -> str:
+    """A laboratory as a TOML file that `load_laboratory` reads, with the sentences for which it was chosen."""
     values = [f"{name} = {value!r}" for name, value in laboratory.numbers().items()]
     head = [f"about = {json.dumps(about)}", f"command = {json.dumps(command)}"]
+    if sentences:
+        head.append(f"sentences = {json.dumps(list(sentences))}")
     return "\n".join([*head, "", "[unknowns]", *values]) + "\n"

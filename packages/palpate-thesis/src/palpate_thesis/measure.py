@@ -2,8 +2,12 @@
 
 import inspect
 import time
+import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +18,20 @@ from palpate.files import check_place, kept_folder, with_author, write_json, wri
 from palpate.report import style
 from palpate.report.look.assets import text_of
 from palpate.report.page import data_address, render
-from palpate_thesis.claims import Done, ThesisClaim, claims_of_studies, count_in_words, count_verdicts, texts
+from palpate_thesis.claims import (
+    VERDICTS,
+    Done,
+    ThesisClaim,
+    claims_of_studies,
+    count_in_words,
+    experiment_sentences,
+    plausible_laboratories,
+    tables,
+    texts,
+)
 from palpate_thesis.drawing import apply_look
-from palpate_thesis.figure import FigureModule
+from palpate_thesis.figure import FigureModule, is_experiment
+from palpate_thesis.laboratory import BENCH, Laboratory
 from palpate_thesis.runs import Runs, sources_digest
 
 STATE = "thesis.json"
@@ -33,12 +48,14 @@ class MeasurementFormat:
         laboratory: its name, for the page.
         endings: of the figures' files, besides the PNG that the page shows.
         dpi: of a PNG; the usual one if None.
+        about: the laboratory of the experiments, in words.
     """
 
     command: str
     laboratory: str = "bench"
     endings: tuple[str, ...] = (".png",)
     dpi: int | None = None
+    about: str = ""
 
 
 @dataclass
@@ -49,6 +66,7 @@ class FolderState:
     wanted: list[str]
     command: str
     laboratory: str = ""
+    about: str = ""
     values: dict[str, float] = field(default_factory=dict)
     done: dict[str, Done] = field(default_factory=dict)
 
@@ -64,6 +82,8 @@ def measure(
     resumed: Callable[[int], None] = lambda _: None,
 ) -> list[Done]:
     """Run the studies, and write claims.json, index.html and each figure into the folder after each study.
+
+    The figures of experiments are of the laboratory of `runs`, all others of the bench.
 
     A folder with an unfinished measurement of the same sources, studies and seeds is continued; `resumed` is then
     called with the number of studies that are done.
@@ -86,8 +106,9 @@ def measure(
 
 def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: MeasurementFormat) -> Done:
     start = time.perf_counter()
+    runs = runs_for(study.NUMBER, runs)
     data = study.run(runs)
-    claims = [_with_note(claim, runs) for claim in study.check(data)]
+    claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
     beside, tables = getattr(study, "beside", None), getattr(study, "tables", None)
     with apply_look():
         for name, draw in (("", study.plot), (BESIDE, beside)):
@@ -103,13 +124,40 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     )
 
 
-def _with_note(claim: ThesisClaim, runs: Runs) -> ThesisClaim:
-    """Replace the note in a laboratory other than the bench: the notes of the figures are about the bench."""
-    if runs.laboratory.is_bench:
+def runs_for(number: str, runs: Runs) -> Runs:
+    """Runs of a study: of an experiment in the chosen laboratory, of another figure on the bench."""
+    return runs if is_experiment(number) else replace(runs, laboratory=BENCH)
+
+
+def note_for(claim: ThesisClaim, laboratory: Laboratory) -> ThesisClaim:
+    """Replace the note in a laboratory other than the bench: the notes of the figures are about the bench.
+
+    The reason of claims.toml stands for one that does not hold; then the laboratory in which it does, and the unknowns
+    that decide it.
+    """
+    if laboratory.is_bench or claim.id not in experiment_sentences():
         return claim
-    values = ", ".join(f"{name} {value:.3g}" for name, value in runs.laboratory.numbers().items())
-    note = f"In this laboratory: {values}. The reason on the hand-chosen bench is in that measurement."
-    return replace(claim, note=note)
+    parts = []
+    if claim.verdict != "reproduced":
+        parts.append(tables()["claims"][claim.id].get("reason", ""))
+        elsewhere = plausible_laboratories().get(claim.id)
+        if elsewhere:
+            parts.append(f"It holds with --laboratory {elsewhere}, which keeps the printed values too.")
+    deciding = [name for name, ids in sensitivity().items() if claim.id in ids]
+    if deciding:
+        parts.append(f"Of the unknowns, changed one at a time, these decide it: {', '.join(deciding)}.")
+    else:
+        parts.append("No unknown, changed alone, decides it.")
+    parts.append("The note on the hand-chosen bench: --laboratory bench.")
+    return replace(claim, note=" ".join(part for part in parts if part))
+
+
+@cache
+def sensitivity() -> Mapping[str, Sequence[str]]:
+    """By unknown, the sentences whose truth it changes in the inferred laboratory: see `palpate laboratory`."""
+    text = (resources.files("palpate_thesis") / "inference" / "sensitivity.toml").read_text("utf-8")
+    table: Mapping[str, Sequence[str]] = tomllib.loads(text)
+    return table
 
 
 def _load_state(
@@ -121,7 +169,9 @@ def _load_state(
         stamp += f" laboratory {runs.laboratory.numbers()}"
     path = folder / STATE
     if not path.exists():
-        return FolderState(stamp, wanted, written.command, written.laboratory, runs.laboratory.numbers())
+        return FolderState(
+            stamp, wanted, written.command, written.laboratory, written.about, runs.laboratory.numbers()
+        )
     check_place(path)
     try:
         state = msgspec.json.decode(path.read_bytes(), type=FolderState)
@@ -149,7 +199,7 @@ def _write_results(state: FolderState, folder: Path) -> None:
     _save_state(state, folder)
 
 
-TONES = {"reproduced": "ok", "differs": "warn", "not checkable": "none"}
+TONES = dict(zip(VERDICTS, ("ok", "part", "warn", "none"), strict=True))
 _CHAPTERS = {"3": "The bench", "4": "The controllers", "5": "The identifiers", "7": "Conclusions"}
 _EXPLANATIONS = "Explanations"
 _SECTIONS_OF_CHAPTER_6 = {5: "Least squares", 9: "Neural identifier", 17: "Force control"}
@@ -168,7 +218,7 @@ def index_page(
         state: of the folder.
     """
     claims = [claim for study in done for claim in study.claims]
-    verdicts = count_verdicts(claims)
+    verdicts = Counter(claim.verdict for claim in claims)
     chapters: dict[str, list[dict[str, Any]]] = {}
     for study in done:
         row = {"study": study, "claims": study.claims}
@@ -180,7 +230,8 @@ def index_page(
         title="The thesis, measured again",
         chapters=[{"title": title, "studies": studies} for title, studies in chapters.items()],
         count=verdicts.total(),
-        told=count_in_words(claims),
+        counts=count_in_words(claims),
+        about=state.about,
         verdicts=verdicts,
         tones=TONES,
         pictures=pictures,

@@ -117,6 +117,10 @@ SURFACES: Mapping[str, Mapping[str, Any]] = {
 }
 
 
+NEAREST_WALL = 0.457
+"""x of the nearest wall that the listed approach allows: it starts at 0.454 m and steps from 0.456 m outwards [m]."""
+
+
 def move_wall(experiment: Experiment, x: float) -> Mapping[str, Any]:
     """Changes that bring start, approach and wall together to a wall at x [m]."""
     offset = x - experiment.wall.x
@@ -142,7 +146,7 @@ def friction_and_pose(experiment: Experiment) -> dict[str, Mapping[str, Any]]:
     return {
         "friction\nhalf": rougher(experiment, 0.5),
         "friction\ndouble": rougher(experiment, 2.0),
-        "wall at\n0.40 m": move_wall(experiment, 0.40),
+        "wall at\n0.457 m": move_wall(experiment, NEAREST_WALL),
         "wall at\n0.49 m": move_wall(experiment, 0.49),
     }
 

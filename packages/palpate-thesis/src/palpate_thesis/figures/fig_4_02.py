@@ -93,7 +93,6 @@ def check(data: Data) -> Sequence[ThesisClaim]:
             not press_runs.failing(data.switches, lambda s: s.clean),
             **data.switches,
             where=press_runs.where_it_fails(fails, len(data.varied)),
-            nearer=press_runs.median([s.last for s in data.varied["wall at 0.40 m"]]),
         ),
         claim(
             "switch-at-5N.threshold",

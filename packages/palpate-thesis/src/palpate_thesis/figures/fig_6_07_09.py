@@ -94,7 +94,8 @@ class NetworkFirstSeconds:
         """One press a noise seed, all starts on each; then the network and the conditions varied."""
         presses = network.presses(runs, self.PARAMETERS, self.surface)
         own = network.chosen_network(runs)
-        curves = [network.learn(presses[0], own, start)[1] for start in network.STARTS[:SHOWN_STARTS]]
+        starts = list(dict.fromkeys((*network.starts(runs), *network.STARTS)))[:SHOWN_STARTS]
+        curves = [network.learn(presses[0], own, start)[1] for start in starts]
         return Data(presses[0], curves, grounds(runs, self.PARAMETERS, self.surface, presses))
 
     def check(self, data: Data) -> Sequence[ThesisClaim]:

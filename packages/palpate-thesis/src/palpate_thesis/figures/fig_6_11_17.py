@@ -17,8 +17,8 @@ from palpate_thesis.runs import Runs
 
 JUDGED = (10.0, 15.0)
 SLOW_RATE = {"controller.learning_rate": 1e-5}
-CYCLE = 5.0
-"""Period of the desired force [s]."""
+CYCLE = 10.0
+"""Common period of the steps (5 s) and of the sine (2 s), whether its clock restarts or not [s]."""
 SMOOTHED = 0.25
 """Time over which deviations are averaged [s]."""
 Window = tuple[float, float]
@@ -71,10 +71,10 @@ class Adapting(NamedTuple):
 
 
 class FromTheStart(Steps):
-    """Steps judged from the first touch on, and how long adapting takes: the last two of four cycles are settled."""
+    """Steps judged from the first touch on, and how long adapting takes: the second of two cycles is settled."""
 
     def run(self, runs: Runs) -> Adapting:
-        """Four cycles; the last two are the reference of the first."""
+        """Two cycles; the second is the reference of the first."""
         away = runs.over_seeds(self.PARAMETERS, away_from_settled)
         t = np.array(1e-3 * np.arange(len(away[0])) + SMOOTHED / 2, dtype=np.float64)
         return Adapting(super().run(runs), t, away[0], [adapted_at(distance) for distance in away])
@@ -102,11 +102,11 @@ class FromTheStart(Steps):
 
 
 def away_from_settled(record: Record) -> Array:
-    """Smoothed distance of the force from the mean of the last two cycles, from contact on [N]."""
+    """Smoothed distance of the force from the last cycle, from contact on [N]."""
     force = record["force"][since_contact(record) >= 0.0]
     ticks = round(CYCLE * 1000)
     cycles = force[: len(force) // ticks * ticks].reshape(-1, ticks)
-    away = (cycles - cycles[-2:].mean(axis=0)).ravel()
+    away = (cycles - cycles[-1]).ravel()
     smoothed: Array = np.abs(np.convolve(away, np.full(round(SMOOTHED * 1000), 1e-3 / SMOOTHED), "valid"))
     return smoothed
 

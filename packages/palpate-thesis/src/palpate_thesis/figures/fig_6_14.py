@@ -14,7 +14,7 @@ from palpate.studies.metrics.following import LIMIT
 from palpate.studies.metrics.window import SETTLE, rms
 from palpate_thesis.claims import ThesisClaim, claim, spread
 from palpate_thesis.drawing import LIMIT_LINE, Figure, force_figure, panels
-from palpate_thesis.figures.fig_6_11_17 import CYCLE, SLOW_RATE
+from palpate_thesis.figures.fig_6_11_17 import SLOW_RATE
 from palpate_thesis.force_control.tracking import (
     FOAM,
     FOLLOWS,
@@ -29,6 +29,8 @@ from palpate_thesis.runs import RELAXING_FOAM, Runs
 
 NUMBER = "6.14"
 PARAMETERS = with_values(FOAM, {**SLOW_RATE, "run.press": 190.0, "run.duration": 300.0})
+CYCLE = 5.0
+"""Period of the steps [s]."""
 SHOWN, JUDGED = (179.5, 185.5), (180.0, 190.0)
 OTHERS: Mapping[str, Mapping[str, Any]] = {
     "foam that relaxes": RELAXING_FOAM,

@@ -26,7 +26,9 @@ class SearchOptions:
     seed: Annotated[int, _within(0, 2**31 - 1)] = 1
     "Seed of everything drawn."
     half: Annotated[bool, FLAG] = False
-    "LaboratorySearch by the calibration half of the sentences alone; the result is judged by all."
+    "Search by the calibration half of the sentences alone; the result is judged by all."
+    start: str | None = None
+    "Laboratory that is tried first, by name or TOML file; the search starts from the prior when left out."
     cores: Annotated[int | None, _within(1, 1024)] = None
     "Number of laboratories tried in parallel; as many as there are cores when left out."
 
@@ -48,12 +50,13 @@ def laboratory(*, search: SearchOptions | None = None, output: InferredOptions |
     from palpate_thesis.inference.search import LaboratorySearch
 
     size, output = search or SearchOptions(), output or InferredOptions()
-    command = f"palpate laboratory --tries {size.tries} --seed {size.seed}{' --half' * size.half}"
+    start = f" --start {size.start}" if size.start else ""
+    command = f"palpate laboratory --tries {size.tries} --seed {size.seed}{start}{' --half' * size.half}"
     threads = size.cores or cores()
     try:
         with progress_of_pieces(console(stderr=True)) as progress:
             settings = LaboratorySearch(
-                output.out, command, size.tries, size.seed, size.half, threads, progress
+                output.out, command, size.tries, size.seed, size.half, size.start, threads, progress
             )
             result = settings.run(replace=output.replace)
     except KeyboardInterrupt:
@@ -79,4 +82,9 @@ def _show(result: "SearchResult", folder: Path, half: bool) -> None:
     screen = console()
     title = f"Sentences that are true, {result.tried} laboratories tried"
     show_table(screen, Table(title, ("laboratory", "calibration", validation, "all"), rows))
+    by_unknown = [(name, str(len(ids)), ", ".join(ids)) for name, ids in result.sensitivity.items()]
+    title = "Sentences whose truth changes with one unknown alone"
+    show_table(screen, Table(title, ("unknown", "sentences", ""), by_unknown))
+    for number, (_, ids) in enumerate(result.plausible, 1):
+        place(screen, f"plausible-{number}, {', '.join(ids)}:", folder / f"plausible-{number}.toml")
     place(screen, "laboratory:", folder / INFERRED)

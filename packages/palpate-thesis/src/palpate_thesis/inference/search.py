@@ -1,7 +1,8 @@
-"""LaboratorySearch for the laboratory in which most of the thesis' sentences hold at once; resumable."""
+"""Search for the laboratory in which most of the thesis' sentences hold at once; resumable."""
 
 from __future__ import annotations
 
+import json
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,12 +19,21 @@ from palpate.studies.plan import Sobol
 from palpate.studies.run_one import map_unordered
 from palpate_thesis.inference.sentences import Sentence, halves, sentences, true_ids
 from palpate_thesis.inference.trial import Trial
-from palpate_thesis.laboratory import BENCH, UNKNOWNS, Laboratory, laboratory_at, laboratory_text
+from palpate_thesis.laboratory import (
+    BENCH,
+    UNKNOWNS,
+    Laboratory,
+    laboratory_at,
+    laboratory_text,
+    load_laboratory,
+    prior_fractions,
+)
+from palpate_thesis.printed_facts import contradictions
 from palpate_thesis.runs import sources_digest
 
 Fractions = tuple[float, ...]
 """A point of the search: for each unknown the fraction of its prior below the value, 0 to 1."""
-STATE, INFERRED = "laboratory.json", "inferred.toml"
+STATE, INFERRED, SENSITIVITY = "laboratory.json", "inferred.toml", "sensitivity.toml"
 GENERATION = 16
 """Laboratories tried before parents are chosen again; fixed, so that no result depends on the number of threads."""
 PRIOR_FRACTION = 0.25
@@ -32,8 +42,14 @@ PARENTS, RANK_SCALE = 25, 2.5
 """Number of the best laboratories that have children, and the scale of the exponential distribution of their rank."""
 MAX_REDRAWN = 4
 """Maximum unknowns in which a child differs from its parent."""
-CANDIDATES = 3
+STEP = 0.1
+"""Standard deviation of a small change of an unknown, as a fraction of its prior; half of the changes are small."""
+CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
+ATTEMPTS = 4
+"""Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
+VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
+"""Fractions of its prior at which an unknown is tried alone."""
 SEEDS, FULL_STEPS = tuple(range(10)), 20
 """Seeds of the noise, and steps of the physics in a tick, of a judgement: those of the figures."""
 
@@ -73,11 +89,20 @@ class JudgedLaboratory:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The best laboratory of a search and the hand-chosen bench, both over all seeds."""
+    """The best laboratory of a search and the hand-chosen bench, both over all seeds.
+
+    Args:
+        tried: number of laboratories.
+        bench, inferred: the two.
+        plausible: further laboratories, each with sentences that do not hold in the inferred one and hold there.
+        sensitivity: by unknown, the sentences whose truth changes when it alone takes other values of its prior.
+    """
 
     tried: int
     bench: JudgedLaboratory
     inferred: JudgedLaboratory
+    plausible: tuple[tuple[Laboratory, tuple[str, ...]], ...]
+    sensitivity: Mapping[str, tuple[str, ...]]
 
     @property
     def laboratories(self) -> dict[str, JudgedLaboratory]:
@@ -92,6 +117,8 @@ class SearchResult:
                 name: {half: {"true": lab.count_true(of), "of": len(of)} for half, of in halves().items()}
                 for name, lab in self.laboratories.items()
             },
+            "plausible": [{"sentences": ids, "unknowns": lab.numbers()} for lab, ids in self.plausible],
+            "sensitivity": dict(self.sensitivity),
             "laboratories": {name: lab.laboratory.numbers() for name, lab in self.laboratories.items()},
             "sentences": {
                 s.id: {name: lab.held[s.id] for name, lab in self.laboratories.items()} for s in sentences()
@@ -109,6 +136,7 @@ class LaboratorySearch:
         tries: number of laboratories; rounded up to whole generations.
         seed: of everything drawn.
         half: True to search by the sentences of the calibration half alone.
+        start: name or file of the laboratory that is tried first; None to start from the prior alone.
         threads: number of threads.
         progress: called with the name of the work, the number done and the total.
     """
@@ -118,6 +146,7 @@ class LaboratorySearch:
     tries: int
     seed: int = 1
     half: bool = False
+    start: str | None = None
     threads: int = 1
     progress: Callable[[str, int, int], None] = lambda _name, _done, _total: None
 
@@ -127,7 +156,7 @@ class LaboratorySearch:
         return tuple(s for s in sentences() if s.searched and (s.calibrates or not self.half))
 
     def run(self, *, replace: bool = False) -> SearchResult:
-        """LaboratorySearch on from the state of the folder, and write the best laboratory.
+        """Search on from the state of the folder, and write the best laboratory.
 
         Raises:
             InputError: the folder holds another search or something else, and `replace` is off.
@@ -142,18 +171,32 @@ class LaboratorySearch:
             bench, *judged = [self._judge(state, laboratory) for laboratory in (BENCH, *best)]
             wanted = halves()["calibration" if self.half else "all"]
             inferred = max(judged, key=lambda lab: lab.count_true(wanted))
-            self._write(inferred)
-            return SearchResult(len(state.tried), bench, inferred)
+            plausible = self._find_plausible(state, inferred)
+            sensitivity = self._find_sensitivity(inferred.laboratory)
+            result = SearchResult(len(state.tried), bench, inferred, plausible, sensitivity)
+            self._write(result)
+            return result
 
     def propose(self, tried: Sequence[TriedLaboratory]) -> list[Fractions]:
-        """Points of the next generation: from the prior at first, then children of the best."""
+        """Points of the next generation: the start and the prior at first, then children of the best.
+
+        A child that contradicts a printed value is drawn again.
+        """
         done = len(tried)
         if done < PRIOR_FRACTION * self.tries:
             sobol = Sobol(len(UNKNOWNS), self.seed)
-            return [tuple(sobol.point(number)) for number in range(done, done + GENERATION)]
+            points = [tuple(sobol.point(number)) for number in range(done, done + GENERATION)]
+            if done == 0 and self.start is not None:
+                points[0] = prior_fractions(load_laboratory(self.start))
+            return points
         parents = sorted(tried, key=lambda laboratory: -len(laboratory.true))[:PARENTS]
         rng = np.random.default_rng([self.seed, done])
-        return [_make_child(parents, rng) for _ in range(GENERATION)]
+        children: list[Fractions] = []
+        while len(children) < GENERATION:
+            child = _make_child(parents, rng)
+            if not contradictions(laboratory_at(child)):
+                children.append(child)
+        return children
 
     def _try_generation(self, points: Sequence[Fractions], first: int) -> list[TriedLaboratory]:
         """Try the points with a noise of their own each; the runs under way stop with the caller."""
@@ -161,6 +204,8 @@ class LaboratorySearch:
 
         def attempt(number: int) -> tuple[int, TriedLaboratory]:
             point = points[number - first]
+            if contradictions(laboratory_at(point)):
+                return number, TriedLaboratory(point, ())
             trial = Trial(laboratory_at(point), number, stopped=stop.is_set)
             return number, TriedLaboratory(point, true_ids(trial, self.sentences))
 
@@ -174,17 +219,60 @@ class LaboratorySearch:
         return [results[number] for number in sorted(results)]
 
     def _judge(self, state: SearchState, laboratory: Laboratory) -> JudgedLaboratory:
-        key = str(laboratory.numbers())
+        return JudgedLaboratory(laboratory, self._count_seeds(state, laboratory, sentences()))
+
+    def _find_plausible(
+        self, state: SearchState, inferred: JudgedLaboratory
+    ) -> tuple[tuple[Laboratory, tuple[str, ...]], ...]:
+        """For each sentence that does not hold in the inferred laboratory, a tried one where it does.
+
+        Of the laboratories in which it held once, those with most true sentences are judged over all seeds.
+        """
+        missing = {s.id: s for s in self.sentences if not inferred.count_true([s])}
+        ranked = sorted(state.tried, key=lambda laboratory: -len(laboratory.true))
+        plausible: list[tuple[Laboratory, tuple[str, ...]]] = []
+        for name in tuple(missing):
+            if name not in missing:
+                continue
+            for tried in [laboratory for laboratory in ranked if name in laboratory.true][:ATTEMPTS]:
+                laboratory = laboratory_at(tried.fractions)
+                among = [s for s in missing.values() if s.id in tried.true]
+                counts = self._count_seeds(state, laboratory, among)
+                true = tuple(s.id for s in among if s.is_true(counts[s.id], len(SEEDS)))
+                if name in true:
+                    plausible.append((laboratory, true))
+                    missing = {key: s for key, s in missing.items() if key not in true}
+                    break
+        return tuple(plausible)
+
+    def _find_sensitivity(self, laboratory: Laboratory) -> dict[str, tuple[str, ...]]:
+        """Change one unknown at a time to values of its prior, and find the sentences whose truth changes."""
+        reference, point = self._true_once(laboratory), list(prior_fractions(laboratory))
+        changed: dict[str, tuple[str, ...]] = {}
+        for i, u in enumerate(UNKNOWNS):
+            others = [laboratory_at([*point[:i], fraction, *point[i + 1 :]]) for fraction in VALUES]
+            results = map_unordered(self._true_once, dict.fromkeys(others), self.threads)
+            differing = set().union(*(reference ^ true for true in results))
+            changed[u.name] = tuple(s.id for s in sentences() if s.id in differing)
+            self.progress("unknowns, one at a time", i + 1, len(UNKNOWNS))
+        return changed
+
+    def _true_once(self, laboratory: Laboratory) -> frozenset[str]:
+        return frozenset(true_ids(Trial(laboratory), [s for s in sentences() if s.searched]))
+
+    def _count_seeds(
+        self, state: SearchState, laboratory: Laboratory, among: Sequence[Sentence]
+    ) -> Counter[str]:
+        """Number of seeds in which each sentence holds; from the state if it has been counted before."""
+        key = f"{laboratory.numbers()} {len(among)} {among[0].id}"
         if key not in state.judged:
-            state.judged[key] = dict(self._count_seeds(laboratory))
+            state.judged[key] = dict(self._run_seeds(laboratory, among))
             self._save(state)
-        return JudgedLaboratory(laboratory, Counter(state.judged[key]))
+        return Counter(state.judged[key])
 
-    def _count_seeds(self, laboratory: Laboratory) -> Counter[str]:
-        """Number of seeds in which each sentence holds."""
-
+    def _run_seeds(self, laboratory: Laboratory, among: Sequence[Sentence]) -> Counter[str]:
         def attempt(seed: int) -> tuple[str, ...]:
-            return true_ids(Trial(laboratory, seed, FULL_STEPS, stop.is_set), sentences())
+            return true_ids(Trial(laboratory, seed, FULL_STEPS, stop.is_set), among)
 
         stop = threading.Event()
         held: Counter[str] = Counter()
@@ -198,7 +286,7 @@ class LaboratorySearch:
 
     def _load(self) -> SearchState:
         path = self.folder / STATE
-        stamp = f"{sources_digest()} tries {self.tries} seed {self.seed} half {self.half}"
+        stamp = f"{sources_digest()} tries {self.tries} seed {self.seed} half {self.half} start {self.start}"
         if not path.exists():
             return SearchState(stamp)
         check_place(path)
@@ -218,10 +306,27 @@ class LaboratorySearch:
     def _save(self, state: SearchState) -> None:
         write_json(self.folder / STATE, with_author(msgspec.to_builtins(state)))
 
-    def _write(self, inferred: JudgedLaboratory) -> None:
-        about = f"{len(sentences())} sentences of the thesis; {inferred.count_true(sentences())} hold."
-        text = laboratory_text(inferred.laboratory, about, self.command)
-        write_text(self.folder / INFERRED, f"{MADE} laboratory --laboratory\n{text}")
+    def _write(self, result: SearchResult) -> None:
+        texts = {INFERRED: laboratory_text(result.inferred.laboratory, self._about(result), self.command)}
+        for number, (laboratory, ids) in enumerate(result.plausible, 1):
+            about = "Keeps the printed values too; chosen for sentences that do not hold in the inferred one."
+            texts[f"plausible-{number}.toml"] = laboratory_text(laboratory, about, self.command, ids)
+        by_unknown = [f"{name} = {json.dumps(ids)}" for name, ids in result.sensitivity.items()]
+        texts[SENSITIVITY] = "\n".join(by_unknown) + "\n"
+        for name, text in texts.items():
+            write_text(self.folder / name, f"{MADE} laboratory --laboratory\n{text}")
+
+    def _about(self, result: SearchResult) -> str:
+        """Counts of the inferred laboratory, and which of them are in-sample."""
+        counts = {name: (result.inferred.count_true(among), len(among)) for name, among in halves().items()}
+        if self.half:
+            (searched, first), (kept_out, second) = counts["calibration"], counts["validation"]
+            return (
+                f"A search by {first} of the sentences alone reached {searched} of these, "
+                f"and {kept_out} of the {second} that were kept out of it."
+            )
+        true, total = counts["all"]
+        return f"{true} of {total} sentences hold, in-sample: all took part in its search."
 
 
 def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:
@@ -231,10 +336,11 @@ def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:
 
 
 def _make_child(parents: Sequence[TriedLaboratory], rng: np.random.Generator) -> Fractions:
-    """A parent, chosen by its rank, with a few unknowns drawn anew from the prior."""
+    """A parent, chosen by its rank, with a few unknowns moved a little or drawn anew from the prior."""
     rank = min(int(rng.exponential(RANK_SCALE)), len(parents) - 1)
     point = list(parents[rank].fractions)
     count = int(rng.integers(1, MAX_REDRAWN + 1))
     for i in rng.choice(len(point), count, replace=False):
-        point[i] = float(rng.random())
+        near = min(max(point[i] + STEP * float(rng.standard_normal()), 0.0), 1.0)
+        point[i] = near if rng.random() < 0.5 else float(rng.random())
     return tuple(point)

@@ -108,11 +108,11 @@ def _rubber(holds: PressHolds) -> Holds:
 
 
 def _settles_within(key: str, limit: float) -> PressHolds:
-    return lambda p: getattr(p.estimates, f"settled_{key}") <= limit
+    return lambda p: first_seconds.settles(p.estimates, key, limit)
 
 
-def _level(kilo: float) -> PressHolds:
-    return lambda p: abs(p.estimates.K / (1e3 * kilo) - 1.0) < later.LEVEL
+def _level(figure: later.Later) -> PressHolds:
+    return lambda p: abs(p.estimates.K / (1e3 * figure.printed[0]) - 1.0) < later.LEVEL
 
 
 def _network(part: network_claims.ClaimPart, answer: Callable[[Trial], NetworkAnswer | None]) -> Holds:
@@ -152,8 +152,8 @@ HOLDS: Mapping[str, Holds] = {
     "switch-at-5N.threshold": lambda t: t.foam is not None and not t.foam.early,
     "force-noise": _foam(lambda p: 1.5 <= p.half_range <= 2.5),
     **_settling(first_seconds.FOAM.claim, first_seconds.FOAM.limit, _foam),
-    later.FOAM.claim: _foam(lambda p: abs(p.estimates.apart) < later.FOAM.apart),
-    f"{later.FOAM.claim}.K": _foam(_level(later.FOAM.level)),
+    later.FOAM.claim: _foam(lambda p: later.FOAM.near(p.estimates)),
+    f"{later.FOAM.claim}.K": _foam(_level(later.FOAM)),
     f"{later.FOAM.claim}.B": _foam(lambda p: later.plausible(p.estimates)),
     f"{later.FOAM.claim}.M": _foam(lambda p: p.estimates.M < 0.0),
     later.FOAM.ratio: _foam(lambda p: p.spread > 1.0),
@@ -162,8 +162,8 @@ HOLDS: Mapping[str, Holds] = {
     "least-squares-raw-signals.K": _foam(lambda p: abs(p.estimates.apart_raw) < fig_6_03.NEAR),
     "least-squares-one-foam": _foam(lambda p: all(shows(p.estimates) for shows in fig_6_03.SHOWS.values())),
     **_settling(first_seconds.RUBBER.claim, first_seconds.RUBBER.limit, _rubber),
-    later.RUBBER.claim: _rubber(lambda p: abs(p.estimates.apart) < later.RUBBER.apart),
-    f"{later.RUBBER.claim}.K": _rubber(_level(later.RUBBER.level)),
+    later.RUBBER.claim: _rubber(lambda p: later.RUBBER.near(p.estimates)),
+    f"{later.RUBBER.claim}.K": _rubber(_level(later.RUBBER)),
     f"{later.RUBBER.claim}.B": _rubber(lambda p: later.plausible(p.estimates)),
     f"{later.RUBBER.claim}.M": _rubber(lambda p: p.estimates.M < 0.0),
     later.RUBBER.ratio: _rubber(lambda p: p.spread > 1.0),

@@ -113,8 +113,9 @@ class Trial:
     def identifiers_answer(self, press: NetworkPress, rate: float = NetworkChoice().rate) -> NetworkAnswer:
         """K, B and M of this laboratory's network over a press, at a learning rate."""
         lab = self.laboratory
-        choice = NetworkChoice(lab.amplitude, lab.weights, rate=rate)
-        return network.answer(press, choice, int(self.seed if lab.start is None else lab.start))
+        return network.answer(
+            press, network.identifier_network(lab, rate), int(self.seed if lab.start is None else lab.start)
+        )
 
     @cached_property
     def hybrid(self) -> fig_6_10.Ends | None:

@@ -9,7 +9,7 @@ from palpate.arrays import Array, Mask
 from palpate.bench import Experiment, load, with_values
 from palpate.bench.summary import CONTACT
 from palpate.records import Record
-from palpate_thesis.runs import VARIED_SEEDS, Runs, move_wall, rougher
+from palpate_thesis.runs import NEAREST_WALL, VARIED_SEEDS, Runs, move_wall, rougher
 
 T = TypeVar("T")
 
@@ -17,6 +17,8 @@ PRESS = 8.0
 """Seconds of contact: the first four as in figures 6.1, 6.3 and 6.4, and the slot of 6.2 and 6.5."""
 FIRST = 4.0
 """Length of the figures' first slot [s]."""
+MASS_FROM = 10
+"""First sample of a mass that sets the scale of its panel."""
 SLOT = (6.0, 8.0)
 """Chosen: "some time after" the first slot [s]."""
 
@@ -80,8 +82,21 @@ def ratio(press: Record, slot: tuple[float, float] = SLOT) -> float:
 
 def settled_after(values: Array, end: float = FIRST, band: float = 0.10, tick: float = 1e-3) -> float:
     """Time from which values stay within `band` of their value at `end` [s]."""
+    return _within_after(values[: round(end / tick)], band, 0.0, tick)
+
+
+def mass_settled_after(values: Array, end: float = FIRST, band: float = 0.10, tick: float = 1e-3) -> float:
+    """Time from which a mass stays within `band` of its largest value in the panel [s].
+
+    A mass ends near zero, where a fraction of the value itself is no criterion: a reader of the panel sees its scale.
+    The first 10 ms do not count, because the signals' lag of 7.6 ms leaves the estimate undetermined.
+    """
     values = values[: round(end / tick)]
-    outside = np.flatnonzero(np.abs(values - values[-1]) > band * abs(values[-1]))
+    return _within_after(values, band, float(np.abs(values[MASS_FROM:]).max(initial=0.0)), tick)
+
+
+def _within_after(values: Array, band: float, scale: float, tick: float) -> float:
+    outside = np.flatnonzero(np.abs(values - values[-1]) > band * max(scale, abs(values[-1])))
     return (float(outside[-1]) + 1.0) * tick if len(outside) else 0.0
 
 
@@ -117,7 +132,7 @@ def conditions(experiment: Experiment) -> dict[str, Experiment]:
     by: dict[str, Mapping[str, Any]] = {
         "friction halved": rougher(experiment, 0.5, "coulomb", "static"),
         "friction doubled": rougher(experiment, 2.0, "coulomb", "static"),
-        "wall at 0.40 m": move_wall(experiment, 0.40),
+        "wall at 0.457 m": move_wall(experiment, NEAREST_WALL),
         "wall at 0.49 m": move_wall(experiment, 0.49),
         "B halved": {"surface.damping": 0.5 * surface.damping},
         "B doubled": {"surface.damping": 2.0 * surface.damping},
@@ -160,7 +175,8 @@ def press_estimates(record: Record) -> PressEstimates:
     end = SLOT[1] - 0.002
     values = {name: at(press, f"{name}_thesis", end) for name in "MBK"}
     raw = {f"{name}_raw": at(press, f"{name}_raw", end) for name in "MBK"}
-    settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "MBK"}
+    settled = {f"settled_{name}": settled_after(press[f"{name}_thesis"]) for name in "BK"}
+    settled["settled_M"] = mass_settled_after(press["M_thesis"])
     damping = own_damping(record.meta["experiment"]["surface"])
     early = at(press, "K_thesis", FIRST) / ratio(press, (FIRST - 1.0, FIRST)) - 1.0
     return PressEstimates(ratio(press), **values, **raw, **settled, early_apart=early, true_B=damping)

@@ -10,7 +10,9 @@ from palpate.arrays import Array
 from palpate.bench import Experiment, load, with_values
 from palpate.identifiers.neural_probe import SETTINGS, NeuralProbe
 from palpate.records import Record
+from palpate_thesis.laboratory import Laboratory
 from palpate_thesis.least_squares import press_runs
+from palpate_thesis.neural_identifier.listed_sum import ListedSumProbe
 from palpate_thesis.runs import Runs
 
 PRESS = 4.0
@@ -102,19 +104,25 @@ class NetworkChoice(NamedTuple):
     thresholds: bool = True
     rate: float = 1e-4
     scale: tuple[float, float, float] | None = None  # the thesis' own where None
+    listed_sum: bool = False  # the listing's v.h in place of the text's v.s(h)
 
     def probe(self, surface: str, start: int) -> NeuralProbe:
         """The 3-4-1 network before it has learned anything."""
         setting = SETTINGS[surface] if self.scale is None else SETTINGS[surface]._replace(scale=self.scale)
         weights, thresholds = self.weights, self.thresholds
-        return NeuralProbe(
-            setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds
-        )
+        kind = ListedSumProbe if self.listed_sum else NeuralProbe
+        return kind(setting, self.amplitude, self.rate, seed=start, weights=weights, thresholds=thresholds)
 
 
 def chosen_network(runs: Runs) -> NetworkChoice:
     """The network of the runs' laboratory."""
-    return NetworkChoice(runs.laboratory.amplitude, runs.laboratory.weights)
+    return identifier_network(runs.laboratory)
+
+
+def identifier_network(laboratory: Laboratory, rate: float = 1e-4) -> NetworkChoice:
+    """The network of a laboratory."""
+    lab = laboratory
+    return NetworkChoice(lab.amplitude, lab.weights, rate=rate, listed_sum=lab.output_sum == 1.0)
 
 
 def starts(runs: Runs) -> tuple[int, ...]:
@@ -153,7 +161,9 @@ def answer(press: NetworkPress, choice: NetworkChoice, start: int) -> NetworkAns
     """Lets one network learn from one press."""
     probe, answers = learn(press, choice, start)
     K, B, M = map(float, answers[-round(LATE / TICK) :, :3].mean(axis=0))
-    k, b, m = (press_runs.settled_after(a, end=len(a) * TICK) for a in answers[:, :3].T)
+    end = len(answers) * TICK
+    k, b = (press_runs.settled_after(a, end) for a in answers[:, :2].T)
+    m = press_runs.mass_settled_after(answers[:, 2], end)
     probed = probe.probe()
     last = probed.force_at_zero, tangent(probe, press.rest), bool(probed.warnings)
     squares_B, gone = float(press.squares[-1, 1]), error_gone(answers[:, 3])

@@ -1,0 +1,97 @@
+"""Printed numbers of the thesis (printed.toml), and the values of a laboratory that contradict them."""
+
+import operator
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
+
+import msgspec
+
+from palpate.bench import Experiment, load
+from palpate.identifiers.neural_probe import SETTINGS
+from palpate.robots.arm3 import Arm3
+from palpate_thesis.figures import fig_6_10, fig_6_11_17, fig_6_15
+from palpate_thesis.laboratory import Laboratory
+from palpate_thesis.neural_identifier.network import identifier_network
+
+EXPERIMENTS: Mapping[str, Experiment] = {
+    "press on foam": load("foam-rls"),
+    "press on rubber": load("rubber-rls"),
+    "steps on foam": fig_6_11_17.FOAM.PARAMETERS,
+    "sine on foam": fig_6_11_17.SINE.PARAMETERS,
+    "small rate": fig_6_11_17.SLOW.PARAMETERS,
+    "steps on rubber": fig_6_11_17.RUBBER.PARAMETERS,
+    "sine on rubber": fig_6_11_17.RUBBER_SINE.PARAMETERS,
+    "hybrid alone": fig_6_10.PARAMETERS,
+    "free directions": fig_6_15.PARAMETERS,
+}
+"""Experiments of chapter 6. Those of force control start nearer to the surface, see `runs.SHORT`."""
+
+
+class PrintedFact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A printed number.
+
+    Args:
+        path: of the attribute that has the value, "robot.torque_limits".
+        printed: number, list of them, or word; "none" for the absence of a value.
+        where: place in the thesis, and what contradicts it there.
+        rule: relation of a laboratory's value to the printed one.
+    """
+
+    path: str
+    printed: Any
+    where: str
+    rule: Literal["equal", "at most", "above"] = "equal"
+
+    def allows(self, value: Any) -> bool:
+        """True if a value agrees with the printed one."""
+        printed = None if self.printed == "none" else self.printed
+        if isinstance(printed, list):
+            values = tuple(value)
+            return len(values) == len(printed) and all(map(RULES[self.rule], values, printed))
+        return RULES[self.rule](value, printed)
+
+
+RULES: Mapping[str, Callable[[Any, Any], bool]] = {
+    "equal": operator.eq,
+    "at most": operator.le,
+    "above": operator.gt,
+}
+
+
+class FactGroup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Printed numbers of the same things; "each" stands for every experiment."""
+
+    of: tuple[str, ...]
+    facts: tuple[PrintedFact, ...]
+
+
+@cache
+def printed_facts() -> tuple[FactGroup, ...]:
+    """All groups of printed.toml."""
+    text = resources.files("palpate_thesis").joinpath("printed.toml").read_text("utf-8")
+    return tuple(msgspec.toml.decode(text, type=dict[str, FactGroup]).values())
+
+
+def subjects(laboratory: Laboratory) -> dict[str, Any]:
+    """The arm, every experiment, the identifier and its probes in a laboratory, by name."""
+    return {
+        "arm": Arm3(),
+        "identifier": identifier_network(laboratory),
+        **{f"probe on {surface}": setting for surface, setting in SETTINGS.items()},
+        **{name: laboratory.adapt(experiment) for name, experiment in EXPERIMENTS.items()},
+    }
+
+
+def contradictions(laboratory: Laboratory) -> list[str]:
+    """Values of a laboratory that contradict a printed number, each in a line."""
+    by_name = subjects(laboratory)
+    lines = []
+    for group in printed_facts():
+        for name in EXPERIMENTS if group.of == ("each",) else group.of:
+            for fact in group.facts:
+                value = operator.attrgetter(fact.path)(by_name[name])
+                if not fact.allows(value):
+                    lines.append(f"{name}: {fact.path} is {value}, printed {fact.printed} ({fact.where})")
+    return lines
