@@ -1,0 +1,249 @@
+"""Arms, sensors, surfaces and errors of the sensor in free motion, as the judge of force laws draws them.
+
+All numbers are the judge's own: it reads no file of palpate. Each constant names its source.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+FULL_SPEED = 0.25  # m/s, ISO 10218-1: reduced speed, the limit of hand-guided and collaborative cells
+ACCURACY = (
+    4.0  # N, Universal Robots, UR5e data sheet: accuracy of the force sensor; largest error after the touch
+)
+JITTER = 2e-4  # s, wake-up of a control thread on a host with ordinary scheduling, one tick in five
+MISSED = 0.002  # probability that a tick is lost, and half as often two: a wire with other traffic
+LAYERS = ((0.0, 500.0), (0.02, 1e5))  # m, N/m: tissue of 20 mm over bone, the case that was reported
+FEWEST_STIFFNESS = 300.0  # N/m, soft foam and tissue
+POWERS = (1.5, 2.0)  # a sphere (Hertz) and a cone (Sneddon) pressed into an elastic half-space
+SEGMENTS = 12  # of a power law; the tangent changes by at most a third from one to the next
+TAU = (1e-4, 2e-3)  # s, damping over stiffness: steel on rubber to foam; a loss of 0.4 to 8 % at 6 Hz
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Arm along one direction, as identified, and the half-widths of the intervals it is drawn from.
+
+    Attributes:
+        kind: `position`, `torque` or `servo`.
+        rate: of the force loop [Hz].
+        mass: of the tip along the normal, without a tool [kg], within 10 %.
+        stiffness: between command and tip [N/m]; a gain of software for a torque arm, else within `spread`.
+        damping: between command and tip of a position arm, against the ground of others [N s/m].
+        delay: from command to motion [s], between half of it and all of it.
+        bandwidth: of the motors of a position arm [rad/s]; 0 for others.
+        ratio: their damping ratio.
+        spread: relative half-width of stiffness, damping, bandwidth and ratio.
+        tool: mass beyond the sensor [kg].
+    """
+
+    kind: str
+    rate: float
+    mass: float
+    stiffness: float
+    damping: float
+    delay: float
+    bandwidth: float = 0.0
+    ratio: float = 1.0
+    spread: float = 0.03
+    tool: float = 0.0
+
+    def draw(self, rng: np.random.Generator) -> Arm:
+        """Arm within the intervals, with a tool of up to 0.5 kg: a probe or a small gripper."""
+        near = lambda value: value * (1 + self.spread * rng.uniform(-1, 1))  # noqa: E731
+        tool = rng.uniform(0, MAX_TOOL)
+        return replace(
+            self,
+            mass=self.mass * rng.uniform(0.9, 1.1) + tool,
+            stiffness=near(self.stiffness),
+            damping=near(self.damping),
+            delay=self.delay * rng.uniform(0.5, 1),
+            bandwidth=near(self.bandwidth),
+            ratio=near(self.ratio),
+            tool=tool,
+        )
+
+    @property
+    def theta(self) -> float:
+        """Largest residual travel per unit of speed after the reading that ends it, in the whole interval [s].
+
+        The tip's lag behind a ramp, the delay, the low-pass' group delay, one sample of the sensor and one tick. A servo
+        is commanded with the inverse of its slow pole, so that its fast pole remains.
+        """
+        if self.kind == "position":
+            ramp = 2 * self.ratio / self.bandwidth * (1 + self.spread) / (1 - self.spread)
+        elif self.kind == "torque":
+            ramp = self.damping / self.stiffness
+        else:
+            ramp = self.mass / self.damping
+        return ramp + self.delay + 2 / (2 * np.pi * LOW_PASS) + 1 / SAMPLING + 1 / self.rate + JITTER
+
+    def pushed(self, cap: float) -> float:
+        """Force per unit of commanded speed by the travel within `theta`, on a surface of stiffness `cap` [N s/m]."""
+        return self.theta * cap * self.stiffness / (cap + self.stiffness)
+
+    def swung(self, cap: float) -> float:
+        """Force per unit of speed by the largest momentum of tip and tool, likewise [N s/m]."""
+        return float(np.sqrt(cap * (1.1 * self.mass + MAX_TOOL)))
+
+
+MAX_TOOL = 0.5  # kg
+SAMPLING, LOW_PASS = 480.0, 120.0  # Hz, assumed: a sensor at a quarter of its rate, on its own clock
+NOISE, RESOLUTION = (
+    0.1,
+    0.02,
+)  # N, standard deviation and step of a reading; makers of six-axis sensors state as much
+
+# Masses: along the vertical at `home` from links, joints and rotors of 0.1 kg m^2 in the public descriptions
+# (Universal_Robots_ROS2_Description, franka_description, drake's iiwa14). Position arm: no maker prints the inner
+# loop; servoj's shortest look-ahead is 0.03 s (URScript manual), the lag 2 z/w of these motors. 5e4 N/m: measured
+# stiffnesses of arms of this size are 2e4 to 1e5. Torque arms: 1 kHz (libfranka, FRI); stiffness and damping are
+# set in software, for 0.6 of critical damping. Servo: joint gains 2000 and 500 N m/rad, a fifth of it as damping
+# (MuJoCo menagerie, UR5e), reflected to the tip at `home`.
+ARMS = {
+    "ur5e": Arm("position", 500.0, 3.67, 5e4, 43.0, 0.010, bandwidth=2 * np.pi * 10, ratio=0.9),
+    "fr3": Arm("torque", 1000.0, 3.87, 15000.0, 300.0, 0.001, spread=0.0),
+    "iiwa14": Arm("torque", 1000.0, 6.56, 15000.0, 380.0, 0.001, spread=0.0),
+    "servo": Arm("servo", 500.0, 3.67, 4950.0, 990.0, 0.008),
+}
+
+
+def arm_file(arm: Arm, title: str) -> str:
+    """Arm file of `palpate tune` for the middle of the intervals: what its user would have identified."""
+    inner = [f'kind = "{arm.kind}"', f"mass = {arm.mass + MAX_TOOL / 2}", f"stiffness = {arm.stiffness}"]
+    if arm.kind == "position":
+        inner += [f"bandwidth = {arm.bandwidth / (2 * np.pi)}", f"damping = {arm.ratio}"]
+    else:
+        inner += [f"damping = {arm.damping}"]
+    sensor = [f"sampling = {SAMPLING}", f"noise = {NOISE}", f'low_pass = "butterworth3:{LOW_PASS:g}"']
+    limits = [f"speed = {FULL_SPEED}", "stiffness = 1000000.0"]
+    parts = {
+        "inner": [*inner, f"delay = {arm.delay}"],
+        "sensor": [*sensor, "full_scale = 500.0"],
+        "limits": limits,
+    }
+    tables = (f"\n[{name}]\n" + "\n".join(lines) for name, lines in parts.items())
+    return f'title = "{title}"\nrate = {arm.rate}\n' + "\n".join(tables) + "\n"
+
+
+class Errors(NamedTuple):
+    """Errors of the reading [N] by time and place, without noise.
+
+    Attributes:
+        cable: force per metre of a cable or hose on the tool [N/m].
+        begin: place where it begins to pull [m].
+        slips: place from which its force stays [m].
+        ends: place where it lets go [m].
+        ripple: amplitude by the pose [N].
+        wave: its length [m].
+        phase: its phase at the start [rad].
+        drift: change in time [N/s].
+        settles: time after which it stays [s].
+    """
+
+    cable: float = 0.0
+    begin: float = 0.0
+    slips: float = 0.0
+    ends: float = 1e3
+    ripple: float = 0.0
+    wave: float = 1.0
+    phase: float = 0.0
+    drift: float = 0.0
+    settles: float = 0.0
+
+
+class Draw(NamedTuple):
+    """One press: arm, distance to the surface [m], its stiffness by depth, damping, sensor and errors.
+
+    `layers` are pairs of depth [m] and incremental stiffness from there on [N/m]; damping is `tau` times the stiffness.
+    """
+
+    arm: Arm
+    distance: float
+    layers: tuple[tuple[float, float], ...]
+    tau: float
+    noise: float
+    low_pass: float
+    sampling: float
+    errors: Errors
+    seed: int
+
+    def least_time(self, force: float, force_max: float, per_speed: float) -> float:
+        """Shortest time to `force` of laws whose speed is at most (F_max - F)/`per_speed` [s].
+
+        On stiffness K: (`per_speed`/K) ln(F_max/(F_max - F_d)); layer by layer.
+        """
+        time, reached = 0.0, 0.0
+        for (depth, stiffness), (deeper, _) in zip(self.layers, [*self.layers[1:], (np.inf, 0)], strict=True):
+            after = min(force, reached + stiffness * (deeper - depth))
+            time += per_speed / stiffness * np.log((force_max - reached) / (force_max - after))
+            reached = after
+        return time
+
+
+def power_law(power: float, tangent: float, force: float, cap: float) -> tuple[tuple[float, float], ...]:
+    """Force c p^n in segments, with a given tangent at a force; a straight line where it reaches the cap."""
+    depth = power * force / tangent  # at the force
+    end = depth * (cap / tangent) ** (1 / (power - 1))
+    depths = np.concatenate([[0], np.geomspace(depth / 8, end, SEGMENTS)])
+    forces = force * (depths / depth) ** power
+    return tuple(zip(depths.tolist(), [*(np.diff(forces) / np.diff(depths)).tolist(), cap], strict=True))
+
+
+def draw_surface(
+    rng: np.random.Generator, case: str, force: float, cap: float
+) -> tuple[tuple[float, float], ...]:
+    """Surface of at most the stiffness `cap`: layers and power laws, or a single spring."""
+    log = lambda low, high: float(np.exp(rng.uniform(np.log(low), np.log(high))))  # noqa: E731
+    if case != "layers":
+        return ((0.0, log(FEWEST_STIFFNESS, cap)),)
+    kind = rng.integers(4)
+    if kind == 0:
+        return tuple((depth, min(stiffness, cap)) for depth, stiffness in LAYERS)
+    if kind == 1:
+        return power_law(POWERS[rng.integers(len(POWERS))], log(FEWEST_STIFFNESS, cap / 3), force, cap)
+    soft = log(FEWEST_STIFFNESS, 5000)  # N/m, tissue and foam
+    # The base is met at up to 1.5 times the desired force: below it on the way, above it by an overshoot.
+    return ((0.0, soft), (force / soft * rng.uniform(0.05, 1.5), log(max(1e4, soft), cap)))
+
+
+def draw_errors(rng: np.random.Generator, case: str, distance: float) -> Errors:
+    """Errors of the reading in free motion; none is above ACCURACY where the tip touches."""
+    sign = 1 if rng.random() < 0.75 else -1  # more cables hold the tool back than push it
+    if case == "cable":
+        cable, begin = np.exp(rng.uniform(np.log(30), np.log(300))), rng.uniform(0, 0.5) * distance
+        if rng.random() < 0.5:  # it drags along with a force that stays
+            return Errors(sign * cable, begin, begin + rng.uniform(1, ACCURACY) / cable)
+        ends = rng.uniform(begin, distance)  # it catches, with up to 15 N, and lets go before the surface
+        return Errors(sign * cable, begin, begin + 15 / cable, ends)
+    if case == "pose":  # 1.5 N over 60 mm: external force of a torque arm by its model, as users report
+        return Errors(ripple=1.5, wave=rng.uniform(0.05, 0.07), phase=rng.uniform(0, 2 * np.pi))
+    if case == "drift":  # a sensor that warms up
+        rate = rng.uniform(0.5, 1.0) * rng.choice((-1, 1))
+        return Errors(drift=rate, settles=ACCURACY / abs(rate))
+    return Errors()
+
+
+def draw_press(arm: Arm, case: str, force: float, cap: float, seed: int) -> Draw:
+    """Press number `seed` of a case, the same for every law and simulator."""
+    rng = np.random.default_rng([seed, *case.encode()])
+    near = case in {"clean", "layers"}
+    distance = float(np.exp(rng.uniform(*np.log((0.003, 0.01) if near else (0.01, 0.06)))))
+    layers = draw_surface(rng, case, force, cap)
+    tau = float(np.exp(rng.uniform(*np.log(TAU))))
+    # K + B/theta is within the cap, as `palpate tune --stiffness-cap` counts it.
+    layers = tuple((depth, min(stiffness, cap / (1 + tau / arm.theta))) for depth, stiffness in layers)
+    return Draw(
+        arm=arm.draw(rng),
+        distance=distance,
+        layers=layers,
+        tau=tau,
+        noise=NOISE if case == "clean" else NOISE * rng.uniform(0.5, 1.5),
+        low_pass=LOW_PASS * rng.uniform(0.97, 1.03),
+        sampling=SAMPLING * rng.uniform(0.999, 1.001),
+        errors=draw_errors(rng, case, distance),
+        seed=seed,
+    )
