@@ -25,77 +25,52 @@ TAU = (1e-4, 2e-3)  # s, damping over stiffness: steel on rubber to foam; a loss
 
 @dataclass(frozen=True)
 class Arm:
-    """Arm along one direction, as identified, and the half-widths of the intervals it is drawn from.
+    """Arm along one direction, as identified; `draw` has one within the intervals."""
 
-    Attributes:
-        kind: `position`, `torque` or `servo`.
-        rate: of the force loop [Hz].
-        mass: of the tip along the normal, without a tool [kg], within 10 %.
-        stiffness: between command and tip [N/m]; a gain of software for a torque arm, else within `spread`.
-        damping: between command and tip of a position arm, against the ground of others [N s/m].
-        delay: from command to motion [s], between half of it and all of it.
-        bandwidth: of the motors of a position arm [rad/s]; 0 for others.
-        ratio: their damping ratio.
-        spread: relative half-width of stiffness, damping, bandwidth and ratio.
-        tool: mass beyond the sensor [kg].
-    """
-
-    kind: str
-    rate: float
-    mass: float
-    stiffness: float
-    damping: float
-    delay: float
-    bandwidth: float = 0.0
-    ratio: float = 1.0
-    spread: float = 0.03
-    tool: float = 0.0
+    kind: str  # position, torque or servo
+    rate: float  # of the force loop [Hz]
+    mass: float  # of the tip along the normal, without a tool [kg], within 10 %
+    stiffness: float  # between command and tip [N/m]
+    damping: float  # between command and tip of a position arm, against the ground of others [N s/m]
+    delay: float  # from command to motion [s], between half of it and all of it
+    bandwidth: float = 0.0  # of the motors of a position arm [rad/s]
+    ratio: float = 1.0  # their damping ratio
+    spread: float = 0.03  # relative half-width of all but mass and delay; 0 where software sets them
+    tool: float = 0.0  # mass beyond the sensor, a part of `mass` once it is drawn [kg]
 
     def draw(self, rng: np.random.Generator) -> Arm:
-        """Arm within the intervals, with a tool of up to 0.5 kg: a probe or a small gripper."""
-        near = lambda value: value * (1 + self.spread * rng.uniform(-1, 1))  # noqa: E731
+        """Arm within the intervals, with a tool."""
+        names = ("stiffness", "damping", "bandwidth", "ratio")
+        near = {name: getattr(self, name) * (1 + self.spread * rng.uniform(-1, 1)) for name in names}
         tool = rng.uniform(0, MAX_TOOL)
-        return replace(
-            self,
-            mass=self.mass * rng.uniform(0.9, 1.1) + tool,
-            stiffness=near(self.stiffness),
-            damping=near(self.damping),
-            delay=self.delay * rng.uniform(0.5, 1),
-            bandwidth=near(self.bandwidth),
-            ratio=near(self.ratio),
-            tool=tool,
-        )
+        mass = self.mass * rng.uniform(0.9, 1.1) + tool
+        return replace(self, mass=mass, delay=self.delay * rng.uniform(0.5, 1), tool=tool, **near)
 
     @property
     def theta(self) -> float:
         """Largest residual travel per unit of speed after the reading that ends it, in the whole interval [s].
 
-        The tip's lag behind a ramp, the delay, the low-pass' group delay, one sample of the sensor and one tick. A servo
-        is commanded with the inverse of its slow pole, so that its fast pole remains.
+        Lag of the tip behind a ramp, delay, group delay of the low-pass, one sample, one tick and its jitter. A servo
+        is commanded by the inverse of its slow pole, so its fast pole remains.
         """
         if self.kind == "position":
             ramp = 2 * self.ratio / self.bandwidth * (1 + self.spread) / (1 - self.spread)
-        elif self.kind == "torque":
-            ramp = self.damping / self.stiffness
         else:
-            ramp = self.mass / self.damping
+            ramp = self.damping / self.stiffness if self.kind == "torque" else self.mass / self.damping
         return ramp + self.delay + 2 / (2 * np.pi * LOW_PASS) + 1 / SAMPLING + 1 / self.rate + JITTER
 
     def pushed(self, cap: float) -> float:
-        """Force per unit of commanded speed by the travel within `theta`, on a surface of stiffness `cap` [N s/m]."""
+        """Force per unit of speed by the travel within `theta`, K_eff theta on a surface of the cap [N s/m]."""
         return self.theta * cap * self.stiffness / (cap + self.stiffness)
 
     def swung(self, cap: float) -> float:
-        """Force per unit of speed by the largest momentum of tip and tool, likewise [N s/m]."""
+        """Force per unit of speed by the largest momentum of tip and tool, sqrt(K m) [N s/m]."""
         return float(np.sqrt(cap * (1.1 * self.mass + MAX_TOOL)))
 
 
-MAX_TOOL = 0.5  # kg
-SAMPLING, LOW_PASS = 480.0, 120.0  # Hz, assumed: a sensor at a quarter of its rate, on its own clock
-NOISE, RESOLUTION = (
-    0.1,
-    0.02,
-)  # N, standard deviation and step of a reading; makers of six-axis sensors state as much
+MAX_TOOL = 0.5  # kg, a probe or a small gripper
+SAMPLING, LOW_PASS = 480.0, 120.0  # Hz, assumed: low-pass at a quarter of the rate, on a clock of its own
+NOISE, RESOLUTION = 0.1, 0.02  # N, assumed: standard deviation and step of a reading of a six-axis sensor
 
 # Masses: along the vertical at `home` from links, joints and rotors of 0.1 kg m^2 in the public descriptions
 # (Universal_Robots_ROS2_Description, franka_description, drake's iiwa14). Position arm: no maker prints the inner
@@ -113,46 +88,40 @@ ARMS = {
 
 def arm_file(arm: Arm, title: str) -> str:
     """Arm file of `palpate tune` for the middle of the intervals: what its user would have identified."""
-    inner = [f'kind = "{arm.kind}"', f"mass = {arm.mass + MAX_TOOL / 2}", f"stiffness = {arm.stiffness}"]
-    if arm.kind == "position":
-        inner += [f"bandwidth = {arm.bandwidth / (2 * np.pi)}", f"damping = {arm.ratio}"]
-    else:
-        inner += [f"damping = {arm.damping}"]
-    sensor = [f"sampling = {SAMPLING}", f"noise = {NOISE}", f'low_pass = "butterworth3:{LOW_PASS:g}"']
-    limits = [f"speed = {FULL_SPEED}", "stiffness = 1000000.0"]
-    parts = {
-        "inner": [*inner, f"delay = {arm.delay}"],
-        "sensor": [*sensor, "full_scale = 500.0"],
-        "limits": limits,
-    }
-    tables = (f"\n[{name}]\n" + "\n".join(lines) for name, lines in parts.items())
-    return f'title = "{title}"\nrate = {arm.rate}\n' + "\n".join(tables) + "\n"
+    position = arm.kind == "position"
+    motors = f"bandwidth = {arm.bandwidth / (2 * np.pi)}" if position else ""
+    return f"""title = "{title}"
+rate = {arm.rate}
+[inner]
+kind = "{arm.kind}"
+mass = {arm.mass + MAX_TOOL / 2}
+stiffness = {arm.stiffness}
+damping = {arm.ratio if position else arm.damping}
+delay = {arm.delay}
+{motors}
+[sensor]
+sampling = {SAMPLING}
+noise = {NOISE}
+low_pass = "butterworth3:{LOW_PASS:g}"
+full_scale = 500.0
+[limits]
+speed = {FULL_SPEED}
+stiffness = 1000000.0
+"""
 
 
 class Errors(NamedTuple):
-    """Errors of the reading [N] by time and place, without noise.
+    """Errors of the reading [N] by time and place, without noise."""
 
-    Attributes:
-        cable: force per metre of a cable or hose on the tool [N/m].
-        begin: place where it begins to pull [m].
-        slips: place from which its force stays [m].
-        ends: place where it lets go [m].
-        ripple: amplitude by the pose [N].
-        wave: its length [m].
-        phase: its phase at the start [rad].
-        drift: change in time [N/s].
-        settles: time after which it stays [s].
-    """
-
-    cable: float = 0.0
-    begin: float = 0.0
-    slips: float = 0.0
-    ends: float = 1e3
-    ripple: float = 0.0
-    wave: float = 1.0
-    phase: float = 0.0
-    drift: float = 0.0
-    settles: float = 0.0
+    cable: float = 0.0  # force per metre of a cable or hose on the tool [N/m]
+    begin: float = 0.0  # place where it begins to pull [m]
+    slips: float = 0.0  # place from which its force stays [m]
+    ends: float = 1e3  # place where it lets go [m]
+    ripple: float = 0.0  # amplitude of the force that changes with the pose [N]
+    wave: float = 1.0  # its length [m]
+    phase: float = 0.0  # its phase at the start [rad]
+    drift: float = 0.0  # change in time [N/s]
+    settles: float = 0.0  # time after which it stays [s]
 
 
 class Draw(NamedTuple):

@@ -10,28 +10,21 @@ import tempfile
 from collections import deque
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 from press_draws import RESOLUTION, Draw
 
 
 class Sample(NamedTuple):
-    """State after a tick: reading [N], measured and true position [m], force [N], its largest, error of the reading [N]."""
+    """State after a tick."""
 
-    reading: float
-    position: float
-    tip: float
-    force: float
-    largest: float
-    error: float
-
-
-class World(Protocol):
-    """Arm before a surface, at rest at the start."""
-
-    def tick(self, command: float, duration: float, noise: float) -> Sample:
-        """Move for `duration` [s] under the commanded position [m]; `noise` is a standard normal draw."""
+    reading: float  # N
+    position: float  # of the encoders [m]
+    tip: float  # true position [m]
+    force: float  # true force on the surface [N]
+    largest: float  # the same, its largest within the tick [N]
+    error: float  # of the reading, without noise [N]
 
 
 C_STEP = 1e-4
