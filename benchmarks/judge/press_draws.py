@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 FULL_SPEED = 0.25  # m/s, ISO 10218-1: reduced speed, the limit of hand-guided and collaborative cells
-ACCURACY = (
-    4.0  # N, Universal Robots, UR5e data sheet: accuracy of the force sensor; largest error after the touch
-)
+ACCURACY = 4.0  # N, force sensor in the data sheet of the UR5e; here the largest error after the touch
+BIAS = 1.0  # N, part of it that taring leaves: the data sheet of the FR3 prints 0.8 N
 JITTER = 2e-4  # s, wake-up of a control thread on a host with ordinary scheduling, one tick in five
 MISSED = 0.002  # probability that a tick is lost, and half as often two: a wire with other traffic
 LAYERS = ((0.0, 500.0), (0.02, 1e5))  # m, N/m: tissue of 20 mm over bone, the case that was reported
 FEWEST_STIFFNESS = 300.0  # N/m, soft foam and tissue
 POWERS = (1.5, 2.0)  # a sphere (Hertz) and a cone (Sneddon) pressed into an elastic half-space
-SEGMENTS = 12  # of a power law; the tangent changes by at most a third from one to the next
+SEGMENTS = 12  # of a power law; the tangent changes by about a third from one to the next
+HARDENED = 10.0  # multiple of the desired force from which a power law goes on straight
 TAU = (1e-4, 2e-3)  # s, damping over stiffness: steel on rubber to foam; a loss of 0.4 to 8 % at 6 Hz
 
 
@@ -71,6 +71,7 @@ class Arm:
 MAX_TOOL = 0.5  # kg, a probe or a small gripper
 SAMPLING, LOW_PASS = 480.0, 120.0  # Hz, assumed: low-pass at a quarter of the rate, on a clock of its own
 NOISE, RESOLUTION = 0.1, 0.02  # N, assumed: standard deviation and step of a reading of a six-axis sensor
+FULL_SCALE = 100.0  # N, assumed: between the 50 N of a UR5e and the 145 N of small six-axis sensors
 
 # Masses: along the vertical at `home` from links, joints and rotors of 0.1 kg m^2 in the public descriptions
 # (Universal_Robots_ROS2_Description, franka_description, drake's iiwa14). Position arm: no maker prints the inner
@@ -103,7 +104,7 @@ delay = {arm.delay}
 sampling = {SAMPLING}
 noise = {NOISE}
 low_pass = "butterworth3:{LOW_PASS:g}"
-full_scale = 500.0
+full_scale = {FULL_SCALE}
 [limits]
 speed = {FULL_SPEED}
 stiffness = 1000000.0
@@ -113,6 +114,7 @@ stiffness = 1000000.0
 class Errors(NamedTuple):
     """Errors of the reading [N] by time and place, without noise."""
 
+    bias: float = 0.0  # N
     cable: float = 0.0  # force per metre of a cable or hose on the tool [N/m]
     begin: float = 0.0  # place where it begins to pull [m]
     slips: float = 0.0  # place from which its force stays [m]
@@ -154,12 +156,13 @@ class Draw(NamedTuple):
 
 
 def power_law(power: float, tangent: float, force: float, cap: float) -> tuple[tuple[float, float], ...]:
-    """Force c p^n in segments, with a given tangent at a force; a straight line where it reaches the cap."""
+    """Force c p^n in segments, with a given tangent at a force; straight from where that is at the cap."""
     depth = power * force / tangent  # at the force
-    end = depth * (cap / tangent) ** (1 / (power - 1))
+    end = depth * min(cap / tangent, HARDENED ** (1 - 1 / power)) ** (1 / (power - 1))
     depths = np.concatenate([[0], np.geomspace(depth / 8, end, SEGMENTS)])
     forces = force * (depths / depth) ** power
-    return tuple(zip(depths.tolist(), [*(np.diff(forces) / np.diff(depths)).tolist(), cap], strict=True))
+    stiffness = [*(np.diff(forces) / np.diff(depths)).tolist(), power * forces[-1] / end]
+    return tuple(zip(depths.tolist(), stiffness, strict=True))
 
 
 def draw_surface(
@@ -182,18 +185,19 @@ def draw_surface(
 def draw_errors(rng: np.random.Generator, case: str, distance: float) -> Errors:
     """Errors of the reading in free motion; none is above ACCURACY where the tip touches."""
     sign = 1 if rng.random() < 0.75 else -1  # more cables hold the tool back than push it
+    bias, most = rng.uniform(-BIAS, BIAS), ACCURACY - BIAS
     if case == "cable":
         cable, begin = np.exp(rng.uniform(np.log(30), np.log(300))), rng.uniform(0, 0.5) * distance
         if rng.random() < 0.5:  # it drags along with a force that stays
-            return Errors(sign * cable, begin, begin + rng.uniform(1, ACCURACY) / cable)
+            return Errors(bias, sign * cable, begin, begin + rng.uniform(1, most) / cable)
         ends = rng.uniform(begin, distance)  # it catches, with up to 15 N, and lets go before the surface
-        return Errors(sign * cable, begin, begin + 15 / cable, ends)
+        return Errors(bias, sign * cable, begin, begin + 15 / cable, ends)
     if case == "pose":  # 1.5 N over 60 mm: external force of a torque arm by its model, as users report
-        return Errors(ripple=1.5, wave=rng.uniform(0.05, 0.07), phase=rng.uniform(0, 2 * np.pi))
+        return Errors(bias, ripple=1.5, wave=rng.uniform(0.05, 0.07), phase=rng.uniform(0, 2 * np.pi))
     if case == "drift":  # a sensor that warms up
         rate = rng.uniform(0.5, 1.0) * rng.choice((-1, 1))
-        return Errors(drift=rate, settles=ACCURACY / abs(rate))
-    return Errors()
+        return Errors(bias, drift=rate, settles=most / abs(rate))
+    return Errors(bias if case == "layers" else 0.0)
 
 
 def draw_press(arm: Arm, case: str, force: float, cap: float, seed: int) -> Draw:

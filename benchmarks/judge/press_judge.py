@@ -60,17 +60,20 @@ def press(law: Law, world: Axis | Engine, draw: Draw, force: float, approach: fl
     command, reading, position, missed, skip = 0.0, 0.0, 0.0, 0, 0
     tips, forces, times = [0.0], [], []
     peak, fast, error, time, touch, inside = 0.0, False, 0.0, 0.0, np.inf, 0.0
-    window = round(WINDOW / period)
+    window, ticks = round(WINDOW / period), int((BEFORE_TOUCH + AFTER_TOUCH) / period * 1.1)
+    jitter = JITTER * rng.choice((-1, 0, 1), ticks, p=(0.1, 0.8, 0.1))
+    noise, lost = rng.standard_normal(ticks), rng.random(ticks)
+    skips = (lost < MISSED).astype(int) + (lost < MISSED / 2)
+    tick = 0
     while time < min(touch, BEFORE_TOUCH) + AFTER_TOUCH * np.isfinite(touch) and inside < REST:
         if skip:
             skip, missed = skip - 1, missed + 1
         else:
             command += period * law.update(reading, position, missed)
-            lost, missed = rng.random(), 0
-            skip = int(lost < MISSED) + int(lost < MISSED / 2)
-        duration = period + JITTER * rng.choice((-1, 0, 1), p=(0.1, 0.8, 0.1))
-        sample = world.tick(command, duration, rng.standard_normal())
-        reading, position, time = sample.reading, sample.position, time + duration
+            missed, skip = 0, int(skips[tick])
+        duration = period + float(jitter[tick])
+        sample = world.tick(command, duration, float(noise[tick]))
+        reading, position, time, tick = sample.reading, sample.position, time + duration, tick + 1
         peak, error = max(peak, sample.largest), max(error, abs(sample.error))
         touch = min(touch, time) if sample.largest > 0 else touch
         if np.isinf(touch):

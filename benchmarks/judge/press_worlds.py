@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
-from press_draws import RESOLUTION, Draw
+from press_draws import FULL_SCALE, RESOLUTION, Draw
 
 
 class Sample(NamedTuple):
@@ -31,17 +31,18 @@ C_STEP = 1e-4
 """Step of the simulator in C [s]: a hundredth of the fastest period, 3 kg on 1e5 N/m at 29 Hz, is 3e-4."""
 C_SOURCE = r"""
 #include <math.h>
-/* Semi-implicit Euler. p: w z K D_relative D_ground mass tool place tau low-pass period noise step layers, then pairs
-   of depth and added stiffness, then the errors. s: y y' x x' f f' f'' clock reading time largest force error delay
-   head, then the ring of commands. */
+/* Semi-implicit Euler. p: w z K D_relative D_ground mass tool place tau low-pass period noise step layers scale,
+   then pairs of depth and added stiffness, then the errors. s: y y' x x' f f' f'' clock reading time largest force
+   error delay head, then the ring of commands. */
 enum { RING = 512 };
 static double reading_error(const double *e, double t, double x) {
-    double end = x < e[2] ? x : e[2], cable = x > e[1] && x < e[3] ? e[0] * (end - e[1]) : 0;
-    return cable + e[4] * (sin(6.283185307179586 * x / e[5] + e[6]) - sin(e[6])) + e[7] * (t < e[8] ? t : e[8]);
+    double end = x < e[3] ? x : e[3], cable = x > e[2] && x < e[4] ? e[1] * (end - e[2]) : 0;
+    double ripple = e[5] * (sin(6.283185307179586 * x / e[6] + e[7]) - sin(e[7]));
+    return e[0] + cable + ripple + e[8] * (t < e[9] ? t : e[9]);
 }
 void tick(double *s, const double *p, double command, int steps, double h, double normal) {
     int layers = (int)p[13];
-    const double *surface = p + 14, *errors = surface + 2 * layers;
+    const double *surface = p + 15, *errors = surface + 2 * layers;
     s[10] = 0;
     for (int i = 0; i < steps; i++) {
         int head = (int)s[14];
@@ -76,7 +77,7 @@ void tick(double *s, const double *p, double command, int steps, double h, doubl
         s[7] += h;
         if (s[7] >= p[10]) {
             s[7] -= p[10];
-            s[8] = p[12] * floor((s[4] + p[11] * normal) / p[12] + 0.5);
+            s[8] = fmax(-p[14], fmin(p[14], p[12] * floor((s[4] + p[11] * normal) / p[12] + 0.5)));
         }
     }
 }
@@ -111,7 +112,14 @@ class Axis:
         arm, springs = draw.arm, added_stiffness(draw)
         damping = (arm.damping, 0.0) if arm.kind == "position" else (0.0, arm.damping)
         p = [arm.bandwidth, arm.ratio, arm.stiffness, *damping, arm.mass, arm.tool, draw.distance, draw.tau]
-        p += [2 * math.pi * draw.low_pass, 1 / draw.sampling, draw.noise, RESOLUTION, len(springs)]
+        p += [
+            2 * math.pi * draw.low_pass,
+            1 / draw.sampling,
+            draw.noise,
+            RESOLUTION,
+            len(springs),
+            FULL_SCALE,
+        ]
         p += [number for spring in springs for number in spring] + [*draw.errors]
         self._parameters = (ctypes.c_double * len(p))(*p)
         self._state = (ctypes.c_double * (15 + 512))()
@@ -194,7 +202,7 @@ class Engine:
         draw, e = self._draw, self._draw.errors
         cable = e.cable * (min(x, e.slips) - e.begin) if e.begin < x < e.ends else 0.0
         ripple = e.ripple * (math.sin(2 * math.pi * x / e.wave + e.phase) - math.sin(e.phase))
-        error = cable + ripple + e.drift * min(float(self._data.time), e.settles)
+        error = e.bias + cable + ripple + e.drift * min(float(self._data.time), e.settles)
         # A first-order section before one of second order with damping 0.5: Butterworth of third order.
         w, h = 2 * math.pi * draw.low_pass, MUJOCO_STEP
         first, second, rate = self._filter
@@ -205,7 +213,8 @@ class Engine:
         self._clock += h
         if self._clock >= 1 / draw.sampling:
             self._clock -= 1 / draw.sampling
-            self._reading = RESOLUTION * round((second + draw.noise * noise) / RESOLUTION)
+            reading = RESOLUTION * round((second + draw.noise * noise) / RESOLUTION)
+            self._reading = max(-FULL_SCALE, min(FULL_SCALE, reading))
         return error
 
 

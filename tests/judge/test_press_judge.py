@@ -129,13 +129,9 @@ def test_draws_are_within_the_assumptions(seed, name, case):
     assert np.all(np.diff(depths) > 0)
     assert np.all(stiffness + draw.tau * stiffness / ARMS[name].theta <= 1.001 * CAP)
     world = Axis(draw)
-    place = np.nextafter(draw.distance, 0.0)
-    late = draw.errors._replace(drift=0.0)
-    assert (
-        abs(late.cable) * max(0.0, min(place, late.slips) - late.begin) * (place < late.ends)
-        <= ACCURACY + 1e-9
-    )
-    assert abs(draw.errors.drift) * draw.errors.settles <= ACCURACY + 1e-9
+    errors, place = draw.errors, draw.distance
+    pulled = abs(errors.cable) * max(0.0, min(place, errors.slips) - errors.begin) * (place < errors.ends)
+    assert pulled + 2 * errors.ripple + abs(errors.drift) * errors.settles + abs(errors.bias) <= ACCURACY
     assert world.tick(0.0, 0.002, 0.0).largest == 0.0
 
 
