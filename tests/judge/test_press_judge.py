@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "judge"))
 import press_judge
-from press_draws import ACCURACY, ARMS, FULL_SPEED, draw_press
-from press_worlds import Axis, Engine
+from press_draws import ACCURACY, ARMS, FULL_SPEED, Errors, draw_press
+from press_worlds import Axis, Engine, Sample
 
 FORCE, FORCE_MAX, CAP = 20.0, 100.0, 1e5
 
@@ -92,20 +92,27 @@ def test_a_law_that_takes_an_error_for_a_touch_is_too_fast(case):
 
 
 @pytest.mark.parametrize("name", ARMS)
-@pytest.mark.parametrize("case", press_judge.CASES)
-def test_the_simulators_agree(name, case):
-    """A rise of 10 ms is met to 2 % with steps of 0.1 and 0.2 ms; motors of 1000 kg yield by 15 um to 60 N."""
-    draw = draw_press(ARMS[name], case, FORCE, CAP, 3)
-    draw = draw._replace(distance=0.004, noise=0.0)
+@pytest.mark.parametrize("layers", [((0.0, 3e4),), ((0.0, 500.0), (0.002, 1e5))])
+def test_the_simulators_agree(name, layers):
+    """A press with every error of the reading, without noise, at up to 30 mm/s.
+
+    Steps of 0.1 and 0.2 ms are 6 um apart, motors of 1000 kg yield by 25 um to 100 N. The forces differ by less than
+    2 % of the largest, sampled readings by what they change in 2 ms. A cable may let go one tick earlier.
+    """
+    draw = draw_press(ARMS[name], "clean", FORCE, CAP, 3)
+    errors = Errors(0.5, 150.0, 0.002, 0.006, 0.008, 1.5, 0.06, 1.0, 1.0, 0.2)
+    draw = draw._replace(distance=0.004, layers=layers, tau=0.002, noise=0.0, errors=errors)
     command, rows = 0.0, []
     worlds = Axis(draw), Engine(draw)
     for tick in range(300):
-        command += 0.03 / draw.arm.rate * (tick < 250)
+        command += 0.03 / draw.arm.rate * (tick < 200)
         rows.append([world.tick(command, 1 / draw.arm.rate, 0.0) for world in worlds])
-    a, b = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
-    largest = max(a[:, 4].max(), 20.0)
-    np.testing.assert_allclose(a[:, 1:5], b[:, 1:5], rtol=0.02, atol=0.02 * largest)
-    np.testing.assert_allclose(a[:, 2], b[:, 2], atol=5e-5)
+    first, second = (np.array([row[k] for row in rows]).T for k in (0, 1))
+    largest = first[4].max()
+    assert largest > 10.0
+    for k, tolerance in enumerate((0.08 * largest, 1e-4, 1e-4, 0.02 * largest, 0.02 * largest)):
+        np.testing.assert_allclose(first[k], second[k], rtol=0, atol=tolerance, err_msg=Sample._fields[k])
+    assert np.count_nonzero(np.abs(first[5] - second[5]) > 0.02) <= 1
 
 
 @pytest.mark.parametrize("name", ["ur5e", "fr3", "iiwa14"])
