@@ -104,8 +104,8 @@ def test_the_simulators_agree(name, layers):
     draw = draw._replace(distance=0.004, layers=layers, tau=0.002, noise=0.0, errors=errors)
     command, rows = 0.0, []
     worlds = Axis(draw), Engine(draw)
-    for tick in range(300):
-        command += 0.03 / draw.arm.rate * (tick < 200)
+    for tick in range(int(0.6 * draw.arm.rate)):
+        command += 0.03 / draw.arm.rate * (tick < 0.4 * draw.arm.rate)
         rows.append([world.tick(command, 1 / draw.arm.rate, 0.0) for world in worlds])
     first, second = (np.array([row[k] for row in rows]).T for k in (0, 1))
     largest = first[4].max()
