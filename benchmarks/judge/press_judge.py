@@ -28,7 +28,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 from press_draws import ARMS, JITTER, MAX_TOOL, MISSED, Arm, Draw, arm_file, draw_press
-from press_worlds import WORLDS, Axis, Engine
+from press_simulators import SIMULATORS, Axis, Engine
 
 CASES = ("clean", "layers", "cable", "pose", "drift")
 BAND = 0.05  # of the desired force, in which it has settled
@@ -54,7 +54,7 @@ class Run(NamedTuple):
     settling: float  # s
 
 
-def press(law: Law, world: Axis | Engine, draw: Draw, force: float, approach: float) -> Run:
+def press(law: Law, simulator: Axis | Engine, draw: Draw, force: float, approach: float) -> Run:
     """Press once, tick by tick; `approach` is the law's own speed in free motion [m/s]."""
     rng, period = np.random.default_rng([draw.seed, 1]), 1 / draw.arm.rate
     command, reading, position, missed, skip = 0.0, 0.0, 0.0, 0, 0
@@ -72,7 +72,7 @@ def press(law: Law, world: Axis | Engine, draw: Draw, force: float, approach: fl
             command += period * law.update(reading, position, missed)
             missed, skip = 0, int(skips[tick])
         duration = period + float(jitter[tick])
-        sample = world.tick(command, duration, float(noise[tick]))
+        sample = simulator.tick(command, duration, float(noise[tick]))
         reading, position, time, tick = sample.reading, sample.position, time + duration, tick + 1
         peak, error = max(peak, sample.largest), max(error, abs(sample.error))
         touch = min(touch, time) if sample.largest > 0 else touch
@@ -98,7 +98,7 @@ def judge(make: Callable[[], Law], case: str, args: argparse.Namespace, approach
     """Press `args.runs` times; the quantities of a row of the table."""
     arm = ARMS[args.arm]
     draws = [draw_press(arm, case, args.force, args.cap, args.seed + k) for k in range(args.runs)]
-    runs = [press(make(), WORLDS[args.simulator](draw), draw, args.force, approach) for draw in draws]
+    runs = [press(make(), SIMULATORS[args.simulator](draw), draw, args.force, approach) for draw in draws]
     peaks, settling = np.array([r.peak for r in runs]), np.array([r.settling for r in runs])
     force_max = args.force_max or 5 * args.force
     slopes = arm.pushed(args.cap), arm.pushed(args.cap) + arm.swung(args.cap)
@@ -158,7 +158,7 @@ def main() -> None:
     )
     parser.add_argument("--arm", choices=ARMS, default="ur5e")
     parser.add_argument("--case", choices=[*CASES, "all"], default="all")
-    parser.add_argument("--simulator", choices=WORLDS, default="axis")
+    parser.add_argument("--simulator", choices=SIMULATORS, default="axis")
     parser.add_argument("--runs", type=int, default=100, help="presses of each case")
     parser.add_argument("--seed", type=int, default=0, help="of the first press; the next has the next")
     parser.add_argument("--force", type=float, default=20.0, help="desired force [N]")

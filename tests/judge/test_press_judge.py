@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "judge"))
 import press_judge
 from press_draws import ACCURACY, ARMS, FULL_SPEED, Errors, draw_press
-from press_worlds import Axis, Engine, Sample
+from press_simulators import Axis, Engine, Sample
 
 FORCE, FORCE_MAX, CAP = 20.0, 100.0, 1e5
 
@@ -103,10 +103,10 @@ def test_the_simulators_agree(name, layers):
     errors = Errors(0.5, 150.0, 0.002, 0.006, 0.008, 1.5, 0.06, 1.0, 1.0, 0.2)
     draw = draw._replace(distance=0.004, layers=layers, tau=0.002, noise=0.0, errors=errors)
     command, rows = 0.0, []
-    worlds = Axis(draw), Engine(draw)
+    simulators = Axis(draw), Engine(draw)
     for tick in range(int(0.6 * draw.arm.rate)):
         command += 0.03 / draw.arm.rate * (tick < 0.4 * draw.arm.rate)
-        rows.append([world.tick(command, 1 / draw.arm.rate, 0.0) for world in worlds])
+        rows.append([simulator.tick(command, 1 / draw.arm.rate, 0.0) for simulator in simulators])
     first, second = (np.array([row[k] for row in rows]).T for k in (0, 1))
     largest = first[4].max()
     assert largest > 10.0
@@ -120,9 +120,9 @@ def test_theta_is_the_residual_travel(name):
     """After a ramp the tip moves on by less than theta allows, and by more than half of it: the sensor has the rest."""
     arm = ARMS[name]
     for seed in range(5):
-        world = Axis(draw_press(arm, "clean", FORCE, CAP, seed)._replace(distance=1.0))
+        simulator = Axis(draw_press(arm, "clean", FORCE, CAP, seed)._replace(distance=1.0))
         speed, ramp = 0.1, np.minimum(np.arange(arm.rate) + 1, arm.rate / 2) / arm.rate
-        tips = [world.tick(speed * place, 1 / arm.rate, 0.0).tip for place in ramp]
+        tips = [simulator.tick(speed * place, 1 / arm.rate, 0.0).tip for place in ramp]
         travel = max(tips) - tips[int(arm.rate / 2) - 1]
         assert 0.5 * arm.theta < travel / speed < arm.theta
 
@@ -135,11 +135,11 @@ def test_draws_are_within_the_assumptions(seed, name, case):
     depths, stiffness = np.array(draw.layers).T
     assert np.all(np.diff(depths) > 0)
     assert np.all(stiffness + draw.tau * stiffness / ARMS[name].theta <= 1.001 * CAP)
-    world = Axis(draw)
+    simulator = Axis(draw)
     errors, place = draw.errors, draw.distance
     pulled = abs(errors.cable) * max(0.0, min(place, errors.slips) - errors.begin) * (place < errors.ends)
     assert pulled + 2 * errors.ripple + abs(errors.drift) * errors.settles + abs(errors.bias) <= ACCURACY
-    assert world.tick(0.0, 0.002, 0.0).largest == 0.0
+    assert simulator.tick(0.0, 0.002, 0.0).largest == 0.0
 
 
 def test_the_lower_bound_is_reached_by_the_law_that_it_is_of():

@@ -28,7 +28,7 @@ class Sample(NamedTuple):
 
 
 C_STEP = 1e-4
-"""Step of the simulator in C [s]: a hundredth of the fastest period, 3 kg on 1e5 N/m at 29 Hz, is 3e-4."""
+"""Step of the simulator in C [s]: an eightieth of the low-pass' period, less of a tip of 3 kg on 1e5 N/m."""
 C_SOURCE = r"""
 #include <math.h>
 /* Semi-implicit Euler. p: w z K D_relative D_ground mass tool place tau low-pass period noise step layers scale,
@@ -218,4 +218,4 @@ class Engine:
         return error
 
 
-WORLDS = {"axis": Axis, "mujoco": Engine}
+SIMULATORS = {"axis": Axis, "mujoco": Engine}
