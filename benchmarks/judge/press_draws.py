@@ -1,6 +1,8 @@
 """Arms, sensors, surfaces and errors of the sensor in free motion, as the judge of force laws draws them.
 
-All numbers are the judge's own: it reads no file of palpate. Each constant names its source.
+All numbers are the judge's own: it reads no file of palpate. Each constant names its source. Arms are within their
+intervals, surfaces within the cap, and readings within ACCURACY of the force once the tip touches, noise and the
+inertia of a tool beyond the sensor aside.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ BIAS = 1.0  # N, part of it that taring leaves: the data sheet of the FR3 prints
 JITTER = 2e-4  # s, wake-up of a control thread on a host with ordinary scheduling, one tick in five
 MISSED = 0.002  # probability that a tick is lost, and half as often two: a wire with other traffic
 LAYERS = ((0.0, 500.0), (0.02, 1e5))  # m, N/m: tissue of 20 mm over bone, the case that was reported
-FEWEST_STIFFNESS = 300.0  # N/m, soft foam and tissue
+SOFTEST = 300.0  # N/m, soft foam and tissue
 POWERS = (1.5, 2.0)  # a sphere (Hertz) and a cone (Sneddon) pressed into an elastic half-space
 SEGMENTS = 12  # of a power law; the tangent changes by about a third from one to the next
 HARDENED = 10.0  # multiple of the desired force from which a power law goes on straight
@@ -171,13 +173,13 @@ def draw_surface(
     """Surface of at most the stiffness `cap`: layers and power laws, or a single spring."""
     log = lambda low, high: float(np.exp(rng.uniform(np.log(low), np.log(high))))  # noqa: E731
     if case != "layers":
-        return ((0.0, log(FEWEST_STIFFNESS, cap)),)
+        return ((0.0, log(SOFTEST, cap)),)
     kind = rng.integers(4)
     if kind == 0:
         return tuple((depth, min(stiffness, cap)) for depth, stiffness in LAYERS)
     if kind == 1:
-        return power_law(POWERS[rng.integers(len(POWERS))], log(FEWEST_STIFFNESS, cap / 3), force, cap)
-    soft = log(FEWEST_STIFFNESS, 5000)  # N/m, tissue and foam
+        return power_law(POWERS[rng.integers(len(POWERS))], log(SOFTEST, cap / 3), force, cap)
+    soft = log(SOFTEST, 5000)  # N/m, tissue and foam
     # The base is met at up to 1.5 times the desired force: below it on the way, above it by an overshoot.
     return ((0.0, soft), (force / soft * rng.uniform(0.05, 1.5), log(max(1e4, soft), cap)))
 
