@@ -3,11 +3,11 @@
     benchmarks/second_judge/judge.py [--logs 20] [--seed 1] [--worlds sphere tap] [--jobs 2] [--out FILE] [--json]
 
 Every log is typed twice, with `--json` and as a person types it. An interval *holds* if it meets the truth (several
-definitions of one stiffness make a range; of two surfaces it must contain both); it is *wrong* if the truth is further
-than three half-widths away. *Known* logs are those whose K an estimator that knows the world has to 5 %; *sharp* ones of
-them have K identified to max(1 %, three times that estimator's half-width): on a curved or relaxing surface K or the
-stiffness at the working point. Under *exit*: exit code 0 with nothing identified, or two codes for one log. Seeds 1 to 9
-are for comparisons between versions; seed 1 is quoted. `--out` keeps each log's result, and resumes.
+definitions of one stiffness make a range; of two surfaces it must contain both); it is *wrong* if the truth is
+further than three half-widths away. *Known* logs are those whose K an estimator that knows the world has to 5 %;
+*sharp* ones of them have K identified to max(1 %, three times that estimator's half-width): on a curved or relaxing
+surface K or the stiffness at the working point. Under *exit*: exit codes against the verdicts, or two codes for one
+log. Seeds 1 to 9 compare versions; seed 1 is quoted. `--out` keeps each log's result, and resumes.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ import laboratory
 WRONG = 3.0
 """Half-widths between value and truth beyond which an answer is confidently wrong."""
 KNOWN, SHARP_TIMES, SHARP = 0.05, 3.0, 0.01
+DOUBTFUL = {"unit-guess", "unit-doubtful", "time-doubtful", "columns-swapped"}
+"""Warnings that make the exit code 1 whatever is identified."""
 NAMES = [*laboratory.WORLDS, *laboratory.CAUSES]
 
 
@@ -103,6 +105,7 @@ def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
     identified = any(v.get("verdict") == "identified" for _, v in values) or any(
         p.get("verdict") == "identified" for p in parameters.values()
     )
+    doubtful = DOUBTFUL & {warning["code"] for warning in answer.get("warnings", ())}
     return {
         "world": log.name,
         "model": answer.get("model"),
@@ -110,7 +113,7 @@ def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
         "known": known,
         "sharp": known and any(w <= max(SHARP, SHARP_TIMES * log.known) for w in widths),
         "crash": 70 in codes,
-        "exit": codes[0] != codes[1] or (codes[0] == 0 and not identified),
+        "exit": codes[0] != codes[1] or (codes[0] < 2 and (codes[0] == 0) != (identified and not doubtful)),
         "refused": codes[0] == 2,
     }
 
@@ -150,7 +153,7 @@ def table(rows: list[dict]) -> str:
     def share(part: int, of: int) -> str:
         return f"{100 * part / of:.0f} %" if of else "-"
 
-    head = "world | logs | answers | hold | wrong | known | sharp | working point | holds | wrong | crash | exit | refused"
+    head = "world | logs | answers | hold | wrong | known | sharp | points | hold | wrong | crash | exit | refused"
     lines = [f"| {head} |", "|---" * (head.count("|") + 1) + "|"]
     groups = [(name, [name]) for name in NAMES]
     groups += [

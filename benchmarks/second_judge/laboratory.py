@@ -1,8 +1,8 @@
 """Simulated laboratories of the second judge: logs, their truth, and the precision of an estimator that knows them.
 
-By an author who has not read the estimator; NumPy and SciPy alone. Ten worlds differ by surface, motion and recording.
-Ten causes of time (the last one in three forms) act on a linear surface under an ordinary press. The force is a function
-of the position as it is recorded: whatever moves the surface or the position's zero is a shift of the surface.
+By an author who has not read the estimator; NumPy and SciPy alone. Ten worlds differ by surface, motion and
+recording. Ten causes of time (the last one in three forms) act on a linear surface under an ordinary press. The force
+is a function of the recorded position: what moves the surface or the position's zero is a shift of the surface.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -28,10 +29,10 @@ class Scene:
     """One log before it is written: motion, surface, recording and causes; all SI.
 
     Attributes:
-        p: parameters: K at the depth `scale`, B, M, x0, zero (of the force) and lag; r and tau (and r2, tau2) of a force
-            that relaxes; n of a curved surface; step and depth of a layer; and the amplitudes of causes.
-        shapes: over time, for the amplitudes `tone` (of the stiffness), `shift` (of the surface), `added` (to the force)
-            and `gain` (of the sensor).
+        p: parameters: K at the depth `scale`, B, M, x0, zero (of the force) and lag; r and tau (and r2, tau2) of
+            a force that relaxes; n of a curved surface; step and depth of a layer; and the amplitudes of causes.
+        shapes: over time, for the amplitudes `tone` (of the stiffness), `shift` (of the surface), `added` (to the
+            force) and `gain` (of the sensor).
         truth: "meets": an interval is right if it meets the range of the definitions of stiffness; "covers": if it
             contains all of it, as with two surfaces in one log.
     """
@@ -133,14 +134,8 @@ def sample(y: Array, scene: Scene, averaged: bool) -> Array:
 def read_position(scene: Scene) -> Array:
     y = scene.x
     if scene.position_low_pass:
-        y = y[0] + relaxed(y - y[0], 1.0 / (2 * np.pi * scene.position_low_pass), scene.dt)
+        y = y - relaxing(y, 1.0 / (2 * np.pi * scene.position_low_pass), scene.dt)
     return sample(y, scene, scene.averaged == "both")
-
-
-def relaxed(y: Array, tau: float, dt: float) -> Array:
-    """Low-pass of first order."""
-    a = np.exp(-dt / tau)
-    return lfilter([1.0 - a], [1.0, -a], y)
 
 
 def known_half(scene: Scene, force: float, noise_f: float, noise_x: float, colour: float) -> float:
@@ -361,8 +356,8 @@ def hand_held(rng: Rng) -> Scene:
     p, depth = surface(rng, (1.0, 20.0), (200.0, 1e4))
     rate = float(rng.choice([60, 100, 250]))
     t = grid(rng.uniform(15.0, 40.0), rate)
-    wander = gaussian_filter1d(rng.normal(size=len(t)), 0.16 / log_uniform(rng, 0.3, 3.0) / (t[1] - t[0]))
-    return Scene(t, depth * (0.1 + 0.4 * wander / wander.std()), rate, p, depth, max_noise=-1.7)
+    x = gaussian_filter1d(rng.normal(size=len(t)), 0.16 / log_uniform(rng, 0.3, 3.0) / (t[1] - t[0]))
+    return Scene(t, depth * (0.1 + 0.4 * x / x.std()), rate, p, depth, max_noise=-1.7)
 
 
 def sweep(rng: Rng) -> Scene:
@@ -452,89 +447,77 @@ def multi_rate(rng: Rng) -> Scene:
 # Causes of time.
 
 
-def base(rng: Rng) -> Scene:
-    """An ordinary press on a linear surface, which a cause of time then spoils."""
+def slow(s: Scene, g: Rng) -> Array:
+    """Exponential approach from 0 to 1, as of a temperature."""
+    return 1 - np.exp(-s.t / (s.t[-1] * log_uniform(g, 0.1, 3.0)))
+
+
+def breath(s: Scene, g: Rng) -> Array:
+    """Chest or belly: half a sine to an even power."""
+    return np.sin(np.pi * (g.uniform(0.15, 0.4) * s.t + g.random())) ** (2 * g.integers(1, 4)) - 0.4
+
+
+def wander(s: Scene, g: Rng) -> Array:
+    """Random motion of unit variance within a fraction of a second to seconds."""
+    y = gaussian_filter1d(g.normal(size=len(s.t)), log_uniform(g, 0.2, 2.0) / s.dt)
+    return (y - y.mean()) / y.std()
+
+
+def slips(s: Scene, g: Rng) -> Array:
+    """One to three steps while the specimen is well loaded."""
+    starts = g.choice(np.flatnonzero(s.x > 0.5 * s.x.max()), g.integers(1, 4))
+    steps = sum(g.uniform(0.3, 1.0) * (np.arange(len(s.t)) >= start) for start in starts)
+    return gaussian_filter1d(steps, 3e-3 / s.dt)
+
+
+def warming(s: Scene, g: Rng, peak: float) -> tuple[dict, dict]:
+    shape = slow(s, g)
+    return {"added": 0.1 * peak * g.normal(), "gain": 0.01 * g.normal()}, {"added": shape, "gain": shape}
+
+
+def sagging(s: Scene, g: Rng, peak: float) -> tuple[dict, dict]:
+    ripple = np.sin(2 * np.pi * 100.0 * (1 + 1e-3 * g.normal()) * s.t)
+    amplitudes = {"gain": g.uniform(0.0, 0.03), "added": peak * log_uniform(g, 1e-3, 0.02)}
+    return amplitudes, {"gain": -s.t / s.t[-1], "added": ripple}
+
+
+def relaxes(s: Scene, g: Rng, peak: float) -> tuple[dict, dict]:
+    fast = {"r": g.uniform(0.1, 0.8), "tau": log_uniform(g, 0.05, 1.0)}
+    return fast | {"r2": g.uniform(0.05, 0.4), "tau2": log_uniform(g, 2.0, 20.0)}, {}
+
+
+SPOIL: dict[str, Callable] = {
+    "charge_amplifier": lambda s, g, _: ({"leak": log_uniform(g, 1.0, 60.0)}, {}),
+    "warming_sensor": warming,
+    "breathing": lambda s, g, _: ({"shift": s.scale * log_uniform(g, 0.01, 0.3)}, {"shift": breath(s, g)}),
+    "muscle_tone": lambda s, g, _: ({"tone": log_uniform(g, 0.01, 0.15)}, {"tone": wander(s, g)}),
+    "relaxation": relaxes,
+    "creeping_cell": lambda s, g, _: (
+        {"creep": log_uniform(g, 2e-3, 0.03), "creep_tau": log_uniform(g, 0.5, 20.0)},
+        {},
+    ),
+    "position_drift": lambda s, g, _: (
+        {"shift": s.scale * log_uniform(g, 0.01, 0.2) * g.choice([-1, 1])},
+        {"shift": slow(s, g)},
+    ),
+    "sagging_supply": sagging,
+    "slipping_clamp": lambda s, g, _: (
+        {"shift": s.scale * log_uniform(g, 0.02, 0.15)},
+        {"shift": slips(s, g)},
+    ),
+    "fluid_film": lambda s, g, _: ({"B": s.p["K"] * log_uniform(g, 0.03, 0.5), "K": 0.0, "M": 0.0}, {}),
+}
+"""Of each cause: changed or added parameters and the shapes over time, from a scene, random numbers and a force."""
+
+
+def spoiled(name: str, rng: Rng) -> Scene:
+    """An ordinary press on a linear surface, spoiled by a cause of time."""
     p, depth = surface(rng)
     rate = float(rng.choice([100, 200, 500, 1000]))
-    return Scene(*ordinary(rng, depth, rate), rate, p, depth)
-
-
-def charge_amplifier(rng: Rng) -> Scene:
-    scene = base(rng)
-    scene.p["leak"] = log_uniform(rng, 1.0, 60.0)
-    return scene
-
-
-def warming_sensor(rng: Rng) -> Scene:
-    scene = base(rng)
-    warm = 1 - np.exp(-scene.t / (scene.t[-1] * log_uniform(rng, 0.1, 2.0)))
-    scene.shapes |= {"added": warm, "gain": warm}
-    scene.p |= {"added": scene.p["K"] * scene.scale * rng.normal() * 0.1, "gain": rng.normal() * 0.01}
-    return scene
-
-
-def breathing(rng: Rng) -> Scene:
-    scene = base(rng)
-    hertz, power = rng.uniform(0.15, 0.4), rng.integers(1, 4)
-    scene.shapes["shift"] = np.sin(np.pi * (hertz * scene.t + rng.random())) ** (2 * power) - 0.4
-    scene.p["shift"] = scene.scale * log_uniform(rng, 0.01, 0.3)
-    return scene
-
-
-def muscle_tone(rng: Rng) -> Scene:
-    scene = base(rng)
-    shape = gaussian_filter1d(rng.normal(size=len(scene.t)), log_uniform(rng, 0.2, 2.0) / scene.dt)
-    scene.shapes["tone"] = (shape - shape.mean()) / shape.std()
-    scene.p["tone"] = log_uniform(rng, 0.01, 0.15)
-    return scene
-
-
-def relaxation(rng: Rng) -> Scene:
-    scene = base(rng)
-    scene.p |= {"r": rng.uniform(0.1, 0.8), "tau": log_uniform(rng, 0.05, 1.0)}
-    scene.p |= {"r2": rng.uniform(0.05, 0.4), "tau2": log_uniform(rng, 2.0, 20.0)}
-    scene.judged = ("K",)
-    return scene
-
-
-def creeping_cell(rng: Rng) -> Scene:
-    scene = base(rng)
-    scene.p |= {"creep": log_uniform(rng, 2e-3, 0.03), "creep_tau": log_uniform(rng, 0.5, 20.0)}
-    return scene
-
-
-def position_drift(rng: Rng) -> Scene:
-    scene = base(rng)
-    scene.shapes["shift"] = 1 - np.exp(-scene.t / (scene.t[-1] * log_uniform(rng, 0.2, 5.0)))
-    scene.p["shift"] = scene.scale * log_uniform(rng, 0.01, 0.2) * rng.choice([-1, 1])
-    return scene
-
-
-def sagging_supply(rng: Rng) -> Scene:
-    scene = base(rng)
-    hertz = 100.0 * (1 + 1e-3 * rng.normal())
-    scene.shapes |= {"gain": -scene.t / scene.t[-1], "added": np.sin(2 * np.pi * hertz * scene.t)}
-    scene.p |= {
-        "gain": rng.uniform(0.0, 0.03),
-        "added": scene.p["K"] * scene.scale * log_uniform(rng, 1e-3, 0.02),
-    }
-    return scene
-
-
-def slipping_clamp(rng: Rng) -> Scene:
-    scene = base(rng)
-    high = np.flatnonzero(scene.x > 0.5 * scene.x.max())
-    shape = np.zeros(len(scene.t))
-    for start in rng.choice(high, rng.integers(1, 4)):
-        shape[start:] += rng.uniform(0.3, 1.0)
-    scene.shapes["shift"] = gaussian_filter1d(shape, 3e-3 / scene.dt)
-    scene.p["shift"] = scene.scale * log_uniform(rng, 0.02, 0.15)
-    return scene
-
-
-def fluid_film(rng: Rng) -> Scene:
-    scene = base(rng)
-    scene.p |= {"B": scene.p["K"] * log_uniform(rng, 0.03, 0.5), "K": 0.0, "M": 0.0}
+    scene = Scene(*ordinary(rng, depth, rate), rate, p, depth)
+    amplitudes, scene.shapes = SPOIL[name](scene, rng, p["K"] * depth)
+    scene.p = p | amplitudes
+    scene.judged = ("K",) if name == "relaxation" else scene.judged
     return scene
 
 
@@ -560,37 +543,21 @@ def fracture(rng: Rng) -> Scene:
     return scene
 
 
-WORLDS = {
-    f.__name__: f
-    for f in (
-        force_loop,
-        testing_machine,
-        tap,
-        hand_held,
-        sweep,
-        creep_test,
-        sphere,
-        layered,
-        two_surfaces,
-        multi_rate,
-    )
-}
-CAUSES = {
-    f.__name__: f
-    for f in (
-        charge_amplifier,
-        warming_sensor,
-        breathing,
-        muscle_tone,
-        relaxation,
-        creeping_cell,
-        position_drift,
-        sagging_supply,
-        slipping_clamp,
-        fluid_film,
-        slack_specimen,
-        fracture,
-    )
+_WORLDS = (
+    force_loop,
+    testing_machine,
+    tap,
+    hand_held,
+    sweep,
+    creep_test,
+    sphere,
+    layered,
+    two_surfaces,
+    multi_rate,
+)
+WORLDS = {f.__name__: f for f in _WORLDS}
+CAUSES = {name: partial(spoiled, name) for name in SPOIL} | {
+    f.__name__: f for f in (slack_specimen, fracture)
 }
 
 
@@ -641,7 +608,7 @@ def record_chain(rng: Rng, scene: Scene, peak: float) -> None:
     if rng.random() < 0.5 and not scene.averaged and "added" not in scene.p:
         order, hertz = (
             int(rng.integers(1, 4)),
-            log_uniform(rng, 1000, 4000) if fast else log_uniform(rng, 15, 300),
+            log_uniform(rng, 1000, 4000) if fast else log_uniform(rng, 30, 300),
         )
         scene.low_pass = (order, hertz)
         delay += {1: 1.0, 2: 1.414, 3: 2.0}[order] / (2 * np.pi * hertz) if hertz < 0.45 / scene.dt else 0.0
@@ -652,6 +619,8 @@ def record_chain(rng: Rng, scene: Scene, peak: float) -> None:
     if rng.random() < 0.5:
         scene.told_lag_std = log_uniform(rng, 1e-5, 5e-5) if fast else log_uniform(rng, 1e-4, 1e-3)
         scene.options["lag"] = f"{delay + scene.told_lag_std * rng.normal():.7f}:{scene.told_lag_std:.7f}"
+        if scene.low_pass and rng.random() < 0.5:
+            scene.options["force_filter"] = "butterworth{}:{:.6g}".format(*scene.low_pass)
 
 
 def written(rng: Rng, scene: Scene, x: Array, f: Array) -> tuple[str, dict[str, str]]:
