@@ -94,7 +94,8 @@ def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
                 if depth and name == "K"
                 else force
             )
-            truth = laboratory.true_range(scene, name, at, hertz, octave)
+            of = "K at rest" if name == "K" and "K1" in parameters else name
+            truth = laboratory.true_range(scene, of, at, hertz, octave)
         low, high = value["ci95"]
         if name == "K" or (name == "working point" and (scene.kind != "linear" or "r" in scene.p)):
             widths.append(0.5 * (high - low) / max(abs(0.5 * (high + low)), 1e-300))

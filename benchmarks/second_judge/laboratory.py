@@ -172,6 +172,18 @@ def known_half(scene: Scene, force: float, noise_f: float, noise_x: float, colou
     return 1.96 * float(np.hypot(over_apparent * np.sqrt(variance), frame))
 
 
+def relaxing_shares(scene: Scene, force: float, hertz: float, static: Array, slow: Array) -> list[float]:
+    """Stiffness that relaxes over that at rest, by two definitions: at a frequency, and along a loading at a force."""
+    p, omega = scene.p, 2 * np.pi * hertz
+    pairs = [(p[r], p[tau]) for r, tau in (("r", "tau"), ("r2", "tau2")) if r in p]
+    spectrum = sum(r * (omega * tau) ** 2 / (1 + (omega * tau) ** 2) for r, tau in pairs)
+    total, rise = static + slow, np.gradient(static)
+    loading = (rise > 0.1 * rise.max()) & (static > 0.1 * static.max())
+    near = loading & (abs(total - force) < 0.15 * total.max())
+    window = near if near.sum() > 20 else loading
+    return [float(spectrum), float(np.polyfit(static[window], slow[window], 1)[0])]
+
+
 def true_range(
     scene: Scene, name: str, force: float, hertz: float, octave: bool
 ) -> tuple[float, float] | None:
@@ -180,6 +192,8 @@ def true_range(
     if name in "BM":
         return (p[name], p[name]) if name in scene.judged else None
     base = tangent(force, p, scene)
+    if name == "K at rest":  # of a model that relaxes itself: its fast branch may take the slow one's place
+        return base, base * (1 + p.get("r2", 0.0))
     values = [base]
     _, static, slow = contact_force(scene, p)
     u = scene.x - p["x0"]
@@ -187,16 +201,10 @@ def true_range(
         inside = u > 0.0
         values.append(float(np.polyfit(u[inside], static[inside], 1)[0]))
     if "r" in p:
-        omega = 2 * np.pi * hertz
-        pairs = [("r", "tau")] + [("r2", "tau2")] * ("r2" in p)
-        values = [base * (1 + sum(p[r] * (omega * p[q]) ** 2 / (1 + (omega * p[q]) ** 2) for r, q in pairs))]
-        loading = (np.gradient(static) > 0.1 * np.gradient(static).max()) & (static > 0.2 * static.max())
-        values.append(base * (1 + float(np.polyfit(static[loading], slow[loading], 1)[0])))
+        values = [base * (1 + share) for share in relaxing_shares(scene, force, hertz, static, slow)]
     if "gain" in p:
         values += [
-            v * (1 + p["gain"] * g)
-            for v in values
-            for g in (scene.shapes["gain"].min(), scene.shapes["gain"].max())
+            base * (1 + p["gain"] * end) for end in (scene.shapes["gain"].min(), scene.shapes["gain"].max())
         ]
     if "tone" in p and scene.truth != "before the break":
         shape = scene.shapes["tone"]
@@ -231,20 +239,17 @@ def presses(
         places += [-gap, deep, deep, -gap]
         now += 2 * travel + rest + rng.uniform(0.3, 2.0)
     t = grid(now + 0.5, rate)
-    return t, gaussian_filter1d(
-        np.interp(t, times, places), max(rng.uniform(3e-3, 1e-2) / (t[1] - t[0]), 1.0)
-    )
+    blur = max(rng.uniform(3e-3, 1e-2) / (t[1] - t[0]), 1.0)
+    return t, gaussian_filter1d(np.interp(t, times, places), blur)
 
 
-def shaken(rng: Rng, depth: float, rate: float, touch: bool = True) -> tuple[Array, Array]:
-    """A multisine about a mean depth, approached from free motion and left again, or bonded."""
+def shaken(rng: Rng, depth: float, rate: float) -> tuple[Array, Array]:
+    """A multisine about a mean depth, approached from free motion and left again."""
     t = grid(log_uniform(rng, 6.0, 25.0), rate)
     count, x = rng.integers(3, 8), np.zeros(len(t))
     for hertz in np.exp(rng.uniform(np.log(0.3), np.log(min(30.0, rate / 8)), count)):
         x += np.sin(2 * np.pi * (hertz * t + rng.random()))
     x *= 0.35 * depth / np.abs(x).max()
-    if not touch:
-        return t, 2.0 * x
     ends = [1.0, 2.0, t[-1] - 2.0, t[-1] - 1.0]
     inside = gaussian_filter1d(np.interp(t, ends, [0.0, 1.0, 1.0, 0.0]), 0.1 / (t[1] - t[0]))
     return t, inside * (0.65 * depth + x) - (1 - inside) * 0.5 * depth
@@ -257,11 +262,8 @@ def ordinary(rng: Rng, depth: float, rate: float) -> tuple[Array, Array]:
 
 
 def surface(
-    rng: Rng,
-    peak: tuple[float, float] = PEAK_N,
-    stiffness: tuple[float, float] = STIFFNESS_N_M,
-    deepest: float = 2e-2,
-) -> tuple[dict[str, float], float]:
+    rng: Rng, peak: tuple = PEAK_N, stiffness: tuple = STIFFNESS_N_M, deepest: float = 2e-2
+) -> tuple[dict, float]:
     """Parameters of a linear surface, and the depth of a press."""
     k, force = log_uniform(rng, *stiffness), log_uniform(rng, *peak)
     depth = float(np.clip(force / k, 5e-5, deepest))
@@ -486,26 +488,27 @@ def relaxes(s: Scene, g: Rng, peak: float) -> tuple[dict, dict]:
     return fast | {"r2": g.uniform(0.05, 0.4), "tau2": log_uniform(g, 2.0, 20.0)}, {}
 
 
+def creeps(s: Scene, g: Rng, peak: float) -> tuple[dict, dict]:
+    return {"creep": log_uniform(g, 2e-3, 0.03), "creep_tau": log_uniform(g, 0.5, 20.0)}, {}
+
+
 SPOIL: dict[str, Callable] = {
-    "charge_amplifier": lambda s, g, _: ({"leak": log_uniform(g, 1.0, 60.0)}, {}),
+    "charge_amplifier": lambda _s, g, _f: ({"leak": log_uniform(g, 1.0, 60.0)}, {}),
     "warming_sensor": warming,
-    "breathing": lambda s, g, _: ({"shift": s.scale * log_uniform(g, 0.01, 0.3)}, {"shift": breath(s, g)}),
-    "muscle_tone": lambda s, g, _: ({"tone": log_uniform(g, 0.01, 0.15)}, {"tone": wander(s, g)}),
+    "breathing": lambda s, g, _f: ({"shift": s.scale * log_uniform(g, 0.01, 0.3)}, {"shift": breath(s, g)}),
+    "muscle_tone": lambda s, g, _f: ({"tone": log_uniform(g, 0.01, 0.15)}, {"tone": wander(s, g)}),
     "relaxation": relaxes,
-    "creeping_cell": lambda s, g, _: (
-        {"creep": log_uniform(g, 2e-3, 0.03), "creep_tau": log_uniform(g, 0.5, 20.0)},
-        {},
-    ),
-    "position_drift": lambda s, g, _: (
+    "creeping_cell": creeps,
+    "position_drift": lambda s, g, _f: (
         {"shift": s.scale * log_uniform(g, 0.01, 0.2) * g.choice([-1, 1])},
         {"shift": slow(s, g)},
     ),
     "sagging_supply": sagging,
-    "slipping_clamp": lambda s, g, _: (
+    "slipping_clamp": lambda s, g, _f: (
         {"shift": s.scale * log_uniform(g, 0.02, 0.15)},
         {"shift": slips(s, g)},
     ),
-    "fluid_film": lambda s, g, _: ({"B": s.p["K"] * log_uniform(g, 0.03, 0.5), "K": 0.0, "M": 0.0}, {}),
+    "fluid_film": lambda s, g, _f: ({"B": s.p["K"] * log_uniform(g, 0.03, 0.5), "K": 0.0, "M": 0.0}, {}),
 }
 """Of each cause: changed or added parameters and the shapes over time, from a scene, random numbers and a force."""
 
