@@ -18,6 +18,7 @@ from scipy.signal import butter, lfilter, sosfilt
 
 Array = np.ndarray
 Rng = np.random.Generator
+Motion = tuple[Array, Array]
 MAX_ROWS = 16000
 PEAK_N, STIFFNESS_N_M = (0.5, 60.0), (200.0, 1e5)
 PRIOR_LAG_S = 5e-3
@@ -148,23 +149,18 @@ def known_half(scene: Scene, force: float, noise_f: float, noise_x: float, colou
         change = scene.p[name] + by * sizes[name] if name in sizes else scene.p[name] * np.exp(by)
         return scene.p | {name: change}
 
-    step = 1e-4
+    def slope(of: Callable, name: str) -> Array:
+        return (of(moved(name, 1e-4)) - of(moved(name, -1e-4))) / 2e-4
+
     if scene.bonded:
         names.remove("x0")
-    columns = [
-        (read_force(scene, moved(n, step)) - read_force(scene, moved(n, -step))) / (2 * step) for n in names
-    ]
-    slope = [
-        (np.log(tangent(force, moved(n, step), scene)) - np.log(tangent(force, moved(n, -step), scene)))
-        / (2 * step)
-        for n in names
-    ]
-    jacobian = np.column_stack(columns)
+    jacobian = np.column_stack([slope(partial(read_force, scene), n) for n in names])
+    target = np.array([slope(lambda p: np.log(tangent(force, p, scene)), n) for n in names])
     white = jacobian[1:] - colour * jacobian[:-1]
     stiff = tangent(force, scene.p, scene)
     std = np.sqrt((1 - colour**2) * noise_f**2 + (1 + colour**2) * (stiff * noise_x) ** 2)
     information = white.T @ white / std**2 + np.diag([prior.get(n, 1.0) ** -2.0 for n in names])
-    variance = float(np.array(slope) @ np.linalg.solve(information, np.array(slope)))
+    variance = float(target @ np.linalg.solve(information, target))
     if scene.series is None or scene.surface_stiffness is None:
         return 1.96 * float(np.sqrt(variance))
     over_apparent = scene.surface_stiffness / scene.p["K"]
@@ -226,9 +222,7 @@ def grid(duration: float, rate: float) -> Array:
     return np.arange(0.0, min(duration, MAX_ROWS / rate), 1.0 / (rate * max(4, min(round(1500 / rate), 16))))
 
 
-def presses(
-    rng: Rng, depth: float, rate: float, hold: bool = False, longest: float = 5.0
-) -> tuple[Array, Array]:
+def presses(rng: Rng, depth: float, rate: float, hold: bool = False, longest: float = 5.0) -> Motion:
     """One to four presses at constant speed, as a testing machine or a straight move does them."""
     gap, rise = depth * log_uniform(rng, 0.3, 3.0), log_uniform(rng, 0.3, longest)
     times, places, now = [0.0], [-gap], rng.uniform(0.3, 2.0)
@@ -243,7 +237,7 @@ def presses(
     return t, gaussian_filter1d(np.interp(t, times, places), blur)
 
 
-def shaken(rng: Rng, depth: float, rate: float) -> tuple[Array, Array]:
+def shaken(rng: Rng, depth: float, rate: float) -> Motion:
     """A multisine about a mean depth, approached from free motion and left again."""
     t = grid(log_uniform(rng, 6.0, 25.0), rate)
     count, x = rng.integers(3, 8), np.zeros(len(t))
@@ -255,7 +249,7 @@ def shaken(rng: Rng, depth: float, rate: float) -> tuple[Array, Array]:
     return t, inside * (0.65 * depth + x) - (1 - inside) * 0.5 * depth
 
 
-def ordinary(rng: Rng, depth: float, rate: float) -> tuple[Array, Array]:
+def ordinary(rng: Rng, depth: float, rate: float) -> Motion:
     """Presses, presses with holds, or a multisine."""
     kind = rng.integers(3)
     return shaken(rng, depth, rate) if kind == 2 else presses(rng, depth, rate, hold=kind == 1)
@@ -268,14 +262,8 @@ def surface(
     k, force = log_uniform(rng, *stiffness), log_uniform(rng, *peak)
     depth = float(np.clip(force / k, 5e-5, deepest))
     mass = k * depth / 9.81 * log_uniform(rng, 1e-3, 0.1) if rng.random() < 0.4 else 0.0
-    return {
-        "K": k,
-        "B": k * log_uniform(rng, 3e-4, 1e-2),
-        "M": mass,
-        "x0": 0.0,
-        "zero": 0.0,
-        "lag": 0.0,
-    }, depth
+    zeros = dict.fromkeys(("x0", "zero", "lag"), 0.0)
+    return zeros | {"K": k, "B": k * log_uniform(rng, 3e-4, 1e-2), "M": mass}, depth
 
 
 def closed_loop(step: Callable, t: Array, x: float, v: float) -> Array:
@@ -546,22 +534,11 @@ def fracture(rng: Rng) -> Scene:
     return scene
 
 
-_WORLDS = (
-    force_loop,
-    testing_machine,
-    tap,
-    hand_held,
-    sweep,
-    creep_test,
-    sphere,
-    layered,
-    two_surfaces,
-    multi_rate,
-)
-WORLDS = {f.__name__: f for f in _WORLDS}
-CAUSES = {name: partial(spoiled, name) for name in SPOIL} | {
-    f.__name__: f for f in (slack_specimen, fracture)
-}
+WORLDS = {f.__name__: f for f in (
+    force_loop, testing_machine, tap, hand_held, sweep, creep_test, sphere, layered, two_surfaces, multi_rate,
+)}  # fmt: skip
+CAUSES = {name: partial(spoiled, name) for name in SPOIL}
+CAUSES |= {"slack_specimen": slack_specimen, "fracture": fracture}
 
 
 @dataclass(frozen=True)
@@ -582,10 +559,8 @@ def draw(name: str, index: int, seed: int) -> Log:
     p, peak = scene.p, float(np.abs(contact_force(scene, scene.p)[0]).max())
     record_chain(rng, scene, peak)
     x, f = read_position(scene), read_force(scene, p)
-    noise_f, noise_x = (
-        peak * 10 ** rng.uniform(-3.3, scene.max_noise),
-        scene.scale * 10 ** rng.uniform(-4.2, -2.5),
-    )
+    noise_f = peak * 10 ** rng.uniform(-3.3, scene.max_noise)
+    noise_x = scene.scale * 10 ** rng.uniform(-4.2, -2.5)
     colour = float(rng.choice([0.0, 0.0, rng.uniform(0.5, 0.95)]))
     force = float(contact_force(scene, p)[1].max()) / 2
     count_f, count_x = noise_f * rng.uniform(0.05, 2.0), noise_x * rng.uniform(0.05, 2.0)
@@ -609,10 +584,7 @@ def record_chain(rng: Rng, scene: Scene, peak: float) -> None:
     scene.p["lag"] = log_uniform(rng, 2e-5, 5e-4) if fast else log_uniform(rng, 2e-4, 1.5e-2)
     delay = scene.p["lag"]
     if rng.random() < 0.5 and not scene.averaged and "added" not in scene.p:
-        order, hertz = (
-            int(rng.integers(1, 4)),
-            log_uniform(rng, 1000, 4000) if fast else log_uniform(rng, 30, 300),
-        )
+        order, hertz = int(rng.integers(1, 4)), log_uniform(rng, 30, 300) * (15 if fast else 1)
         scene.low_pass = (order, hertz)
         delay += {1: 1.0, 2: 1.414, 3: 2.0}[order] / (2 * np.pi * hertz) if hertz < 0.45 / scene.dt else 0.0
     if scene.position_low_pass:
@@ -628,17 +600,13 @@ def record_chain(rng: Rng, scene: Scene, peak: float) -> None:
 
 def written(rng: Rng, scene: Scene, x: Array, f: Array) -> tuple[str, dict[str, str]]:
     """Text of the CSV file with stated units, and the options that name its columns."""
-    ms, (unit, per_m), (newton, per_n) = (
-        rng.random() < 0.3,
-        [("m", 1.0), ("mm", 1e3), ("um", 1e6)][rng.integers(3)],
-        [("N", 1.0), ("mN", 1e3), ("kN", 1e-3)][rng.integers(3)],
-    )
+    ms, (unit, per_m) = rng.random() < 0.3, [("m", 1.0), ("mm", 1e3), ("um", 1e6)][rng.integers(3)]
+    newton, per_n = [("N", 1.0), ("mN", 1e3), ("kN", 1e-3)][rng.integers(3)]
     time = np.arange(len(x)) / scene.rate * (1e3 if ms else 1.0)
-    names = ("clock", "travel", "load")
     rows = zip(time, x * per_m, f * per_n, strict=True)
-    lines = [",".join(names), *(f"{a:.10g},{b:.10g},{c:.10g}" for a, b, c in rows)]
+    lines = ["clock,travel,load", *(f"{a:.10g},{b:.10g},{c:.10g}" for a, b, c in rows)]
     columns = {
-        "time": f"clock:{'ms' if ms else 's'}",
+        "time": "clock:ms" if ms else "clock:s",
         "position": f"travel:{unit}",
         "force": f"load:{newton}",
     }
