@@ -129,10 +129,19 @@ def run(name: str, seed: int, index: int) -> dict:
             words, start = command("press.csv", log.options), time.perf_counter()
             code, out = typed([*words, "--json"])
             seconds = time.perf_counter() - start
-            row = judge(log, json.loads(out) if code < 2 else {}, (code, typed(words)[0]))
+            answer = json.loads(out) if code < 2 else {}
+            codes = (code, typed(words)[0])
         finally:
             os.chdir(home)
-    return {"seed": seed, "index": index, "seconds": round(seconds, 2), "words": " ".join(words), **row}
+    stored = {key: answer.get(key) for key in ("parameters", "working_point", "depth_m", "lag_s", "warnings")}
+    row = {
+        "seed": seed,
+        "index": index,
+        "seconds": round(seconds, 2),
+        "words": " ".join(words),
+        "codes": codes,
+    }
+    return row | judge(log, answer, codes) | {"answer": stored}
 
 
 def tally(rows: list[dict]) -> dict:
