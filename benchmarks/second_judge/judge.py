@@ -2,7 +2,7 @@
 
     benchmarks/second_judge/judge.py [--logs 20] [--seed 1] [--worlds sphere tap] [--jobs 2] [--out FILE] [--json]
 
-Every log is typed twice, with `--json` and as a person types it. An interval *holds* if it meets the truth (several
+Every log is typed with `--json`, and as a person does (`--plain`). An interval *holds* if it meets the truth (several
 definitions of one stiffness make a range; of two surfaces it must contain both); it is *wrong* if the truth is
 further than three half-widths away. *Known* logs are those whose K an estimator that knows the world has to 5 %;
 *sharp* ones of them have K identified to max(1 %, three times that estimator's half-width): on a curved or relaxing
@@ -119,8 +119,8 @@ def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
     }
 
 
-def run(name: str, seed: int, index: int) -> dict:
-    """Draw one log, type the two commands, judge the answer."""
+def run(name: str, seed: int, index: int, plain: int) -> dict:
+    """Draw one log, type the command with `--json` (the first `plain` ones as a person does, too), judge the answer."""
     log, home = laboratory.draw(name, index, seed), Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -130,7 +130,7 @@ def run(name: str, seed: int, index: int) -> dict:
             code, out = typed([*words, "--json"])
             seconds = time.perf_counter() - start
             answer = json.loads(out) if code < 2 else {}
-            codes = (code, typed(words)[0])
+            codes = (code, typed(words)[0] if index < plain else code)
         finally:
             os.chdir(home)
     stored = {key: answer.get(key) for key in ("parameters", "working_point", "depth_m", "lag_s", "warnings")}
@@ -208,6 +208,7 @@ def main() -> None:
     parser.add_argument("--worlds", nargs="+", default=NAMES, choices=NAMES, metavar="NAME")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--worst", type=int, default=10, help="single answers to name")
+    parser.add_argument("--plain", type=int, default=sys.maxsize, help="of each, typed without --json, too")
     parser.add_argument("--out", type=Path, help="a file of results, one JSON object a line")
     parser.add_argument("--json", action="store_true", help="counts by world as JSON")
     given = parser.parse_args()
@@ -218,7 +219,9 @@ def main() -> None:
     with ProcessPoolExecutor(given.jobs) as pool, contextlib.ExitStack() as stack:
         file = stack.enter_context(given.out.open("a", encoding="utf-8")) if given.out else None
         for row in (
-            pool.map(run, *zip(*[(name, given.seed, k) for name, k in tasks], strict=True)) if tasks else ()
+            pool.map(run, *zip(*[(name, given.seed, k, given.plain) for name, k in tasks], strict=True))
+            if tasks
+            else ()
         ):
             rows.append(row)
             if file:
