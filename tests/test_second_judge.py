@@ -38,33 +38,38 @@ def hand():
 
 def test_a_right_and_narrow_answer_holds_and_is_sharp(hand):
     k = hand.scene.p["K"]
-    found = counts(hand, answer(k * 1.001, k * 0.002))
-    assert (found["answers"], found["answers_hold"], found["answers_wrong"], found["sharp"]) == (1, 1, 0, 1)
-    assert (found["points"], found["points_hold"], found["known"], found["exit"]) == (1, 1, 1, 0)
+    result = counts(hand, answer(k * 1.001, k * 0.002))
+    assert (result["answers"], result["answers_hold"], result["answers_wrong"], result["sharp"]) == (
+        1,
+        1,
+        0,
+        1,
+    )
+    assert (result["points"], result["points_hold"], result["known"], result["exit"]) == (1, 1, 1, 0)
 
 
 def test_a_confidently_wrong_answer_is_counted(hand):
     k = hand.scene.p["K"]
-    found = counts(hand, answer(1.04 * k, 0.01 * k), answer(1.02 * k, 0.01 * k))
-    assert (found["answers_hold"], found["answers_wrong"], found["points_wrong"]) == (0, 1, 1)
+    result = counts(hand, answer(1.04 * k, 0.01 * k), answer(1.02 * k, 0.01 * k))
+    assert (result["answers_hold"], result["answers_wrong"], result["points_wrong"]) == (0, 1, 1)
 
 
 def test_an_interval_that_is_too_wide_is_not_sharp(hand):
     k = hand.scene.p["K"]
-    found = counts(hand, answer(k, 0.1 * k))
-    assert (found["answers_hold"], found["known"], found["sharp"]) == (1, 1, 0)
+    result = counts(hand, answer(k, 0.1 * k))
+    assert (result["answers_hold"], result["known"], result["sharp"]) == (1, 1, 0)
 
 
 def test_any_stiffness_of_a_fluid_is_wrong():
-    found = counts(laboratory.draw("fluid_film", 0, 1), answer(500.0, 100.0))
-    assert (found["answers_wrong"], found["points_wrong"], found["known"]) == (1, 1, 0)
+    result = counts(laboratory.draw("fluid_film", 0, 1), answer(500.0, 100.0))
+    assert (result["answers_wrong"], result["points_wrong"], result["known"]) == (1, 1, 0)
 
 
 def test_an_answer_for_two_surfaces_has_to_hold_for_both():
     log = laboratory.draw("two_surfaces", 0, 1)
     k = log.scene.p["K"] * np.array([1.0, 1.0 + log.scene.p["tone"]])
-    found = counts(log, answer(k[0], 0.05 * k[0]), answer(k[1], 0.05 * k[1]), answer(k.mean(), k.mean()))
-    assert found["answers_hold"] == 1
+    result = counts(log, answer(k[0], 0.05 * k[0]), answer(k[1], 0.05 * k[1]), answer(k.mean(), k.mean()))
+    assert result["answers_hold"] == 1
 
 
 def test_a_tangent_is_judged_at_the_force_that_it_is_given_for():

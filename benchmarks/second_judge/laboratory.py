@@ -50,7 +50,7 @@ class Scene:
     low_pass: tuple[int, float] | None = None
     position_low_pass: float = 0.0
     options: dict[str, str] = field(default_factory=dict)
-    told_lag_std: float = 0.0
+    given_lag_std: float = 0.0
     truth: str = "meets"
     judged: tuple[str, ...] = ("K", "B", "M")
     series: tuple[float, float] | None = None
@@ -143,7 +143,7 @@ def known_half(scene: Scene, force: float, noise_f: float, noise_x: float, colou
     """Relative 95 % half-width of K by weighted least squares with the model, its causes and the noise known."""
     sizes = {"x0": scene.scale, "zero": max(abs(force), 1e-9), "lag": PRIOR_LAG_S}
     names = [n for n in scene.p if scene.p[n] != 0.0 or n in sizes]
-    prior = {"lag": (scene.told_lag_std or PRIOR_LAG_S) / PRIOR_LAG_S, "x0": 1e3, "zero": 1e3, "K": 1e3}
+    prior = {"lag": (scene.given_lag_std or PRIOR_LAG_S) / PRIOR_LAG_S, "x0": 1e3, "zero": 1e3, "K": 1e3}
 
     def moved(name: str, by: float) -> dict[str, float]:
         change = scene.p[name] + by * sizes[name] if name in sizes else scene.p[name] * np.exp(by)
@@ -307,10 +307,10 @@ def testing_machine(rng: Rng) -> Scene:
     t, x = presses(rng, depth, rate, longest=40.0)
     frame = p["K"] * log_uniform(rng, 4.0, 50.0)
     inside = frame / (frame + p["K"])
-    told, k = rng.random() < 0.5, p["K"]
+    is_given, k = rng.random() < 0.5, p["K"]
     p |= {"K": k * inside, "B": p["B"] * inside**2, "M": 0.0}
     scene = Scene(t, x, rate, p, depth, judged=("K",))
-    if told:
+    if is_given:
         std = rng.uniform(0.01, 0.05)
         scene.series, scene.surface_stiffness = (frame, std), k
         scene.options["series_stiffness"] = f"{frame * (1 + std * rng.normal()):.6g}:{frame * std:.4g}"
@@ -508,7 +508,7 @@ def spoiled(name: str, rng: Rng) -> Scene:
     scene = Scene(*ordinary(rng, depth, rate), rate, p, depth)
     amplitudes, scene.shapes = SPOIL[name](scene, rng, p["K"] * depth)
     scene.p = p | amplitudes
-    scene.judged = ("K",) if name == "relaxation" else scene.judged
+    scene.judged = ("K",) if name in {"relaxation", "fluid_film"} else scene.judged
     return scene
 
 
@@ -592,8 +592,8 @@ def record_chain(rng: Rng, scene: Scene, peak: float) -> None:
     if scene.averaged:
         delay += 0.5 * (scene.stride - 1) * scene.dt * (scene.averaged == "force")
     if rng.random() < 0.5:
-        scene.told_lag_std = log_uniform(rng, 1e-5, 5e-5) if fast else log_uniform(rng, 1e-4, 1e-3)
-        scene.options["lag"] = f"{delay + scene.told_lag_std * rng.normal():.7f}:{scene.told_lag_std:.7f}"
+        scene.given_lag_std = log_uniform(rng, 1e-5, 5e-5) if fast else log_uniform(rng, 1e-4, 1e-3)
+        scene.options["lag"] = f"{delay + scene.given_lag_std * rng.normal():.7f}:{scene.given_lag_std:.7f}"
         if scene.low_pass and rng.random() < 0.5:
             scene.options["force_filter"] = "butterworth{}:{:.6g}".format(*scene.low_pass)
 
