@@ -28,6 +28,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import laboratory
 
+JUDGED = ("K", "B", "M", "n", "working point")
 WRONG = 3.0
 """Half-widths between value and truth beyond which an answer is confidently wrong."""
 KNOWN, SHARP_TIMES, SHARP = 0.05, 3.0, 0.01
@@ -58,9 +59,8 @@ def command(path: str, options: dict[str, str]) -> list[str]:
     return ["identify", path, *flags]
 
 
-def misses(value: dict, truth: tuple[float, float], covers: bool) -> tuple[bool, float]:
+def misses(low: float, high: float, truth: tuple[float, float], covers: bool) -> tuple[bool, float]:
     """Whether an interval holds, and the distance of its middle from the truth in half-widths."""
-    low, high = value["ci95"]
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     if covers:
         return low <= truth[0] and truth[1] <= high, max(abs(end - middle) for end in truth) / half
@@ -68,55 +68,41 @@ def misses(value: dict, truth: tuple[float, float], covers: bool) -> tuple[bool,
     return away <= half, away / half
 
 
+def true_range(name: str, value: dict, answer: dict, scene: laboratory.Scene) -> tuple[float, float] | None:
+    """Truth of a parameter or of the working point at the force and frequency of the answer; None: not judged."""
+    if name == "n":
+        return (scene.p["n"], scene.p["n"]) if "n" in scene.p else None
+    if value.get("unit", "N/m").startswith("N/m^"):
+        return None
+    point, depth = answer.get("working_point") or {}, answer.get("depth_m")
+    force = abs(point.get("force_N") or 0.5 * float(laboratory.contact_force(scene, scene.p)[1].max()))
+    if name == "K" and depth:
+        force = float(laboratory.elastic(np.array([depth]), scene.p, scene)[0])
+    of = "K at rest" if name == "K" and "K1" in answer["parameters"] else name
+    return laboratory.true_range(
+        scene, of, force, point.get("frequency_Hz") or 0.0, point.get("source") == "octave"
+    )
+
+
 def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
     """One row of results from an answer as `--json` prints it (empty after a crash), and the two exit codes."""
-    scene, covers = log.scene, log.scene.truth == "covers"
-    parameters, point = answer.get("parameters") or {}, answer.get("working_point")
-    octave = bool(point) and point.get("source") == "octave"
-    hertz = (point or {}).get("frequency_Hz") or 0.0
-    force = abs(
-        (point or {}).get("force_N") or float(np.max(laboratory.contact_force(scene, scene.p)[1])) / 2
-    )
-    depth = answer.get("depth_m")
-    results, widths = [], []
-    values = [(name, value) for name, value in parameters.items() if name in ("K", "B", "M", "n")]
-    values += [("working point", point["stiffness"])] if point else []
-    for name, value in values:
-        if value.get("verdict") != "identified" or not value.get("ci95"):
-            continue
-        if name == "n":
-            truth = (scene.p["n"],) * 2 if "n" in scene.p else None
-        elif value.get("unit", "N/m").startswith("N/m^"):
-            truth = None
-        else:
-            at = (
-                float(laboratory.elastic(np.array([depth]), scene.p, scene)[0])
-                if depth and name == "K"
-                else force
-            )
-            of = "K at rest" if name == "K" and "K1" in parameters else name
-            truth = laboratory.true_range(scene, of, at, hertz, octave)
-        low, high = value["ci95"]
+    scene, point, results, width = log.scene, answer.get("working_point"), [], np.inf
+    values = dict(answer.get("parameters") or {}) | ({"working point": point["stiffness"]} if point else {})
+    identified = {name: value for name, value in values.items() if value.get("verdict") == "identified"}
+    for name in [name for name in JUDGED if name in identified]:
+        low, high = identified[name]["ci95"]
         if name == "K" or (name == "working point" and (scene.kind != "linear" or "r" in scene.p)):
-            widths.append(0.5 * (high - low) / max(abs(0.5 * (high + low)), 1e-300))
+            width = min(width, (high - low) / max(abs(high + low), 1e-300))
+        truth = true_range(name, identified[name], answer, scene)
         if truth is not None:
-            holds, away = misses(value, truth, covers)
-            results.append({"name": name, "said": value["ci95"], "true": truth, "holds": holds, "away": away})
-    known = log.known <= KNOWN
-    identified = any(v.get("verdict") == "identified" for _, v in values) or any(
-        p.get("verdict") == "identified" for p in parameters.values()
-    )
+            holds, away = misses(low, high, truth, scene.truth == "covers")
+            results.append({"name": name, "said": (low, high), "true": truth, "holds": holds, "away": away})
     doubtful = DOUBTFUL & {warning["code"] for warning in answer.get("warnings", ())}
-    return {
-        "world": log.name,
-        "model": answer.get("model"),
-        "results": results,
-        "known": known,
-        "sharp": known and any(w <= max(SHARP, SHARP_TIMES * log.known) for w in widths),
-        "crash": 70 in codes,
-        "exit": codes[0] != codes[1] or (codes[0] < 2 and (codes[0] == 0) != (identified and not doubtful)),
-        "refused": codes[0] == 2,
-    }
+    known, expected = log.known <= KNOWN, 0 if identified and not doubtful else 1
+    row = {"world": log.name, "model": answer.get("model"), "results": results, "known": known}
+    row |= {"sharp": known and bool(width <= max(SHARP, SHARP_TIMES * log.known)), "crash": 70 in codes}
+    wrong_code = codes[0] != codes[1] or (codes[0] < 2 and codes[0] != expected)
+    return row | {"exit": wrong_code, "refused": codes[0] == 2}
 
 
 def run(name: str, seed: int, index: int, plain: int) -> dict:
@@ -152,9 +138,8 @@ def tally(rows: list[dict]) -> dict:
     for key, part in (("answers", fits), ("points", points)):
         out |= {key: len(part), f"{key}_hold": sum(r["holds"] for r in part)}
         out[f"{key}_wrong"] = sum(r["away"] > WRONG for r in part)
-    return out | {
-        key: sum(row[key] for row in rows) for key in ("known", "sharp", "crash", "exit", "refused")
-    }
+    flags = ("known", "sharp", "crash", "exit", "refused")
+    return out | {key: sum(row[key] for row in rows) for key in flags}
 
 
 def table(rows: list[dict]) -> str:
@@ -165,27 +150,15 @@ def table(rows: list[dict]) -> str:
 
     head = "world | logs | answers | hold | wrong | known | sharp | points | hold | wrong | crash | exit | refused"
     lines = [f"| {head} |", "|---" * (head.count("|") + 1) + "|"]
-    groups = [(name, [name]) for name in NAMES]
-    groups += [
-        ("all worlds", list(laboratory.WORLDS)),
-        ("all causes", list(laboratory.CAUSES)),
-        ("all", NAMES),
-    ]
-    for title, names in groups:
-        chosen = [row for row in rows if row["world"] in names]
-        if not chosen:
-            continue
-        c = tally(chosen)
-        cells = [title.replace("_", " "), c["logs"], c["answers"], share(c["answers_hold"], c["answers"])]
-        cells += [
-            share(c["answers_wrong"], c["answers"]),
-            c["known"],
-            share(c["sharp"], c["known"]),
-            c["points"],
-        ]
-        cells += [share(c["points_hold"], c["points"]), share(c["points_wrong"], c["points"])]
-        cells += [c["crash"], c["exit"], c["refused"]]
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    groups = {name: [name] for name in NAMES}
+    groups |= {"all worlds": [*laboratory.WORLDS], "all causes": [*laboratory.CAUSES], "all": NAMES}
+    for title, names in groups.items():
+        c = tally([row for row in rows if row["world"] in names])
+        cells = [title.replace("_", " "), c["logs"]]
+        for key, middle in (("answers", (c["known"], share(c["sharp"], c["known"]))), ("points", ())):
+            cells += [c[key], share(c[f"{key}_hold"], c[key]), share(c[f"{key}_wrong"], c[key]), *middle]
+        if c["logs"]:
+            lines.append("| " + " | ".join(map(str, [*cells, c["crash"], c["exit"], c["refused"]])) + " |")
     return "\n".join(lines)
 
 
