@@ -4,10 +4,11 @@ The force along the motion, over a stretch that slides without a reversal, is
 
     F = F0 + s (Fc + (Fs - Fc) exp(-(v / vs)^2)) + B v + M a + c1 x + c2 x^2 + e,    s = sign(v)
 
-with the inertia M a and the terms of the position (gravity, a spring) as nuisances. All but vs is linear. The noise e is
-white and, beside it, correlated over a time that the log shows (an Ornstein-Uhlenbeck process: drift, hum, cogging).
-vs, that time and the noise's ratio are integrated over a grid by their marginal likelihood (Rasmussen and Williams,
-Gaussian Processes for Machine Learning, 2006, section 2.7), so that what they leave open is in every interval.
+with the inertia M a, the terms of the position (gravity, a spring) and what remains of the last reversal (presliding)
+as nuisances where the log shows them. All but vs is linear. The noise e is white and, beside it, correlated over a time
+that the log shows (an Ornstein-Uhlenbeck process: drift, hum, cogging). vs, that time and the noise's ratio are
+integrated over a grid by their marginal likelihood (Rasmussen and Williams, Gaussian Processes for Machine Learning,
+2006, section 5.4), so that what they leave open is in every interval.
 
 Rows about a reversal are left out: there the bodies stick, and a lag of the force is largest.
 """
@@ -38,26 +39,36 @@ MIN_SPEED_FRACTION = 0.005
 """Fraction of the fastest speed below which an axis counts as at rest."""
 REVERSAL_FRACTION = 0.005
 """Fraction of a stroke after a reversal that is left out: presliding takes 0.1 to 0.5 % of usual strokes."""
+TRANSIENT_FRACTIONS = (0.01, 0.04)
+"""Lengths over which a change at a reversal fades, as fractions of a stroke: long presliding, a drive that yields."""
 REVERSAL_TIME = 0.02
 """Time before and after each rest that is left out [s]: a force is read up to so late."""
 ONE_SPEED = 1.25
 """Ratio of fast to slow speeds (90 and 10 % of the rows) below which a log has one speed."""
 LEVEL_SPREAD = 0.6
 """Prior standard deviation of (Fs - Fc) / Fc, which is positive: published ratios Fs / Fc are 1 to 2."""
+MAX_UNEQUAL = 0.1
+"""Fraction of a friction at one speed by which unequal speeds may move the offset."""
 STRIBECK_SPEEDS = 9
 """Stribeck speeds of the grid, in equal ratios from the slowest speed to half of the fastest."""
+REFINEMENTS = 3
+"""Times that this grid is refined about its likely part; each brings its steps down to a fourth."""
+UNLIKELY = 7.0
+"""Logarithm of the ratio to the largest likelihood from which on a cell is left out: one in a thousand."""
 STRIBECK_EVIDENCE = 3.0
 """Logarithm of the ratio of likelihoods with and without a Stribeck effect from which on it shows (20 to 1)."""
 CURVED_EVIDENCE = 10.0
 """The same for a curvature of the friction over the speed, by which the model is rejected..."""
 CURVED_FRACTION = 0.1
 """... where the curvature is as large a fraction of the friction at the fastest speed."""
-NOISE_TIMES = 7
+NUISANCES = 5
+"""Columns of nuisances."""
+NOISE_TIMES = 6
 """Correlation times of the noise's grid, in equal ratios from a block to ten times the log."""
-NOISE_POWERS = (0.03, 0.1, 0.4, 1.5, 6.0, 30.0, 300.0)
+NOISE_POWERS = (0.05, 0.4, 3.0, 30.0, 300.0)
 """Variance of the change of the correlated noise over a block, over that of the white noise of a block's mean."""
 DRAWS = 6000
-"""Draws from the joint distribution of parameters, by which intervals are formed; their ends err by 2 % of its width."""
+"""Draws from the joint distribution of parameters, which give the intervals; an end errs by 2 % of the width."""
 
 NAMES = {
     "Fc": "Coulomb friction",
@@ -140,6 +151,8 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
         reason = "the log shows no motion above the noise of its speed; move the axis back and forth"
         unknown = {name: Parameter.unknown(_unit(name, units), reason) for name in NAMES}
         return AxisFriction(unknown, (0.0, 0.0, 0.0), 0, units, 0.0, 0.0, 0, notes)
+    if not _several_speeds(blocks.speed):
+        blocks = _without_ramps(blocks)
     return _fit(blocks, units, tolerance, notes)
 
 
@@ -181,6 +194,7 @@ class _Blocks:
         time: of the middle [s], shape (n,).
         count: rows of each block.
         force, position, speed, acceleration: means; the position from the middle of its range, over half of it.
+        transients: means of what remains of a change at the last reversal, for each length, shape (n, 2).
         rows: speed of each row, and the block that it is of: a function's mean is that of its rows.
         limits: slowest, median and fastest speed without sign.
     """
@@ -191,6 +205,7 @@ class _Blocks:
     position: Array
     speed: Array
     acceleration: Array
+    transients: Array
     rows: tuple[Array, Indices]
     limits: tuple[float, float, float]
 
@@ -248,7 +263,9 @@ def _differentiate(axis: _Axis) -> _Motion:
     widths = [width for width in HALF_WINDOWS if 2 * width <= longest] or [1]
     speeds = [_local(signal, 2 * width, order, axis.dt) for width in widths]
     before = [_local(signal, widths[0], order, axis.dt), *speeds[:-1]]
-    errors = [float(np.sqrt(np.mean((a - b)[axis.present] ** 2))) for a, b in zip(before, speeds, strict=True)]
+    errors = [
+        float(np.sqrt(np.mean((a - b)[axis.present] ** 2))) for a, b in zip(before, speeds, strict=True)
+    ]
     best = int(np.argmin(errors))
     half_window = widths[best]
     speed = _local(signal, half_window, order, axis.dt)
@@ -279,9 +296,11 @@ def _average(axis: _Axis, motion: _Motion) -> _Blocks | None:
     if not at_rest < 0.5 * fastest:
         return None
     sliding = axis.present & (abs(speed) > at_rest)
-    runs = _trimmed(_runs(sliding, np.sign(speed)), axis, motion)
+    strokes = _runs(sliding, np.sign(speed))
+    runs = _trimmed(strokes, axis, motion)
     if not runs:
         return None
+    decays = _decays(strokes, motion)
     rows = sum(end - begin for begin, end in runs)
     length = max(rows / MAX_BLOCKS, 1.0)
     if len(runs) > MAX_BLOCKS:
@@ -300,9 +319,10 @@ def _average(axis: _Axis, motion: _Motion) -> _Blocks | None:
     place = motion.position[index]
     low, high = place.min(), place.max()
     position = (motion.position - (low + high) / 2) / max((high - low) / 2, 1e-300)
+    transients = np.column_stack([mean(np.sign(speed) * decay) for decay in decays])
     return _Blocks(
         axis.dt * (begins + ends) / 2, count, mean(axis.force), mean(position), mean(speed),
-        mean(motion.acceleration), (speed[index], block), limits,
+        mean(motion.acceleration), transients, (speed[index], block), limits,
     )  # fmt: skip
 
 
@@ -314,12 +334,26 @@ def _runs(sliding: Mask, direction: Array) -> list[tuple[int, int]]:
     return [(int(b), int(e)) for b, e in zip(begins, ends, strict=True) if kind[b] != 0.0]
 
 
+def _stroke_length(strokes: list[tuple[int, int]], position: Array) -> float:
+    """Length of the longer strokes."""
+    return float(np.quantile([abs(position[end - 1] - position[begin]) for begin, end in strokes], 0.75))
+
+
+def _decays(strokes: list[tuple[int, int]], motion: _Motion) -> list[Array]:
+    """What remains of a change at the last reversal, for each length over which it fades; one of each row."""
+    since = np.full(len(motion.speed), np.inf)
+    for begin, end in strokes:
+        if begin > 0:
+            since[begin:end] = abs(motion.position[begin:end] - motion.position[begin])
+    length = max(_stroke_length(strokes, motion.position), 1e-300)
+    return [np.exp(-since / (fraction * length)) for fraction in TRANSIENT_FRACTIONS]
+
+
 def _trimmed(runs: list[tuple[int, int]], axis: _Axis, motion: _Motion) -> list[tuple[int, int]]:
     """Runs without the rows near a rest, by time and by distance."""
     if not runs:
         return []
-    strokes = [abs(motion.position[e - 1] - motion.position[b]) for b, e in runs]
-    presliding = REVERSAL_FRACTION * float(np.quantile(strokes, 0.75))
+    presliding = REVERSAL_FRACTION * _stroke_length(runs, motion.position)
     typical = float(np.quantile([e - b for b, e in runs], 0.75))
     margin = motion.half_window + int(min(REVERSAL_TIME / axis.dt, 0.1 * typical))
     kept = []
@@ -338,7 +372,8 @@ class _Terms(NamedTuple):
 
     Args:
         names: of the parameters, which come first: F0, Fc where both directions are there, B where two speeds are.
-        design: parameters, nuisances (acceleration, position, its square), Stribeck effects, curvature, shape (n, p).
+        design: parameters, nuisances (acceleration, position, its square, two transients), Stribeck effects,
+            curvature, shape (n, p).
         scale: root mean square of each column, shape (p,).
         grid: Stribeck speeds, shape (k,); empty where one speed shows none.
     """
@@ -355,31 +390,64 @@ class _Terms(NamedTuple):
 
     @property
     def nuisances(self) -> list[list[int]]:
-        """Choices of nuisances: none, the acceleration, the position, both."""
+        """Choices of nuisances: inertia or none, terms of the position or none, a transient or none."""
         first = len(self.names)
-        return [[], [first], [first + 1, first + 2], [first, first + 1, first + 2]]
+        inertias: list[list[int]] = [[], [first]]
+        positions: list[list[int]] = [[], [first + 1, first + 2]]
+        transients: list[list[int]] = [[], [first + 3], [first + 4]]
+        return [a + b + c for a in inertias for b in positions for c in transients]
 
     @property
     def effects(self) -> list[int]:
         """Columns of the Stribeck effects."""
-        first = len(self.names) + 3
+        first = len(self.names) + NUISANCES
         return list(range(first, first + len(self.grid)))
 
 
-def _terms(blocks: _Blocks) -> _Terms:
+def _without_ramps(blocks: _Blocks) -> _Blocks:
+    """Blocks of one speed in each direction, without those in which the axis still gains that speed.
+
+    The limits are the speeds of both directions and their mean, for which half of the difference between the forces is
+    the friction.
+    """
+    usual, speeds = np.zeros(len(blocks.speed)), []
+    for side in (blocks.speed < 0.0, blocks.speed > 0.0):
+        if side.any():
+            usual[side] = np.median(blocks.speed[side])
+            speeds.append(abs(float(usual[side][0])))
+    ratio = blocks.speed / usual
+    inside = (ratio * ONE_SPEED > 1.0) & (ratio < ONE_SPEED)
+    rows, block = blocks.rows
+    row_inside = inside[block]
+    names = ("time", "count", "force", "position", "speed", "acceleration", "transients")
+    return replace(
+        blocks,
+        rows=(rows[row_inside], (np.cumsum(inside) - 1)[block[row_inside]]),
+        limits=(min(speeds), float(np.mean(speeds)), max(speeds)),
+        **{name: getattr(blocks, name)[inside] for name in names},
+    )
+
+
+def _several_speeds(speed: Array) -> bool:
+    """True if a direction has two speeds: one speed in each cannot separate offset, Coulomb and viscous friction."""
+    sides = [abs(speed[speed < 0.0]), abs(speed[speed > 0.0])]
+    ends = [np.quantile(side, (0.1, 0.9)) for side in sides if len(side)]
+    return any(fast > ONE_SPEED * slow for slow, fast in ends)
+
+
+def _terms(blocks: _Blocks, grid: Array) -> _Terms:
+    """Columns of the linear model, for Stribeck speeds of shape (k,)."""
     speed, sign = blocks.speed, np.sign(blocks.speed)
-    slow, fast = np.quantile(abs(speed), (0.1, 0.9))
-    slowest, _, fastest = blocks.limits
     names, columns = ["F0"], [np.ones(len(speed))]
-    grid = np.empty(0)
     if len(set(sign)) == 2:
         names, columns = [*names, "Fc"], [*columns, sign]
-    if fast > ONE_SPEED * slow:
+    if _several_speeds(speed):
         names, columns = [*names, "B"], [*columns, speed]
-        grid = np.geomspace(max(slowest, 0.01 * fastest), 0.5 * fastest, STRIBECK_SPEEDS)
+    else:
+        grid = np.empty(0)
     rows = blocks.rows[0]
     effects = [blocks.mean(np.sign(rows) * np.exp(-((rows / vs) ** 2))) for vs in grid]
-    nuisances = [blocks.acceleration, blocks.position, blocks.position**2]
+    nuisances = [blocks.acceleration, blocks.position, blocks.position**2, *blocks.transients.T]
     design = np.column_stack([*columns, *nuisances, *effects, blocks.mean(np.sign(rows) * rows**2)])
     scale = np.maximum(np.sqrt(np.mean(design**2, axis=0)), 1e-300)
     return _Terms(names, design / scale, scale, grid)
@@ -401,27 +469,35 @@ class _Whitened(NamedTuple):
     blocks: int
 
 
-def _whitenings(blocks: _Blocks, design: Array, force: Array) -> list[_Whitened]:
-    """Products for each covariance of the grid: white noise, and beside it correlated noise of a time and a power."""
-    from scipy.linalg import solve_triangular
+class _Noise(NamedTuple):
+    """A covariance of the noise: correlation time [s], and variance of the correlated part over the white one's."""
 
-    count, time = blocks.count, blocks.time
-    white = np.diag(count.mean() / count)
-    distance = abs(time[:, None] - time)
-    columns = np.column_stack([design, force])
-    plain = design.T @ design / len(force)
-    step, length = float(np.median(np.diff(time))), float(np.ptp(time))
-    products = []
+    memory: float
+    power: float
+
+
+def _noises(blocks: _Blocks) -> list[_Noise]:
+    """The grid of covariances; the first is that of white noise."""
+    step, length = float(np.median(np.diff(blocks.time))), float(np.ptp(blocks.time))
+    noises = [_Noise(step, 0.0)]
     for memory in np.geomspace(step, 10.0 * length, NOISE_TIMES):
-        kernel = np.exp(-distance / memory)
         # A slow noise is seen by its change between blocks: the grid is of that, not of its variance.
         change = min(1.0, 2.0 * step / memory)
-        for power in NOISE_POWERS if products else (0.0, *NOISE_POWERS):
-            factor = np.linalg.cholesky(white + power / change * kernel)
-            columns_white = solve_triangular(factor, columns, lower=True, check_finite=False)
-            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-            products.append(_Whitened(columns_white.T @ columns_white, log_det, plain, len(force)))
-    return products
+        noises += [_Noise(float(memory), power / change) for power in NOISE_POWERS]
+    return noises
+
+
+def _whiten(blocks: _Blocks, noise: _Noise, design: Array, force: Array) -> _Whitened:
+    from scipy.linalg import solve_triangular
+
+    covariance = np.diag(blocks.count.mean() / blocks.count)
+    if noise.power:
+        distance = abs(blocks.time[:, None] - blocks.time)
+        covariance += noise.power * np.exp(-distance / noise.memory)
+    factor = np.linalg.cholesky(covariance)
+    columns = solve_triangular(factor, np.column_stack([design, force]), lower=True, check_finite=False)
+    log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+    return _Whitened(columns.T @ columns, log_det, design.T @ design / len(force), len(force))
 
 
 class _Cell(NamedTuple):
@@ -435,6 +511,7 @@ class _Cell(NamedTuple):
         rss: squared residuals over that.
         freedom: degrees of freedom.
         effect: index of the Stribeck speed; -1 without that effect.
+        noise: covariance of the noise.
     """
 
     likelihood: float
@@ -444,6 +521,7 @@ class _Cell(NamedTuple):
     rss: float
     freedom: int
     effect: int = -1
+    noise: _Noise | None = None
 
 
 def _cell(products: _Whitened, columns: list[int], common: int, prior: float = 0.0) -> _Cell:
@@ -475,20 +553,28 @@ def _cell(products: _Whitened, columns: list[int], common: int, prior: float = 0
     return _Cell(float(likelihood), columns, theta, cov, rss, freedom)
 
 
-def _grid(terms: _Terms, whitened: list[_Whitened], level: float) -> tuple[list[_Cell], list[_Cell]]:
+def _cells(terms: _Terms, whitened: dict[_Noise, _Whitened], level: float) -> tuple[list[_Cell], list[_Cell]]:
     """Cells without and with a Stribeck effect, of each covariance and each choice of nuisances."""
     plain, effects = [], []
-    for products in whitened:
+    for noise, products in whitened.items():
         for nuisances in terms.nuisances:
             columns = terms.base + nuisances
-            cell = _cell(products, columns, len(terms.base))
+            cell = _cell(products, columns, len(terms.base))._replace(noise=noise)
             plain.append(cell)
             variance = cell.rss / cell.freedom
             for index, effect in enumerate(terms.effects):
                 std = LEVEL_SPREAD * level * terms.scale[effect]
                 fitted = _cell(products, [*columns, effect], len(terms.base), variance / std**2)
-                effects.append(fitted._replace(effect=index))
+                effects.append(fitted._replace(effect=index, noise=noise))
     return plain, effects
+
+
+def _refine(grid: Array, cells: list[_Cell]) -> Array:
+    """Stribeck speeds over the range that is likely by the cells, one step of the grid wider."""
+    best = max(cell.likelihood for cell in cells)
+    likely = [cell.effect for cell in cells if cell.likelihood > best - UNLIKELY]
+    low, high = grid[max(min(likely) - 1, 0)], grid[min(max(likely) + 1, len(grid) - 1)]
+    return np.asarray(np.geomspace(float(low), float(high), STRIBECK_SPEEDS))
 
 
 def _evidence(cells: list[_Cell]) -> float:
@@ -526,23 +612,35 @@ def _draw(terms: _Terms, cells: list[_Cell]) -> dict[str, Array]:
     return {name: np.concatenate(parts) for name, parts in drawn.items()}
 
 
+# One fit from the blocks to the answer: its steps share the terms and the grid.
 def _fit(
     blocks: _Blocks, units: tuple[str, str], tolerance: float, notes: list[dict[str, str]]
 ) -> AxisFriction:
-    terms = _terms(blocks)
-    columns = terms.base + terms.nuisances[-1]
+    slowest, median, fastest = blocks.limits
+    grid = np.geomspace(max(slowest, 0.01 * fastest), 0.5 * fastest, STRIBECK_SPEEDS)
+    terms = _terms(blocks, grid)
+    columns = terms.base + list(range(len(terms.names), len(terms.names) + 3))
     first = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-10)[0] / terms.scale[columns]
     by_name = dict(zip(terms.names, first, strict=False))
-    median = blocks.limits[1]
     at_median = by_name.get("Fc", 0.0) + median * by_name.get("B", 0.0)
     if at_median < 0.0:
         text = "the force acts against the motion that it drives, so its sign is turned"
         notes.append({"code": "force-sign-turned", "text": text})
     force = -blocks.force if at_median < 0.0 else blocks.force
     level = abs(by_name["Fc"]) if "Fc" in by_name else float(np.ptp(force))
-    whitened = _whitenings(blocks, terms.design, force)
-    plain, effects = _grid(terms, whitened, level)
-    shows = bool(effects) and _evidence(effects) - _evidence(plain) > STRIBECK_EVIDENCE
+    noises = _noises(blocks)
+    evidence = 0.0
+    for attempt in range(REFINEMENTS + 1):
+        whitened = {noise: _whiten(blocks, noise, terms.design, force) for noise in noises}
+        plain, effects = _cells(terms, whitened, level)
+        if attempt == 0 and effects:
+            evidence = _evidence(effects) - _evidence(plain)
+        if not effects or attempt == REFINEMENTS:
+            break
+        least = max(cell.likelihood for cell in effects) - UNLIKELY
+        noises = list({c.noise: 0 for c in effects if c.likelihood > least and c.noise})
+        terms = _terms(blocks, grid := _refine(grid, effects))
+    shows = evidence > STRIBECK_EVIDENCE
     draws = _draw(terms, effects or plain)
     curvature = _curvature(terms, whitened, effects or plain, blocks.limits[2])
     judged = _Judge(blocks.limits, units, tolerance, "" if curvature is None else curvature)
@@ -551,7 +649,7 @@ def _fit(
         notes.append({"code": "model-rejected", "text": curvature})
     best = max(effects or plain, key=lambda cell: cell.likelihood)
     fitted = terms.design[:, best.columns] @ best.theta
-    friction = [k for k, c in enumerate(best.columns) if c not in terms.nuisances[-1] and c != 0]
+    friction = [k for k, c in enumerate(best.columns) if c in (*terms.base[1:], *terms.effects)]
     shown = force - fitted + terms.design[:, np.array(best.columns)[friction]] @ best.theta[friction]
     residual = np.average((force - fitted) ** 2, weights=blocks.count)
     variance = np.average((force - np.average(force, weights=blocks.count)) ** 2, weights=blocks.count)
@@ -562,12 +660,15 @@ def _fit(
     )  # fmt: skip
 
 
-def _curvature(terms: _Terms, whitened: list[_Whitened], cells: list[_Cell], fastest: float) -> str | None:
+def _curvature(
+    terms: _Terms, whitened: dict[_Noise, _Whitened], cells: list[_Cell], fastest: float
+) -> str | None:
     """A sentence where the friction is certainly no straight line over the speed; else None."""
     if "B" not in terms.names or "Fc" not in terms.names:
         return None
-    index = max(range(len(cells)), key=lambda k: cells[k].likelihood)
-    best, products = cells[index], whitened[index * len(whitened) // len(cells)]
+    best = max(cells, key=lambda cell: cell.likelihood)
+    assert best.noise is not None
+    products = whitened[best.noise]
     first = [c for c in best.columns if c not in terms.effects]
     curved = len(terms.scale) - 1
     straight = _cell(products, first, len(terms.base))
@@ -627,43 +728,54 @@ class _Judge(NamedTuple):
 
     def parameters(self, draws: dict[str, Array], terms: _Terms, shows: bool) -> dict[str, Parameter]:
         """All parameters, by name in the order of `NAMES`."""
-        slowest, median, _ = self.limits
+        one_speed = "B" not in terms.names
         parameters = {name: self._unknown(name, _ONE_DIRECTION) for name in NAMES}
-        if "B" in terms.names:
+        if not one_speed:
             parameters["B"] = self._judge("B", draws["B"], positive=True)
-        else:
-            parameters["B"] = self._unknown("B", self._one_speed())
         if "Fc" not in terms.names:
             return parameters
         parameters["F0"] = self._judge("F0", draws["F0"])
-        at_median = _at(draws, median)
-        parameters["F"] = self._judge("F", at_median, positive=True)
-        if "B" not in terms.names:
-            high = max(float(np.quantile(at_median, 0.975)), 0.0)
-            bounds = {"Fc": high, "B": high / median}
-            for name, bound in bounds.items():
-                parameters[name] = self._unknown(name, self._one_speed(), (0.0, bound))
-            for name in ("Fs", "vs"):
-                parameters[name] = self._unknown(name, self._one_speed())
-            return parameters
+        parameters["F"] = self._judge("F", _at(draws, self.limits[1]), positive=True)
+        if one_speed:
+            return parameters | self._of_one_speed(draws)
         parameters["Fc"] = self._judge("Fc", draws["Fc"], positive=True)
-        if shows:
-            step = np.log(terms.grid[1] / terms.grid[0])
-            within = np.random.default_rng(2).uniform(-0.5, 0.5, len(draws["vs"]))
-            parameters["Fs"] = self._judge("Fs", draws["Fc"] + draws["rise"], positive=True)
-            parameters["vs"] = self._judge("vs", draws["vs"] * np.exp(step * within), positive=True)
-        else:
-            reason = f"no Stribeck effect shows at {slowest:.3g} {self.units[1]} and above; move more slowly, too"
-            for name in ("Fs", "vs"):
-                parameters[name] = self._unknown(name, reason)
+        parameters |= self._stribeck(draws, terms, shows)
         if self.rejected:
-            for name in ("Fc", "B", "Fs", "vs"):
-                parameters[name] = parameters[name].without_number(self.rejected, Verdict.REJECTED)
+            parameters |= {
+                name: parameters[name].without_number(self.rejected, Verdict.REJECTED)
+                for name in ("Fc", "B", "Fs", "vs")
+            }
         return parameters
 
-    def _one_speed(self) -> str:
-        speed = f"{self.limits[1]:.3g} {self.units[1]}"
-        return f"the log has one speed of {speed}, so Fc and B v are one number, F; add strokes at half and twice the speed"
+    def _stribeck(self, draws: dict[str, Array], terms: _Terms, shows: bool) -> dict[str, Parameter]:
+        if not shows:
+            slowest = f"{self.limits[0]:.3g} {self.units[1]}"
+            reason = f"no Stribeck effect shows at {slowest} and above; move more slowly, too"
+            return {name: self._unknown(name, reason) for name in ("Fs", "vs")}
+        step = np.log(terms.grid[1] / terms.grid[0])
+        within = np.random.default_rng(2).uniform(-0.5, 0.5, len(draws["vs"]))
+        return {
+            "Fs": self._judge("Fs", draws["Fc"] + draws["rise"], positive=True),
+            "vs": self._judge("vs", draws["vs"] * np.exp(step * within), positive=True),
+        }
+
+    def _of_one_speed(self, draws: dict[str, Array]) -> dict[str, Parameter]:
+        """Bounds by a friction that is passive: neither Coulomb nor viscous friction is below zero."""
+        slowest, median, fastest = self.limits
+        high = max(float(np.quantile(_at(draws, median), 0.975)), 0.0)
+        bounds = {"Fc": (0.0, high), "B": (0.0, high / median), "Fs": None, "vs": None}
+        reason = (
+            f"the log has one speed of {median:.3g} {self.units[1]} in a direction, where Fc + B v is one number, F;"
+            " add strokes at half and at twice the speed"
+        )
+        parameters = {name: self._unknown(name, reason, ends) for name, ends in bounds.items()}
+        # B v of unequal speeds is in the mean of both directions.
+        unequal = high / median * (fastest - slowest) / 2
+        if unequal > MAX_UNEQUAL * high:
+            low, top = (float(end) for end in np.quantile(draws["F0"], (0.025, 0.975)))
+            reason = "the speeds of the two directions differ, and viscous friction is in the mean of both"
+            parameters["F0"] = self._unknown("F0", reason, (low - unequal, top + unequal))
+        return parameters
 
     def _unknown(self, name: str, reason: str, ci95: tuple[float, float] | None = None) -> Parameter:
         return Parameter(None, None, ci95, _unit(name, self.units), Verdict.NOT_IDENTIFIABLE, reason)

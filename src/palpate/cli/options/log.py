@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, Model
 from palpate.errors import InputError
+from palpate.logs import formats
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
     from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.identification.indenter import Indenter
+    from palpate.records import Record
 
 
 @values.options("Signals of the log", 1)
@@ -29,6 +31,33 @@ class LogOptions(Signals):
     "Leave out the rows before, in seconds from the first row."
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
+
+    def read_axis(self, log: Path, velocity: str | None) -> Record:
+        """The record of an axis: time, force, and position or velocity or both.
+
+        Args:
+            log: path of it.
+            velocity: column of the speed; None where it is made from the position.
+
+        Raises:
+            InputError: the log or an option is wrong, or a signal has no name.
+        """
+        from palpate.logs import read_log
+
+        roles = {"time": self.time, "position": self.position, "velocity": velocity, "force": self.force}
+        columns = {role: name for role, name in roles.items() if name is not None}
+        if self.wrench or self.pose:
+            raise InputError(
+                "--friction is of one axis; give --force-column with --position or --velocity, not --wrench and --pose"
+            )
+        if columns:
+            lacking = [] if self.force else ["--force-column"]
+            lacking += [] if self.position or velocity else ["--position or --velocity"]
+            lacking += [] if self.time or self.rate or formats.kind_of(log).is_bag else ["--time or --rate"]
+            if lacking:
+                raise InputError(f"name the columns of {log} with {' and '.join(lacking)} as well")
+        reading = {name: getattr(self, name) for name in ("rate", "start", "end", "missing", "delimiter")}
+        return read_log(log, limits=self.limits, **reading, **columns)
 
 
 @values.options("Wrench and pose, and the sign of the force", 2)
