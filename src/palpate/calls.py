@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError, unknown
+from palpate.from_log import accept_stated_units
 from palpate.from_log import identify_log as identify_log_file
 from palpate.identification import Identification, Pooled
 from palpate.identification import identify as identify_record
@@ -45,7 +46,11 @@ def identify(source: Record | Any, **options: Any) -> Identification:
         if isinstance(source, str | Path) and not {*options} - _OPTIONS:
             return identify_log_file(source, **_split(options, columns=True)[1])
         reading, fitting = _split(options, columns=not isinstance(source, Record))
-        return _fit(source if isinstance(source, Record) else read(source, **reading), fitting)
+        if isinstance(source, Record):
+            return _fit(source, fitting)
+        record = read(source, **reading)
+        specs = {role: reading.get(role) for role in ("position", "force")}
+        return accept_stated_units(_fit(record, fitting), record, specs)
 
 
 def identify_log(path: str | Path, **options: Any) -> Identification:
