@@ -21,30 +21,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.arrays import Array, Indices, Mask
-from palpate.errors import InputError
+from palpate.arrays import Array, Indices
+from palpate.contact_frame.axis_motion import SlidingBlocks, several_speeds, sliding_blocks
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.records import Record, Result
 from palpate.signals.types import NORMAL
 
-MIN_ROWS = 50
-"""Fewest rows of a log: ten for each term of the force, about."""
-MAX_BLOCKS = 320
-"""Approximate blocks of rows that are fitted by their means; a dense covariance of so many takes 5 ms."""
-HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-"""Half-widths [rows] of the windows in which the speed is a local parabola's; that with the least error is taken."""
-NOISE_FACTOR = 3.0
-"""Standard deviations of the speed below which its sign is not sure."""
-MIN_SPEED_FRACTION = 0.005
-"""Fraction of the fastest speed below which an axis counts as at rest."""
-REVERSAL_FRACTION = 0.005
-"""Fraction of a stroke after a reversal that is left out: presliding takes 0.1 to 0.5 % of usual strokes."""
-TRANSIENT_FRACTIONS = (0.01, 0.04)
-"""Lengths over which a change at a reversal fades, as fractions of a stroke: long presliding, a drive that yields."""
-REVERSAL_TIME = 0.02
-"""Time before and after each rest that is left out [s]: a force is read up to so late."""
-ONE_SPEED = 1.25
-"""Ratio of fast to slow speeds (90 and 10 % of the rows) below which a log has one speed."""
 LEVEL_SPREAD = 0.6
 """Prior standard deviation of (Fs - Fc) / Fc, which is positive: published ratios Fs / Fc are 1 to 2."""
 MAX_UNEQUAL = 0.1
@@ -69,6 +51,7 @@ NOISE_POWERS = (0.05, 0.4, 3.0, 30.0, 300.0)
 """Variance of the change of the correlated noise over a block, over that of the white noise of a block's mean."""
 DRAWS = 6000
 """Draws from the joint distribution of parameters, which give the intervals; an end errs by 2 % of the width."""
+
 
 NAMES = {
     "Fc": "Coulomb friction",
@@ -142,229 +125,13 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
     Raises:
         InputError: a column is missing, or there are too few rows.
     """
-    axis = _axis(record)
-    motion = _differentiate(axis)
-    blocks = _average(axis, motion)
-    units = axis.force_unit, axis.speed_unit
+    blocks, units = sliding_blocks(record)
     notes = [dict(note) for note in record.meta.get("notes", ())]
     if blocks is None:
         reason = "the log shows no motion above the noise of its speed; move the axis back and forth"
         unknown = {name: Parameter.unknown(_unit(name, units), reason) for name in NAMES}
         return AxisFriction(unknown, (0.0, 0.0, 0.0), 0, units, 0.0, 0.0, 0, notes)
-    if not _several_speeds(blocks.speed):
-        blocks = _without_ramps(blocks)
-    return _fit(blocks, units, tolerance, notes)
-
-
-class _Axis(NamedTuple):
-    """Equally spaced samples of an axis.
-
-    Args:
-        dt: [s].
-        force: shape (n,).
-        position: likewise; None where the log has a speed alone.
-        velocity: likewise; None where it is derived from the position.
-        present: samples that are near a row of the log.
-    """
-
-    dt: float
-    force: Array
-    position: Array | None
-    velocity: Array | None
-    present: Mask
-    force_unit: str
-    speed_unit: str
-
-
-class _Motion(NamedTuple):
-    """Position, speed and acceleration of each sample; noise of the speed; half-width of the window [rows]."""
-
-    position: Array
-    speed: Array
-    acceleration: Array
-    noise: float
-    half_window: int
-
-
-@dataclass(frozen=True)
-class _Blocks:
-    """Means over blocks of rows that slide in one direction.
-
-    Args:
-        time: of the middle [s], shape (n,).
-        count: rows of each block.
-        force, position, speed, acceleration: means; the position from the middle of its range, over half of it.
-        transients: means of what remains of a change at the last reversal, for each length, shape (n, 2).
-        rows: speed of each row, and the block that it is of: a function's mean is that of its rows.
-        limits: slowest, median and fastest speed without sign.
-    """
-
-    time: Array
-    count: Array
-    force: Array
-    position: Array
-    speed: Array
-    acceleration: Array
-    transients: Array
-    rows: tuple[Array, Indices]
-    limits: tuple[float, float, float]
-
-    def mean(self, values: Array) -> Array:
-        """Mean over each block of values of each row."""
-        return np.asarray(np.bincount(self.rows[1], values, len(self.count)) / self.count)
-
-
-def _axis(record: Record) -> _Axis:
-    missing = [name for name in ("time", "force") if name not in record.columns]
-    moved = [name for name in ("position", "velocity") if name in record.columns]
-    if missing or not moved:
-        lacking = " and ".join([*missing, *([] if moved else ["position or velocity"])])
-        raise InputError(f"the friction of an axis needs time, force and its motion; there is no {lacking}")
-    columns = {name: np.asarray(record[name], np.float64) for name in ("time", "force", *moved)}
-    finite = np.all([np.isfinite(values) for values in columns.values()], axis=0)
-    order = np.argsort(columns["time"][finite], kind="stable")
-    columns = {name: values[finite][order] for name, values in columns.items()}
-    time, first = np.unique(columns["time"], return_index=True)
-    if len(time) < MIN_ROWS:
-        raise InputError(f"the friction of an axis needs {MIN_ROWS} rows at least, got {len(time)}")
-    steps = np.diff(time)
-    dt = float(np.median(steps))
-    if np.ptp(time) / dt > 20.0 * len(time):
-        raise InputError(
-            f"the log lasts {np.ptp(time):.3g} s and has a row each {dt:.3g} s, with gaps nearly everywhere;"
-            " cut it with --start and --end"
-        )
-    grid = time[0] + dt * np.arange(int(np.ptp(time) / dt + 0.5) + 1)
-    nearest = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
-    distance = np.minimum(abs(grid - time[nearest - 1]), abs(time[nearest] - grid))
-    sampled = {name: np.interp(grid, time, values[first]) for name, values in columns.items()}
-    units = record.units
-    speed_unit = units["velocity"] if "velocity" in moved else _per_second(units["position"])
-    return _Axis(
-        dt, sampled["force"], sampled.get("position"), sampled.get("velocity"), distance < 3.0 * dt,
-        units["force"], speed_unit,
-    )  # fmt: skip
-
-
-def _per_second(unit: str) -> str:
-    return "1/s" if unit == "1" else f"{unit}/s"
-
-
-def _differentiate(axis: _Axis) -> _Motion:
-    """Speed and acceleration by a local parabola whose window has the least error.
-
-    The error is judged by the change of the speed from a window to that of twice the width: a short one shows noise, a
-    long one the curvature of the motion.
-    """
-    order = 0 if axis.velocity is not None else 1
-    signal = axis.velocity if axis.velocity is not None else axis.position
-    assert signal is not None
-    longest = max(len(signal) // 12, 1)
-    widths = [width for width in HALF_WINDOWS if 2 * width <= longest] or [1]
-    speeds = [_local(signal, 2 * width, order, axis.dt) for width in widths]
-    before = [_local(signal, widths[0], order, axis.dt), *speeds[:-1]]
-    errors = [
-        float(np.sqrt(np.mean((a - b)[axis.present] ** 2))) for a, b in zip(before, speeds, strict=True)
-    ]
-    best = int(np.argmin(errors))
-    half_window = widths[best]
-    speed = _local(signal, half_window, order, axis.dt)
-    acceleration = _local(signal, 2 * half_window, order + 1, axis.dt)
-    position = axis.position if axis.position is not None else axis.dt * np.cumsum(speed)
-    return _Motion(position, speed, acceleration, errors[best], half_window)
-
-
-def _local(signal: Array, half_width: int, order: int, dt: float) -> Array:
-    """A derivative of the parabola through the samples of a window, at its middle (Savitzky and Golay, 1964)."""
-    places = np.arange(-half_width, half_width + 1.0)
-    weights = np.linalg.pinv(np.vander(places, 3, increasing=True))[order]
-    scale = (1.0, 1.0, 2.0)[order] / dt**order
-    ends = np.arange(half_width, 0, -1)
-    ends = ends[ends < len(signal)]
-    # Beyond the ends the signal goes on as its mirror image through the last point.
-    begin, end = 2 * signal[0] - signal[ends], 2 * signal[-1] - signal[-1 - ends[::-1]]
-    padded = np.concatenate([begin, signal, end])
-    middle = np.convolve(padded, scale * weights[::-1], "same")
-    return np.asarray(middle[len(begin) : len(begin) + len(signal)])
-
-
-def _average(axis: _Axis, motion: _Motion) -> _Blocks | None:
-    """Means over blocks of rows that slide; None if the axis does not move."""
-    speed = motion.speed
-    fastest = float(np.quantile(abs(speed[axis.present]), 0.98))
-    at_rest = max(NOISE_FACTOR * motion.noise, MIN_SPEED_FRACTION * fastest)
-    if not at_rest < 0.5 * fastest:
-        return None
-    sliding = axis.present & (abs(speed) > at_rest)
-    strokes = _runs(sliding, np.sign(speed))
-    runs = _trimmed(strokes, axis, motion)
-    if not runs:
-        return None
-    decays = _decays(strokes, motion)
-    rows = sum(end - begin for begin, end in runs)
-    length = max(rows / MAX_BLOCKS, 1.0)
-    if len(runs) > MAX_BLOCKS:
-        runs = runs[:: -(-len(runs) // MAX_BLOCKS)]
-    edges = [np.linspace(b, e, max(round((e - b) / length), 1) + 1).astype(int) for b, e in runs]
-    begins, ends = np.concatenate([e[:-1] for e in edges]), np.concatenate([e[1:] for e in edges])
-    count = (ends - begins).astype(float)
-    index = np.concatenate([np.arange(b, e) for b, e in zip(begins, ends, strict=True)])
-    block = np.repeat(np.arange(len(count)), ends - begins)
-
-    def mean(values: Array) -> Array:
-        return np.asarray(np.bincount(block, values[index]) / count)
-
-    slid = abs(speed[index])
-    limits = float(np.quantile(slid, 0.02)), float(np.median(slid)), float(np.quantile(slid, 0.98))
-    place = motion.position[index]
-    low, high = place.min(), place.max()
-    position = (motion.position - (low + high) / 2) / max((high - low) / 2, 1e-300)
-    transients = np.column_stack([mean(np.sign(speed) * decay) for decay in decays])
-    return _Blocks(
-        axis.dt * (begins + ends) / 2, count, mean(axis.force), mean(position), mean(speed),
-        mean(motion.acceleration), transients, (speed[index], block), limits,
-    )  # fmt: skip
-
-
-def _runs(sliding: Mask, direction: Array) -> list[tuple[int, int]]:
-    """Begin and end of each run of rows that slide in one direction."""
-    kind = np.where(sliding, direction, 0.0)
-    edges = np.flatnonzero(np.diff(kind)) + 1
-    begins, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(kind)]])
-    return [(int(b), int(e)) for b, e in zip(begins, ends, strict=True) if kind[b] != 0.0]
-
-
-def _stroke_length(strokes: list[tuple[int, int]], position: Array) -> float:
-    """Length of the longer strokes."""
-    return float(np.quantile([abs(position[end - 1] - position[begin]) for begin, end in strokes], 0.75))
-
-
-def _decays(strokes: list[tuple[int, int]], motion: _Motion) -> list[Array]:
-    """What remains of a change at the last reversal, for each length over which it fades; one of each row."""
-    since = np.full(len(motion.speed), np.inf)
-    for begin, end in strokes:
-        if begin > 0:
-            since[begin:end] = abs(motion.position[begin:end] - motion.position[begin])
-    length = max(_stroke_length(strokes, motion.position), 1e-300)
-    return [np.exp(-since / (fraction * length)) for fraction in TRANSIENT_FRACTIONS]
-
-
-def _trimmed(runs: list[tuple[int, int]], axis: _Axis, motion: _Motion) -> list[tuple[int, int]]:
-    """Runs without the rows near a rest, by time and by distance."""
-    if not runs:
-        return []
-    presliding = REVERSAL_FRACTION * _stroke_length(runs, motion.position)
-    typical = float(np.quantile([e - b for b, e in runs], 0.75))
-    margin = motion.half_window + int(min(REVERSAL_TIME / axis.dt, 0.1 * typical))
-    kept = []
-    for begin, end in runs:
-        at_begin, at_end = begin > 0, end < len(axis.force)  # the log's own ends are no reversals
-        moved = abs(motion.position[begin:end] - motion.position[begin])
-        first = begin + max(margin, int(np.searchsorted(moved, presliding))) * at_begin
-        last = end - margin * at_end
-        if last - first >= 2:
-            kept.append((first, last))
-    return kept
+    return _identify(blocks, units, tolerance, notes)
 
 
 class _Terms(NamedTuple):
@@ -404,44 +171,13 @@ class _Terms(NamedTuple):
         return list(range(first, first + len(self.grid)))
 
 
-def _without_ramps(blocks: _Blocks) -> _Blocks:
-    """Blocks of one speed in each direction, without those in which the axis still gains that speed.
-
-    The limits are the speeds of both directions and their mean, for which half of the difference between the forces is
-    the friction.
-    """
-    usual, speeds = np.zeros(len(blocks.speed)), []
-    for side in (blocks.speed < 0.0, blocks.speed > 0.0):
-        if side.any():
-            usual[side] = np.median(blocks.speed[side])
-            speeds.append(abs(float(usual[side][0])))
-    ratio = blocks.speed / usual
-    inside = (ratio * ONE_SPEED > 1.0) & (ratio < ONE_SPEED)
-    rows, block = blocks.rows
-    row_inside = inside[block]
-    names = ("time", "count", "force", "position", "speed", "acceleration", "transients")
-    return replace(
-        blocks,
-        rows=(rows[row_inside], (np.cumsum(inside) - 1)[block[row_inside]]),
-        limits=(min(speeds), float(np.mean(speeds)), max(speeds)),
-        **{name: getattr(blocks, name)[inside] for name in names},
-    )
-
-
-def _several_speeds(speed: Array) -> bool:
-    """True if a direction has two speeds: one speed in each cannot separate offset, Coulomb and viscous friction."""
-    sides = [abs(speed[speed < 0.0]), abs(speed[speed > 0.0])]
-    ends = [np.quantile(side, (0.1, 0.9)) for side in sides if len(side)]
-    return any(fast > ONE_SPEED * slow for slow, fast in ends)
-
-
-def _terms(blocks: _Blocks, grid: Array) -> _Terms:
+def _terms(blocks: SlidingBlocks, grid: Array) -> _Terms:
     """Columns of the linear model, for Stribeck speeds of shape (k,)."""
     speed, sign = blocks.speed, np.sign(blocks.speed)
     names, columns = ["F0"], [np.ones(len(speed))]
     if len(set(sign)) == 2:
         names, columns = [*names, "Fc"], [*columns, sign]
-    if _several_speeds(speed):
+    if several_speeds(speed):
         names, columns = [*names, "B"], [*columns, speed]
     else:
         grid = np.empty(0)
@@ -453,245 +189,289 @@ def _terms(blocks: _Blocks, grid: Array) -> _Terms:
     return _Terms(names, design / scale, scale, grid)
 
 
+class _Noise(NamedTuple):
+    """Covariances of the noise: correlation time [s], and variance of the correlated over that of the white part."""
+
+    memory: Array
+    power: Array
+
+
+def _noise_grid(blocks: SlidingBlocks) -> _Noise:
+    """The grid of covariances; the first is that of white noise."""
+    step, length = float(np.median(np.diff(blocks.time))), float(np.ptp(blocks.time))
+    memory = np.repeat(np.geomspace(step, 10.0 * length, NOISE_TIMES), len(NOISE_POWERS))
+    # A slow noise is seen by its change between blocks: the grid is of that, not of its variance.
+    power = np.tile(NOISE_POWERS, NOISE_TIMES) / np.minimum(1.0, 2.0 * step / memory)
+    return _Noise(np.append(step, memory), np.append(0.0, power))
+
+
 class _Whitened(NamedTuple):
-    """Products of the columns and the force under one covariance of the noise.
+    """Products of columns and force under each covariance.
 
     Args:
-        gram: of columns and force, the force last, shape (p + 1, p + 1).
-        log_det: logarithm of the covariance's determinant.
-        plain: products of the columns without the covariance, over the blocks, shape (p, p).
+        gram: of columns and force, the force last, shape (c, p + 1, p + 1).
+        log_det: logarithm of each covariance's determinant, shape (c,).
+        plain: products of the columns without a covariance, over the blocks, shape (p, p).
         blocks: how many there are.
     """
 
     gram: Array
-    log_det: float
+    log_det: Array
     plain: Array
     blocks: int
 
 
-class _Noise(NamedTuple):
-    """A covariance of the noise: correlation time [s], and variance of the correlated part over the white one's."""
-
-    memory: float
-    power: float
-
-
-def _noises(blocks: _Blocks) -> list[_Noise]:
-    """The grid of covariances; the first is that of white noise."""
-    step, length = float(np.median(np.diff(blocks.time))), float(np.ptp(blocks.time))
-    noises = [_Noise(step, 0.0)]
-    for memory in np.geomspace(step, 10.0 * length, NOISE_TIMES):
-        # A slow noise is seen by its change between blocks: the grid is of that, not of its variance.
-        change = min(1.0, 2.0 * step / memory)
-        noises += [_Noise(float(memory), power / change) for power in NOISE_POWERS]
-    return noises
-
-
-def _whiten(blocks: _Blocks, noise: _Noise, design: Array, force: Array) -> _Whitened:
-    from scipy.linalg import solve_triangular
-
-    covariance = np.diag(blocks.count.mean() / blocks.count)
-    if noise.power:
-        distance = abs(blocks.time[:, None] - blocks.time)
-        covariance += noise.power * np.exp(-distance / noise.memory)
-    factor = np.linalg.cholesky(covariance)
-    columns = solve_triangular(factor, np.column_stack([design, force]), lower=True, check_finite=False)
-    log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-    return _Whitened(columns.T @ columns, log_det, design.T @ design / len(force), len(force))
+def _whiten(blocks: SlidingBlocks, noise: _Noise, design: Array, force: Array) -> _Whitened:
+    """Whiten columns and force by a Kalman filter of the correlated noise, for all covariances together."""
+    columns = np.column_stack([design, force])
+    white = blocks.count.mean() / blocks.count
+    state = np.zeros((len(noise.power), columns.shape[1]))
+    variance, log_det = noise.power.copy(), np.zeros(len(noise.power))
+    innovations = np.empty((len(columns), *state.shape))
+    for k, row in enumerate(columns):
+        if k:
+            keep = np.exp(-(blocks.time[k] - blocks.time[k - 1]) / noise.memory)
+            state *= keep[:, None]
+            variance = noise.power + keep**2 * (variance - noise.power)
+        total = variance + white[k]
+        residual = row - state
+        state += (variance / total)[:, None] * residual
+        variance = variance * white[k] / total
+        innovations[k] = residual / np.sqrt(total)[:, None]
+        log_det += np.log(total)
+    gram = np.einsum("ncp,ncq->cpq", innovations, innovations, optimize=True)
+    return _Whitened(gram, log_det, design.T @ design / len(force), len(force))
 
 
-class _Cell(NamedTuple):
-    """The fit of one point of the grid.
+class _Cells(NamedTuple):
+    """Fits of one choice of columns, for each covariance c and each Stribeck speed k.
 
     Args:
-        likelihood: logarithm of its marginal likelihood.
-        columns: that are fitted; the Stribeck effect last, if there is one.
-        theta: their coefficients.
-        cov: covariance of these over the noise's variance.
-        rss: squared residuals over that.
+        columns: that are fitted, for each Stribeck speed, whose effect is the last, shape (k, m).
+        likelihood: logarithm of the marginal likelihood, shape (c, k).
+        theta: coefficients, shape (c, k, m).
+        cov: covariance of these over the noise's variance, shape (c, k, m, m).
+        rss: squared residuals over that, shape (c, k).
         freedom: degrees of freedom.
-        effect: index of the Stribeck speed; -1 without that effect.
-        noise: covariance of the noise.
+        stribeck: the last column is an effect.
     """
 
-    likelihood: float
-    columns: list[int]
+    columns: Indices
+    likelihood: Array
     theta: Array
     cov: Array
-    rss: float
+    rss: Array
     freedom: int
-    effect: int = -1
-    noise: _Noise | None = None
+    stribeck: bool
 
 
-def _cell(products: _Whitened, columns: list[int], common: int, prior: float = 0.0) -> _Cell:
+def _fit(products: _Whitened, columns: Indices, common: int, prior: Array | None = None) -> _Cells:
     """Fit columns by least squares; nuisances have a prior of unit information.
 
     Args:
         products: of columns and force.
-        columns: fitted.
+        columns: fitted, shape (k, m).
         common: how many of them every cell has.
-        prior: precision of the last coefficient, which is positive, over that of the noise; 0 for no such prior.
+        prior: variance of the last coefficient, which is positive, shape (k,); None for no such prior.
     """
     from scipy.special import log_ndtr
 
-    gram = products.gram
-    normal = gram[np.ix_(columns, columns)].copy()
-    flat = len(columns) - bool(prior)
-    normal[np.diag_indices(len(columns))] *= 1.0 + 1e-9
-    normal[-1, -1] += prior
-    cov = np.linalg.inv(normal)
-    theta = cov @ gram[columns, -1]
-    rss = max(float(gram[-1, -1] - theta @ gram[columns, -1]), 1e-300)
+    size = columns.shape[1]
+    flat = size - (prior is not None)
+    normal = products.gram[:, columns[:, :, None], columns[:, None, :]]
+    right = products.gram[:, columns, -1]
+    whole = products.gram[:, -1:, -1]
+    diagonal = np.arange(size)
+    normal[..., diagonal, diagonal] *= 1.0 + 1e-9
+    precision = np.zeros(normal.shape[:2])
+    if prior is not None:
+        bare = normal[..., :flat, :flat]
+        misfit = whole - np.einsum(
+            "ckm,ckm->ck", np.linalg.solve(bare, right[..., :flat, None])[..., 0], right[..., :flat]
+        )
+        precision = np.maximum(misfit, 1e-300) / (products.blocks - flat) / prior
+        normal[..., -1, -1] += precision
+    cov = np.asarray(np.linalg.inv(normal))
+    theta = (cov @ right[..., None])[..., 0]
+    rss = np.maximum(whole - np.einsum("ckm,ckm->ck", theta, right), 1e-300)
     freedom = products.blocks - flat
-    plain = products.plain[np.ix_(columns[:flat], columns[:flat])] + 1e-9 * np.eye(flat)
+    plain = products.plain[columns[:, :flat, None], columns[:, None, :flat]] + 1e-9 * np.eye(flat)
     determinants = np.linalg.slogdet(normal)[1] - np.linalg.slogdet(plain)[1]
-    likelihood = -0.5 * (products.log_det + determinants + (products.blocks - common) * np.log(rss))
-    if prior:
-        std = np.sqrt(cov[-1, -1] * rss / freedom)
-        likelihood += 0.5 * np.log(prior) + np.log(2.0) + log_ndtr(theta[-1] / std)
-    return _Cell(float(likelihood), columns, theta, cov, rss, freedom)
+    likelihood = -0.5 * (products.log_det[:, None] + determinants + (products.blocks - common) * np.log(rss))
+    if prior is not None:
+        std = np.sqrt(cov[..., -1, -1] * rss / freedom)
+        likelihood += 0.5 * np.log(precision) + np.log(2.0) + log_ndtr(theta[..., -1] / std)
+    return _Cells(columns, likelihood, theta, cov, rss, freedom, prior is not None)
 
 
-def _cells(terms: _Terms, whitened: dict[_Noise, _Whitened], level: float) -> tuple[list[_Cell], list[_Cell]]:
-    """Cells without and with a Stribeck effect, of each covariance and each choice of nuisances."""
+def _all_cells(terms: _Terms, products: _Whitened, level: float) -> tuple[list[_Cells], list[_Cells]]:
+    """Cells without and with a Stribeck effect, of each choice of nuisances."""
     plain, effects = [], []
-    for noise, products in whitened.items():
-        for nuisances in terms.nuisances:
-            columns = terms.base + nuisances
-            cell = _cell(products, columns, len(terms.base))._replace(noise=noise)
-            plain.append(cell)
-            variance = cell.rss / cell.freedom
-            for index, effect in enumerate(terms.effects):
-                std = LEVEL_SPREAD * level * terms.scale[effect]
-                fitted = _cell(products, [*columns, effect], len(terms.base), variance / std**2)
-                effects.append(fitted._replace(effect=index, noise=noise))
+    prior = (LEVEL_SPREAD * level * terms.scale[terms.effects]) ** 2
+    for nuisances in terms.nuisances:
+        columns = np.array([terms.base + nuisances])
+        plain.append(_fit(products, columns, len(terms.base)))
+        if terms.effects:
+            with_effect = np.column_stack([np.repeat(columns, len(terms.grid), axis=0), terms.effects])
+            effects.append(_fit(products, with_effect, len(terms.base), prior))
     return plain, effects
 
 
-def _refine(grid: Array, cells: list[_Cell]) -> Array:
-    """Stribeck speeds over the range that is likely by the cells, one step of the grid wider."""
-    best = max(cell.likelihood for cell in cells)
-    likely = [cell.effect for cell in cells if cell.likelihood > best - UNLIKELY]
-    low, high = grid[max(min(likely) - 1, 0)], grid[min(max(likely) + 1, len(grid) - 1)]
-    return np.asarray(np.geomspace(float(low), float(high), STRIBECK_SPEEDS))
-
-
-def _evidence(cells: list[_Cell]) -> float:
+def _evidence(cells: list[_Cells]) -> float:
     """Logarithm of the mean marginal likelihood."""
-    values = np.array([cell.likelihood for cell in cells])
+    values = np.concatenate([c.likelihood.ravel() for c in cells])
     return float(values.max() + np.log(np.mean(np.exp(values - values.max()))))
 
 
-def _draw(terms: _Terms, cells: list[_Cell]) -> dict[str, Array]:
+def _likely(cells: list[_Cells]) -> tuple[Indices, Indices]:
+    """Indices of the covariances and of the Stribeck speeds that are not unlikely."""
+    least = max(c.likelihood.max() for c in cells) - UNLIKELY
+    likely = np.any([c.likelihood > least for c in cells], axis=0)
+    return np.flatnonzero(likely.any(axis=1)), np.flatnonzero(likely.any(axis=0))
+
+
+def _draw(terms: _Terms, cells: list[_Cells]) -> dict[str, Array]:
     """Draws from the joint distribution: parameters by name, Fs - Fc as `rise`, and vs, each of shape (d,)."""
     from scipy.special import ndtr, ndtri
 
     random = np.random.default_rng(1)
-    likelihood = np.array([cell.likelihood for cell in cells])
+    likelihood = np.concatenate([c.likelihood.ravel() for c in cells])
     weights = np.exp(likelihood - likelihood.max())
+    counts = random.multinomial(DRAWS, weights / weights.sum())
     drawn: dict[str, list[Array]] = {name: [] for name in (*terms.names, "rise", "vs")}
-    for cell, many in zip(cells, random.multinomial(DRAWS, weights / weights.sum()), strict=True):
+    places = [(c, i, k) for c in cells for i, k in np.ndindex(*c.likelihood.shape)]
+    for (fit, i, k), many in zip(places, counts, strict=True):
         if not many:
             continue
-        std = np.sqrt(cell.rss / random.chisquare(cell.freedom, many))
-        factor = np.linalg.cholesky(cell.cov)
-        theta = cell.theta + std[:, None] * (random.standard_normal((many, len(cell.theta))) @ factor.T)
-        if cell.effect >= 0:
+        middle, cov = fit.theta[i, k], fit.cov[i, k]
+        std = np.sqrt(fit.rss[i, k] / random.chisquare(fit.freedom, many))
+        theta = middle + std[:, None] * (
+            random.standard_normal((many, len(middle))) @ np.linalg.cholesky(cov).T
+        )
+        rise, speed = np.zeros(many), np.full(many, np.inf)
+        if fit.stribeck:
             # The effect is positive: draw it from its truncated distribution, and move the others along with it.
-            middle, spread = cell.theta[-1], std * np.sqrt(cell.cov[-1, -1])
-            above = ndtr(middle / spread)
-            uniform = np.maximum(random.random(many) * above, 1e-300)
-            effect = np.maximum(middle - spread * ndtri(uniform), 0.0)
-            theta += np.outer(effect - theta[:, -1], cell.cov[-1] / cell.cov[-1, -1])
-        scaled = theta / terms.scale[cell.columns]
+            spread = std * np.sqrt(cov[-1, -1])
+            uniform = np.maximum(random.random(many) * ndtr(middle[-1] / spread), 1e-300)
+            effect = np.maximum(middle[-1] - spread * ndtri(uniform), 0.0)
+            theta += np.outer(effect - theta[:, -1], cov[-1] / cov[-1, -1])
+            rise, speed = effect / terms.scale[fit.columns[k, -1]], np.full(many, terms.grid[k])
         for index, name in enumerate(terms.names):
-            drawn[name].append(scaled[:, index])
-        drawn["rise"].append(scaled[:, -1] if cell.effect >= 0 else np.zeros(many))
-        drawn["vs"].append(np.full(many, terms.grid[cell.effect] if cell.effect >= 0 else np.inf))
+            drawn[name].append(theta[:, index] / terms.scale[index])
+        drawn["rise"].append(rise)
+        drawn["vs"].append(speed)
     return {name: np.concatenate(parts) for name, parts in drawn.items()}
 
 
-# One fit from the blocks to the answer: its steps share the terms and the grid.
-def _fit(
-    blocks: _Blocks, units: tuple[str, str], tolerance: float, notes: list[dict[str, str]]
-) -> AxisFriction:
-    slowest, median, fastest = blocks.limits
+class _Posterior(NamedTuple):
+    """The grid after its refinement.
+
+    Args:
+        terms: of the last grid.
+        products: likewise.
+        cells: with the Stribeck effect, without it where one speed shows none.
+        shows: a Stribeck effect shows.
+        level: approximate Coulomb friction.
+    """
+
+    terms: _Terms
+    products: _Whitened
+    cells: list[_Cells]
+    shows: bool
+    level: float
+
+    @property
+    def best(self) -> tuple[_Cells, int, int]:
+        """The most likely cell: the fit of its columns, its covariance and its Stribeck speed."""
+        best = max(self.cells, key=lambda c: float(c.likelihood.max()))
+        i, k = np.unravel_index(int(np.argmax(best.likelihood)), best.likelihood.shape)
+        return best, int(i), int(k)
+
+
+def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
+    """Fit the grid, and refine its Stribeck speeds about the likely ones."""
+    slowest, _, fastest = blocks.limits
     grid = np.geomspace(max(slowest, 0.01 * fastest), 0.5 * fastest, STRIBECK_SPEEDS)
-    terms = _terms(blocks, grid)
-    columns = terms.base + list(range(len(terms.names), len(terms.names) + 3))
-    first = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-10)[0] / terms.scale[columns]
-    by_name = dict(zip(terms.names, first, strict=False))
-    at_median = by_name.get("Fc", 0.0) + median * by_name.get("B", 0.0)
-    if at_median < 0.0:
+    noise, shows = _noise_grid(blocks), False
+    for attempt in range(REFINEMENTS + 1):
+        terms = _terms(blocks, grid)
+        products = _whiten(blocks, noise, terms.design, force)
+        plain, effects = _all_cells(terms, products, level)
+        if not effects:
+            break
+        if attempt == 0:
+            shows = _evidence(effects) - _evidence(plain) > STRIBECK_EVIDENCE
+        if attempt < REFINEMENTS:
+            covariances, speeds = _likely(effects)
+            noise = _Noise(*(values[covariances] for values in noise))
+            low, high = grid[max(speeds[0] - 1, 0)], grid[min(speeds[-1] + 1, len(grid) - 1)]
+            grid = np.geomspace(float(low), float(high), STRIBECK_SPEEDS)
+    return _Posterior(terms, products, effects or plain, shows, level)
+
+
+def _identify(
+    blocks: SlidingBlocks, units: tuple[str, str], tolerance: float, notes: list[dict[str, str]]
+) -> AxisFriction:
+    level, opposed = _first_fit(blocks)
+    if opposed:
         text = "the force acts against the motion that it drives, so its sign is turned"
         notes.append({"code": "force-sign-turned", "text": text})
-    force = -blocks.force if at_median < 0.0 else blocks.force
-    level = abs(by_name["Fc"]) if "Fc" in by_name else float(np.ptp(force))
-    noises = _noises(blocks)
-    evidence = 0.0
-    for attempt in range(REFINEMENTS + 1):
-        whitened = {noise: _whiten(blocks, noise, terms.design, force) for noise in noises}
-        plain, effects = _cells(terms, whitened, level)
-        if attempt == 0 and effects:
-            evidence = _evidence(effects) - _evidence(plain)
-        if not effects or attempt == REFINEMENTS:
-            break
-        least = max(cell.likelihood for cell in effects) - UNLIKELY
-        noises = list({c.noise: 0 for c in effects if c.likelihood > least and c.noise})
-        terms = _terms(blocks, grid := _refine(grid, effects))
-    shows = evidence > STRIBECK_EVIDENCE
-    draws = _draw(terms, effects or plain)
-    curvature = _curvature(terms, whitened, effects or plain, blocks.limits[2])
-    judged = _Judge(blocks.limits, units, tolerance, "" if curvature is None else curvature)
-    parameters = judged.parameters(draws, terms, shows)
-    if curvature is not None:
+    force = -blocks.force if opposed else blocks.force
+    posterior = _refine(blocks, force, level)
+    terms, draws = posterior.terms, _draw(posterior.terms, posterior.cells)
+    curvature = _curvature(posterior, blocks.limits[2])
+    if curvature:
         notes.append({"code": "model-rejected", "text": curvature})
-    best = max(effects or plain, key=lambda cell: cell.likelihood)
-    fitted = terms.design[:, best.columns] @ best.theta
-    friction = [k for k, c in enumerate(best.columns) if c in (*terms.base[1:], *terms.effects)]
-    shown = force - fitted + terms.design[:, np.array(best.columns)[friction]] @ best.theta[friction]
-    residual = np.average((force - fitted) ** 2, weights=blocks.count)
+    parameters = _Judge(blocks.limits, units, tolerance, curvature).parameters(draws, terms, posterior.shows)
+    best, i, k = posterior.best
+    parts = terms.design[:, best.columns[k]] * best.theta[i, k]
+    residual = force - parts.sum(axis=1)
+    friction = np.isin(best.columns[k], [*terms.base[1:], *terms.effects])
+    mean_square = np.average(residual**2, weights=blocks.count)
     variance = np.average((force - np.average(force, weights=blocks.count)) ** 2, weights=blocks.count)
     return AxisFriction(
-        parameters, blocks.limits, len(set(np.sign(blocks.speed))), units, float(np.sqrt(residual)),
-        float(1.0 - residual / max(variance, 1e-300)), int(blocks.count.sum()), notes,
-        np.column_stack([blocks.speed, shown]), _curve(draws, blocks),
+        parameters, blocks.limits, len(set(np.sign(blocks.speed))), units, float(np.sqrt(mean_square)),
+        float(1.0 - mean_square / max(variance, 1e-300)), int(blocks.count.sum()), notes,
+        np.column_stack([blocks.speed, residual + parts[:, friction].sum(axis=1)]), _curve(draws, blocks),
     )  # fmt: skip
 
 
-def _curvature(
-    terms: _Terms, whitened: dict[_Noise, _Whitened], cells: list[_Cell], fastest: float
-) -> str | None:
-    """A sentence where the friction is certainly no straight line over the speed; else None."""
+def _first_fit(blocks: SlidingBlocks) -> tuple[float, bool]:
+    """Approximate Coulomb friction, and whether the force acts against the motion."""
+    terms = _terms(blocks, np.empty(0))
+    columns = list(range(len(terms.names) + 3))
+    theta = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-10)[0] / terms.scale[columns]
+    by_name = dict(zip(terms.names, theta, strict=False))
+    opposed = by_name.get("Fc", 0.0) + blocks.limits[1] * by_name.get("B", 0.0) < 0.0
+    return float(abs(by_name["Fc"]) if "Fc" in by_name else np.ptp(blocks.force)), opposed
+
+
+def _curvature(posterior: _Posterior, fastest: float) -> str:
+    """A sentence where the friction is certainly no straight line over the speed; else an empty text."""
+    terms, products = posterior.terms, posterior.products
     if "B" not in terms.names or "Fc" not in terms.names:
-        return None
-    best = max(cells, key=lambda cell: cell.likelihood)
-    assert best.noise is not None
-    products = whitened[best.noise]
-    first = [c for c in best.columns if c not in terms.effects]
-    curved = len(terms.scale) - 1
-    straight = _cell(products, first, len(terms.base))
-    # The Stribeck effect stays as it was fitted: what it explains is no curvature.
-    columns = [*best.columns[: len(first)], curved, *best.columns[len(first) :]]
-    prior = 0.0
-    if best.effect >= 0:
-        level = abs(best.theta[1] / terms.scale[1])
-        prior = straight.rss / straight.freedom / (LEVEL_SPREAD * level * terms.scale[best.columns[-1]]) ** 2
-    fitted = _cell(products, columns, len(terms.base), prior)
-    theta = fitted.theta / terms.scale[columns]
-    bent = theta[len(first)] * fastest**2
-    whole = theta[1] + theta[2] * fastest + bent
-    if fitted.likelihood - best.likelihood < CURVED_EVIDENCE or abs(bent) < CURVED_FRACTION * abs(whole):
-        return None
-    slope = theta[2] + 2.0 * theta[len(first)] * fastest
+        return ""
+    best, i, k = posterior.best
+    columns = best.columns[k : k + 1]
+    # The Stribeck effect stays the last column: what it explains is no curvature.
+    place = columns.shape[1] - best.stribeck
+    columns = np.insert(columns, place, len(terms.scale) - 1, axis=1)
+    prior = (LEVEL_SPREAD * posterior.level * terms.scale[columns[:, -1]]) ** 2 if best.stribeck else None
+    bent = _fit(products, columns, len(terms.base), prior)
+    theta = bent.theta[i, 0] / terms.scale[columns[0]]
+    curve = theta[place] * fastest**2
+    friction = theta[1] + theta[2] * fastest + curve
+    gain = bent.likelihood[i, 0] - best.likelihood[i, k]
+    if gain < CURVED_EVIDENCE or abs(curve) < CURVED_FRACTION * abs(friction):
+        return ""
+    slope = theta[2] + 2.0 * theta[place] * fastest
     return (
         f"the friction is no straight line over the speed: its slope is {theta[2]:.3g} at slow speeds and {slope:.3g}"
         f" at {fastest:.3g}; fit a narrower range of speeds with --start and --end"
     )
 
 
-def _curve(draws: dict[str, Array], blocks: _Blocks) -> Array:
+def _curve(draws: dict[str, Array], blocks: SlidingBlocks) -> Array:
     """Speed, friction and both ends of its interval over the speeds of the log, in each direction."""
     slowest, _, fastest = blocks.limits
     speeds = np.geomspace(slowest, fastest, 40)
