@@ -32,7 +32,8 @@ LEVEL_SPREAD = 0.6
 MAX_UNEQUAL = 0.1
 """Fraction of a friction at one speed by which unequal speeds may move the offset."""
 STRIBECK_SPEEDS = 9
-"""Stribeck speeds of the grid, in equal ratios from the slowest speed to half of the fastest."""
+"""Stribeck speeds of the grid, in equal ratios from half of the slowest speed (2 % of the effect are left) to half
+of the fastest."""
 REFINEMENTS = 3
 """Times that this grid is refined about its likely part; each brings its steps down to a fourth."""
 UNLIKELY = 7.0
@@ -323,11 +324,13 @@ def _evidence(cells: list[_Cells]) -> float:
     return float(values.max() + np.log(np.mean(np.exp(values - values.max()))))
 
 
-def _likely(cells: list[_Cells]) -> tuple[Indices, Indices]:
+def _likely(plain: list[_Cells], effects: list[_Cells]) -> tuple[Indices, Indices]:
     """Indices of the covariances and of the Stribeck speeds that are not unlikely."""
-    least = max(c.likelihood.max() for c in cells) - UNLIKELY
-    likely = np.any([c.likelihood > least for c in cells], axis=0)
-    return np.flatnonzero(likely.any(axis=1)), np.flatnonzero(likely.any(axis=0))
+    least = max(c.likelihood.max() for c in plain + effects) - UNLIKELY
+    covariances = np.any([(c.likelihood > least).any(axis=1) for c in plain + effects], axis=0)
+    least = max(c.likelihood.max() for c in effects) - UNLIKELY
+    speeds = np.any([(c.likelihood > least).any(axis=0) for c in effects], axis=0)
+    return np.flatnonzero(covariances), np.flatnonzero(speeds)
 
 
 def _draw(terms: _Terms, cells: list[_Cells]) -> dict[str, Array]:
@@ -369,7 +372,7 @@ class _Posterior(NamedTuple):
     Args:
         terms: of the last grid.
         products: likewise.
-        cells: with the Stribeck effect, without it where one speed shows none.
+        cells: without the Stribeck effect, and with it where there are several speeds.
         shows: a Stribeck effect shows.
         level: approximate Coulomb friction.
     """
@@ -391,7 +394,7 @@ class _Posterior(NamedTuple):
 def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
     """Fit the grid, and refine its Stribeck speeds about the likely ones."""
     slowest, _, fastest = blocks.limits
-    grid = np.geomspace(max(slowest, 0.01 * fastest), 0.5 * fastest, STRIBECK_SPEEDS)
+    grid = np.geomspace(0.5 * slowest, 0.5 * fastest, STRIBECK_SPEEDS)
     noise, shows = _noise_grid(blocks), False
     for attempt in range(REFINEMENTS + 1):
         terms = _terms(blocks, grid)
@@ -402,11 +405,14 @@ def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
         if attempt == 0:
             shows = _evidence(effects) - _evidence(plain) > STRIBECK_EVIDENCE
         if attempt < REFINEMENTS:
-            covariances, speeds = _likely(effects)
+            covariances, speeds = _likely(plain, effects)
             noise = _Noise(*(values[covariances] for values in noise))
             low, high = grid[max(speeds[0] - 1, 0)], grid[min(speeds[-1] + 1, len(grid) - 1)]
             grid = np.geomspace(float(low), float(high), STRIBECK_SPEEDS)
-    return _Posterior(terms, products, effects or plain, shows, level)
+        # Each Stribeck speed has its share of the prior: as much as all of them has the friction without the effect.
+        share = np.log(grid[1] / grid[0]) / np.log(fastest / slowest)
+        effects = [c._replace(likelihood=c.likelihood + np.log(share)) for c in effects]
+    return _Posterior(terms, products, plain + effects, shows, level)
 
 
 def _identify(
@@ -533,6 +539,7 @@ class _Judge(NamedTuple):
             reason = f"no Stribeck effect shows at {slowest} and above; move more slowly, too"
             return {name: self._unknown(name, reason) for name in ("Fs", "vs")}
         step = np.log(terms.grid[1] / terms.grid[0])
+        draws = {name: values[np.isfinite(draws["vs"])] for name, values in draws.items()}
         within = np.random.default_rng(2).uniform(-0.5, 0.5, len(draws["vs"]))
         return {
             "Fs": self._judge("Fs", draws["Fc"] + draws["rise"], positive=True),

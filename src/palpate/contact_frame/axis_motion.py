@@ -103,11 +103,12 @@ class _Samples(NamedTuple):
 
 
 class _Motion(NamedTuple):
-    """Position, speed and acceleration of each sample; noise of the speed; half-width of the window [rows]."""
+    """Position, speed, acceleration and force of each sample; noise of the speed; half-width of the window [rows]."""
 
     position: Array
     speed: Array
     acceleration: Array
+    force: Array
     noise: float
     half_window: int
 
@@ -149,7 +150,7 @@ def _per_second(unit: str) -> str:
 
 
 def _differentiate(axis: _Samples) -> _Motion:
-    """Speed and acceleration by a local parabola whose window has the least error.
+    """Speed by a local parabola whose window has the least error, and force by the same smoothing.
 
     The error is judged by the change of the speed from a window to that of twice the width: a short one shows noise, a
     long one the curvature of the motion.
@@ -159,31 +160,40 @@ def _differentiate(axis: _Samples) -> _Motion:
     assert signal is not None
     longest = max(len(signal) // 12, 1)
     widths = [width for width in HALF_WINDOWS if 2 * width <= longest] or [1]
-    speeds = [_local(signal, 2 * width, order, axis.dt) for width in widths]
-    before = [_local(signal, widths[0], order, axis.dt), *speeds[:-1]]
-    errors = [
-        float(np.sqrt(np.mean((a - b)[axis.present] ** 2))) for a, b in zip(before, speeds, strict=True)
-    ]
-    best = int(np.argmin(errors))
-    half_window = widths[best]
-    speed = _local(signal, half_window, order, axis.dt)
-    acceleration = _local(signal, 2 * half_window, order + 1, axis.dt)
+    kernels = {width: _kernel(width, order) for width in {*widths, *(2 * width for width in widths)}}
+    speeds = {width: _smooth(signal, kernel) / axis.dt**order for width, kernel in kernels.items()}
+    errors = [np.sqrt(np.mean((speeds[w] - speeds[2 * w])[axis.present] ** 2)) for w in widths]
+    half_window = widths[int(np.argmin(errors))]
+    speed = speeds[half_window]
+    force = _smooth(axis.force, _smoothing_of_speed(kernels[half_window], order))
     position = axis.position if axis.position is not None else axis.dt * np.cumsum(speed)
-    return _Motion(position, speed, acceleration, errors[best], half_window)
+    return _Motion(position, speed, np.gradient(speed, axis.dt), force, float(min(errors)), half_window)
 
 
-def _local(signal: Array, half_width: int, order: int, dt: float) -> Array:
-    """A derivative of the parabola through the samples of a window, at its middle (Savitzky and Golay, 1964)."""
+def _kernel(half_width: int, order: int) -> Array:
+    """Weights of a derivative of the parabola through samples, at their middle (Savitzky and Golay, 1964)."""
     places = np.arange(-half_width, half_width + 1.0)
-    weights = np.linalg.pinv(np.vander(places, 3, increasing=True))[order]
-    scale = (1.0, 1.0, 2.0)[order] / dt**order
-    ends = np.arange(half_width, 0, -1)
-    ends = ends[ends < len(signal)]
-    # Beyond the ends the signal goes on as its mirror image through the last point.
-    begin, end = 2 * signal[0] - signal[ends], 2 * signal[-1] - signal[-1 - ends[::-1]]
-    padded = np.concatenate([begin, signal, end])
-    middle = np.convolve(padded, scale * weights[::-1], "same")
-    return np.asarray(middle[len(begin) : len(begin) + len(signal)])
+    return np.asarray(np.linalg.pinv(np.vander(places, 3, increasing=True))[order])
+
+
+def _smoothing_of_speed(kernel: Array, order: int) -> Array:
+    """Weights by which a kernel averages the speed: those of the position are for its differences, summed up.
+
+    A force that is averaged likewise stays linear in speed and acceleration, whatever the window.
+    """
+    if order == 0:
+        return kernel
+    between = np.cumsum(kernel[::-1])[::-1][1:]
+    return np.asarray((np.append(0.0, between) + np.append(between, 0.0)) / 2.0)
+
+
+def _smooth(signal: Array, kernel: Array) -> Array:
+    """Weighted sums about each sample; beyond its ends the signal is mirrored through its last point."""
+    width = min(len(kernel) // 2, len(signal) - 1)
+    begin, end = 2 * signal[0] - signal[width:0:-1], 2 * signal[-1] - signal[-2 : -2 - width : -1]
+    return np.asarray(
+        np.convolve(np.concatenate([begin, signal, end]), kernel[::-1], "same")[width : width + len(signal)]
+    )
 
 
 def _average(axis: _Samples, motion: _Motion) -> SlidingBlocks | None:
@@ -219,7 +229,7 @@ def _average(axis: _Samples, motion: _Motion) -> SlidingBlocks | None:
     position = (motion.position - (low + high) / 2) / max((high - low) / 2, 1e-300)
     transients = np.column_stack([mean(np.sign(speed) * decay) for decay in decays])
     return SlidingBlocks(
-        axis.dt * (begins + ends) / 2, count, mean(axis.force), mean(position), mean(speed),
+        axis.dt * (begins + ends) / 2, count, mean(motion.force), mean(position), mean(speed),
         mean(motion.acceleration), transients, (speed[index], block), limits,
     )  # fmt: skip
 
