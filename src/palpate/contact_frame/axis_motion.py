@@ -17,6 +17,8 @@ MAX_BLOCKS = 320
 """Approximate blocks of rows that are fitted by their means: many in a stroke, and few enough for 0.2 s a log."""
 HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """Half-widths [rows] of the windows in which the speed is a local parabola's; that with the least error is taken."""
+MAX_NOISE_FRACTION = 0.01
+"""Standard deviation of the speed, as a fraction of the fastest, that is good enough."""
 NOISE_FACTOR = 3.0
 """Standard deviations of the speed below which its sign is not sure."""
 MIN_SPEED_FRACTION = 0.005
@@ -163,11 +165,15 @@ def _differentiate(axis: _Samples) -> _Motion:
     kernels = {width: _kernel(width, order) for width in {*widths, *(2 * width for width in widths)}}
     speeds = {width: _smooth(signal, kernel) / axis.dt**order for width, kernel in kernels.items()}
     errors = [np.sqrt(np.mean((speeds[w] - speeds[2 * w])[axis.present] ** 2)) for w in widths]
-    half_window = widths[int(np.argmin(errors))]
+    fastest = np.quantile(abs(speeds[widths[int(np.argmin(errors))]]), 0.98)
+    # Noise averages out over a block, and a blurred speed does not: the shortest window that is good enough.
+    enough = [k for k, error in enumerate(errors) if error < MAX_NOISE_FRACTION * fastest]
+    chosen = enough[0] if enough else int(np.argmin(errors))
+    half_window, noise = widths[chosen], float(errors[chosen])
     speed = speeds[half_window]
     force = _smooth(axis.force, _smoothing_of_speed(kernels[half_window], order))
     position = axis.position if axis.position is not None else axis.dt * np.cumsum(speed)
-    return _Motion(position, speed, np.gradient(speed, axis.dt), force, float(min(errors)), half_window)
+    return _Motion(position, speed, np.gradient(speed, axis.dt), force, noise, half_window)
 
 
 def _kernel(half_width: int, order: int) -> Array:
