@@ -212,13 +212,11 @@ class _Whitened(NamedTuple):
     Args:
         gram: of columns and force, the force last, shape (c, p + 1, p + 1).
         log_det: logarithm of each covariance's determinant, shape (c,).
-        plain: products of the columns without a covariance, over the blocks, shape (p, p).
         blocks: how many there are.
     """
 
     gram: Array
     log_det: Array
-    plain: Array
     blocks: int
 
 
@@ -241,7 +239,7 @@ def _whiten(blocks: SlidingBlocks, noise: _Noise, design: Array, force: Array) -
         innovations[k] = residual / np.sqrt(total)[:, None]
         log_det += np.log(total)
     gram = np.einsum("ncp,ncq->cpq", innovations, innovations, optimize=True)
-    return _Whitened(gram, log_det, design.T @ design / len(force), len(force))
+    return _Whitened(gram, log_det, len(force))
 
 
 class _Cells(NamedTuple):
@@ -266,55 +264,52 @@ class _Cells(NamedTuple):
     stribeck: bool
 
 
-def _fit(products: _Whitened, columns: Indices, common: int, prior: Array | None = None) -> _Cells:
-    """Fit columns by least squares; nuisances have a prior of unit information.
+def _fit(products: _Whitened, columns: Indices, variances: Array, *, stribeck: bool = False) -> _Cells:
+    """Fit columns by least squares, some with a normal prior about zero.
 
     Args:
         products: of columns and force.
-        columns: fitted, shape (k, m).
-        common: how many of them every cell has.
-        prior: variance of the last coefficient, which is positive, shape (k,); None for no such prior.
+        columns: fitted, those without a prior first, shape (k, m).
+        variances: of the priors of the last coefficients, shape (k, r).
+        stribeck: the last coefficient is that of a Stribeck effect, which is positive.
     """
     from scipy.special import log_ndtr
 
-    size = columns.shape[1]
-    flat = size - (prior is not None)
     normal = products.gram[:, columns[:, :, None], columns[:, None, :]]
     right = products.gram[:, columns, -1]
     whole = products.gram[:, -1:, -1]
-    diagonal = np.arange(size)
+    diagonal = np.arange(columns.shape[1])
     normal[..., diagonal, diagonal] *= 1.0 + 1e-9
-    precision = np.zeros(normal.shape[:2])
-    if prior is not None:
-        bare = normal[..., :flat, :flat]
-        misfit = whole - np.einsum(
-            "ckm,ckm->ck", np.linalg.solve(bare, right[..., :flat, None])[..., 0], right[..., :flat]
-        )
-        precision = np.maximum(misfit, 1e-300) / (products.blocks - flat) / prior
-        normal[..., -1, -1] += precision
+    bare = whole - np.einsum("ckm,ckm->ck", np.linalg.solve(normal, right[..., None])[..., 0], right)
+    bare_freedom = products.blocks - columns.shape[1]
+    precisions = (np.maximum(bare, 1e-300) / bare_freedom)[..., None] / variances
+    with_prior = diagonal[len(diagonal) - variances.shape[1] :]
+    normal[..., with_prior, with_prior] += precisions
     cov = np.asarray(np.linalg.inv(normal))
     theta = (cov @ right[..., None])[..., 0]
     rss = np.maximum(whole - np.einsum("ckm,ckm->ck", theta, right), 1e-300)
-    freedom = products.blocks - flat
-    plain = products.plain[columns[:, :flat, None], columns[:, None, :flat]] + 1e-9 * np.eye(flat)
-    determinants = np.linalg.slogdet(normal)[1] - np.linalg.slogdet(plain)[1]
-    likelihood = -0.5 * (products.log_det[:, None] + determinants + (products.blocks - common) * np.log(rss))
-    if prior is not None:
+    freedom = products.blocks - len(diagonal) + len(with_prior)
+    determinants = np.linalg.slogdet(normal)[1] - np.log(precisions).sum(axis=-1)
+    likelihood = -0.5 * (products.log_det[:, None] + determinants + freedom * np.log(rss))
+    if stribeck:
         std = np.sqrt(cov[..., -1, -1] * rss / freedom)
-        likelihood += 0.5 * np.log(precision) + np.log(2.0) + log_ndtr(theta[..., -1] / std)
-    return _Cells(columns, likelihood, theta, cov, rss, freedom, prior is not None)
+        likelihood += np.log(2.0) + log_ndtr(theta[..., -1] / std)
+    return _Cells(columns, likelihood, theta, cov, rss, freedom, stribeck)
 
 
 def _all_cells(terms: _Terms, products: _Whitened, level: float) -> tuple[list[_Cells], list[_Cells]]:
     """Cells without and with a Stribeck effect, of each choice of nuisances."""
     plain, effects = [], []
-    prior = (LEVEL_SPREAD * level * terms.scale[terms.effects]) ** 2
+    rises = (LEVEL_SPREAD * level * terms.scale[terms.effects]) ** 2
     for nuisances in terms.nuisances:
         columns = np.array([terms.base + nuisances])
-        plain.append(_fit(products, columns, len(terms.base)))
+        spread = np.full((1, len(nuisances)), level**2)
+        plain.append(_fit(products, columns, spread))
         if terms.effects:
-            with_effect = np.column_stack([np.repeat(columns, len(terms.grid), axis=0), terms.effects])
-            effects.append(_fit(products, with_effect, len(terms.base), prior))
+            count = len(terms.effects)
+            columns = np.column_stack([np.repeat(columns, count, axis=0), np.array(terms.effects)])
+            spread = np.column_stack([np.repeat(spread, count, axis=0), rises])
+            effects.append(_fit(products, columns, spread, stribeck=True))
     return plain, effects
 
 
@@ -462,8 +457,11 @@ def _curvature(posterior: _Posterior, fastest: float) -> str:
     # The Stribeck effect stays the last column: what it explains is no curvature.
     place = columns.shape[1] - best.stribeck
     columns = np.insert(columns, place, len(terms.scale) - 1, axis=1)
-    prior = (LEVEL_SPREAD * posterior.level * terms.scale[columns[:, -1]]) ** 2 if best.stribeck else None
-    bent = _fit(products, columns, len(terms.base), prior)
+    # The curvature is a nuisance of its own, with as wide a prior as the others.
+    variances = np.full((1, columns.shape[1] - len(terms.base)), posterior.level**2)
+    if best.stribeck:
+        variances[0, -1] = (LEVEL_SPREAD * posterior.level * terms.scale[columns[0, -1]]) ** 2
+    bent = _fit(products, columns, variances, stribeck=best.stribeck)
     theta = bent.theta[i, 0] / terms.scale[columns[0]]
     curve = theta[place] * fastest**2
     friction = theta[1] + theta[2] * fastest + curve
@@ -569,8 +567,11 @@ class _Judge(NamedTuple):
 
     def _judge(self, name: str, draws: Array, *, positive: bool = False) -> Parameter:
         unit = _unit(name, self.units)
-        low, value, high = (float(q) for q in np.quantile(draws, (0.025, 0.5, 0.975)))
-        half = (high - low) / 2
+        quantiles = np.quantile(draws, (0.025, 0.5, 0.975))
+        value = float(quantiles[1])
+        # A Stribeck effect that may be there or not makes one side short: the longer one holds for both.
+        half = float(np.diff(quantiles).max())
+        low, high = value - half, value + half
         parameter = Parameter(
             value, half / NORMAL, (low, high), unit, Verdict.NOT_IDENTIFIABLE, "", {"noise": half}
         )

@@ -35,9 +35,7 @@ def number(parameter: Parameter) -> str:
     low, high = parameter.ci95
     if parameter.value is None:
         return quantity_between(low, high, parameter.unit)
-    # An interval that is not symmetric is shown by its farther end.
-    half = max(high - parameter.value, parameter.value - low)
-    return quantity(parameter.value, parameter.unit, half)
+    return quantity(parameter.value, parameter.unit, (high - low) / 2)
 
 
 def build_answer(friction: AxisFriction, log: str = "") -> Answer:
