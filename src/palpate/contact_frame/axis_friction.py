@@ -46,9 +46,9 @@ CURVED_FRACTION = 0.1
 """... where the curvature is as large a fraction of the friction at the fastest speed."""
 NUISANCES = 5
 """Columns of nuisances."""
-NOISE_TIMES = 6
+NOISE_TIMES = 10
 """Correlation times of the noise's grid, in equal ratios from a block to ten times the log."""
-NOISE_POWERS = (0.05, 0.4, 3.0, 30.0, 300.0)
+NOISE_POWERS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
 """Variance of the change of the correlated noise over a block, over that of the white noise of a block's mean."""
 DRAWS = 6000
 """Draws from the joint distribution of parameters, which give the intervals; an end errs by 2 % of the width."""
@@ -279,7 +279,8 @@ def _fit(products: _Whitened, columns: Indices, variances: Array, *, stribeck: b
     right = products.gram[:, columns, -1]
     whole = products.gram[:, -1:, -1]
     diagonal = np.arange(columns.shape[1])
-    normal[..., diagonal, diagonal] *= 1.0 + 1e-9
+    # A column that is zero, or a sum of others, has no number and spoils none.
+    normal[..., diagonal, diagonal] += 1e-9 * products.gram[:, None, None, 0, 0]
     bare = whole - np.einsum("ckm,ckm->ck", np.linalg.solve(normal, right[..., None])[..., 0], right)
     bare_freedom = products.blocks - columns.shape[1]
     precisions = (np.maximum(bare, 1e-300) / bare_freedom)[..., None] / variances
@@ -441,7 +442,7 @@ def _first_fit(blocks: SlidingBlocks) -> tuple[float, bool]:
     """Approximate Coulomb friction, and whether the force acts against the motion."""
     terms = _terms(blocks, np.empty(0))
     columns = list(range(len(terms.names) + 3))
-    theta = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-10)[0] / terms.scale[columns]
+    theta = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-3)[0] / terms.scale[columns]
     by_name = dict(zip(terms.names, theta, strict=False))
     opposed = by_name.get("Fc", 0.0) + blocks.limits[1] * by_name.get("B", 0.0) < 0.0
     return float(abs(by_name["Fc"]) if "Fc" in by_name else np.ptp(blocks.force)), opposed
