@@ -270,15 +270,15 @@ def _trimmed(runs: list[tuple[int, int]], axis: _Samples, motion: _Motion) -> li
     presliding = REVERSAL_FRACTION * _stroke_length(runs, motion.position)
     typical = float(np.quantile([e - b for b, e in runs], 0.75))
     margin = motion.half_window + int(min(REVERSAL_TIME / axis.dt, 0.1 * typical))
-    kept = []
+    inner = []
     for begin, end in runs:
-        at_begin, at_end = begin > 0, end < len(axis.force)  # the log's own ends are no reversals
         moved = abs(motion.position[begin:end] - motion.position[begin])
-        first = begin + max(margin, int(np.searchsorted(moved, presliding))) * at_begin
-        last = end - margin * at_end
+        # The begin of the log is no reversal.
+        slid = int(np.searchsorted(moved, presliding)) if begin > 0 else 0
+        first, last = begin + max(margin, slid), end - margin
         if last - first >= 2:
-            kept.append((first, last))
-    return kept
+            inner.append((first, last))
+    return inner
 
 
 def _without_ramps(blocks: SlidingBlocks) -> SlidingBlocks:
