@@ -135,7 +135,7 @@ def export(
         return export_law(gains, law, output)
 
 
-def _tuned(found: Path | None, parameters: GivenOptions, law: LawOptions) -> "Gains":
+def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -> "Gains":
     """Gains of a force loop for an identified surface or for given numbers.
 
     Raises:
@@ -148,8 +148,8 @@ def _tuned(found: Path | None, parameters: GivenOptions, law: LawOptions) -> "Ga
             "a law in C is of gains for an arm and a force; add --arm and --force, as --force 15:N"
         )
     if parameters.stiffness is None:
-        assert found is not None
-        known = known_from(read_found(found), str(found))
+        assert identified is not None
+        known = known_from(read_found(identified), str(identified))
     else:
         known = Known.of_range((parameters.stiffness.si,) * 2)
     return tune(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def press(
-    found: Path | None = None,
+    identified: Path | None = None,
     /,
     *,
     task: AskOptions | None = None,
@@ -64,7 +64,7 @@ def press(
 
     Parameters
     ----------
-    found
+    identified
         The output of palpate identify --json, in place of --surface.
     json
         Print one JSON object and nothing else; for a real arm it needs --yes or --dry-run.
@@ -73,9 +73,9 @@ def press(
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
     cell.check()
     real = wire.wire is not None or wire.recover is not None
-    if found is not None and (real or (phantom is not None and phantom.map is not None)):
+    if identified is not None and (real or (phantom is not None and phantom.map is not None)):
         raise InputError(
-            f"{found} is the surface of a simulated press; leave it out with --wire and with --map"
+            f"{identified} is the surface of a simulated press; leave it out with --wire and with --map"
         )
     if real:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
@@ -91,18 +91,18 @@ def press(
             code = press_map(task, simulated, phantom, json=json)
         else:
             only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
-            code = _simulate(found, task, simulated, json)
+            code = _simulate(identified, task, simulated, json)
     cell.save((task, simulated, wire, limits), "press")
     return code
 
 
-def _simulate(found: Path | None, task: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+def _simulate(identified: Path | None, task: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.summary import DONE, INTERRUPTED
     from palpate.press.prepare import prepare_press
     from palpate.report.press import build_answer
 
     spec, folder = (
-        simulated.spec(task, None if found is None else simulated.surface_of(found)),
+        simulated.spec(task, None if identified is None else simulated.read_surface(identified)),
         simulated.folder,
     )
     with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:

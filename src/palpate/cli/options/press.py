@@ -94,7 +94,7 @@ class SimulatedOptions:
     replace: Annotated[bool, FLAG] = False
     "Replace the results at --out."
 
-    def surface_of(self, found: Path) -> KelvinVoigt:
+    def read_surface(self, identified: Path) -> KelvinVoigt:
         """The surface of an identification; without the arm's compliance where the log includes it.
 
         Raises:
@@ -107,10 +107,10 @@ class SimulatedOptions:
 
         if self.surface is not None:
             raise InputError("give a file or --surface, not both")
-        answer, remedy = read_found(found), "give the surface with --surface, as K=5000,B=50"
+        answer, remedy = read_found(identified), "give the surface with --surface, as K=5000,B=50"
         contact = contact_from(
             answer,
-            str(found),
+            str(identified),
             Given(
                 working_point="logs" not in answer and str(answer.get("model")) not in LINEAR,
                 arm=load_arm(str(self.arm)) if self.arm in names() else None,
