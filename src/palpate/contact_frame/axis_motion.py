@@ -17,6 +17,8 @@ MAX_BLOCKS = 320
 """Approximate blocks of rows that are fitted by their means: many in a stroke, and few enough for 0.2 s a log."""
 HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """Half-widths [rows] of the windows in which the speed is a local parabola's; that with the least error is taken."""
+TRIED_ROWS = 50_000
+"""Rows on which the windows are tried: 50 s at 1 kHz."""
 MAX_NOISE_FRACTION = 0.01
 """Standard deviation of the speed, as a fraction of the fastest, that is good enough."""
 NOISE_FACTOR = 3.0
@@ -160,20 +162,29 @@ def _differentiate(axis: _Samples) -> _Motion:
     order = 0 if axis.velocity is not None else 1
     signal = axis.velocity if axis.velocity is not None else axis.position
     assert signal is not None
-    longest = max(len(signal) // 12, 1)
-    widths = [width for width in HALF_WINDOWS if 2 * width <= longest] or [1]
+    rows = _busiest(signal)
+    widths = [width for width in HALF_WINDOWS if 24 * width <= len(signal)] or [1]
     kernels = {width: _kernel(width, order) for width in {*widths, *(2 * width for width in widths)}}
-    speeds = {width: _smooth(signal, kernel) / axis.dt**order for width, kernel in kernels.items()}
-    errors = [np.sqrt(np.mean((speeds[w] - speeds[2 * w])[axis.present] ** 2)) for w in widths]
-    fastest = np.quantile(abs(speeds[widths[int(np.argmin(errors))]]), 0.98)
+    speeds = {width: _smooth(signal[rows], kernel) / axis.dt**order for width, kernel in kernels.items()}
+    errors = [np.sqrt(np.mean((speeds[w] - speeds[2 * w])[axis.present[rows]] ** 2)) for w in widths]
+    best = int(np.argmin(errors))
+    fastest = np.quantile(abs(speeds[widths[best]]), 0.98)
     # Noise averages out over a block, and a blurred speed does not: the shortest window that is good enough.
     enough = [k for k, error in enumerate(errors) if error < MAX_NOISE_FRACTION * fastest]
-    chosen = enough[0] if enough else int(np.argmin(errors))
+    chosen = enough[0] if enough else best
     half_window, noise = widths[chosen], float(errors[chosen])
-    speed = speeds[half_window]
-    force = _smooth(axis.force, _smoothing_of_speed(kernels[half_window], order))
+    kernel = kernels[half_window]
+    speed = _smooth(signal, kernel) / axis.dt**order
+    force = _smooth(axis.force, _smoothing_of_speed(kernel, order))
     position = axis.position if axis.position is not None else axis.dt * np.cumsum(speed)
     return _Motion(position, speed, np.gradient(speed, axis.dt), force, noise, half_window)
+
+
+def _busiest(signal: Array) -> slice:
+    """The stretch of a long signal that varies most: windows are tried on it."""
+    begins = range(0, max(len(signal) - TRIED_ROWS // 2, 1), TRIED_ROWS // 2)
+    begin = max(begins, key=lambda begin: float(np.std(signal[begin : begin + TRIED_ROWS])))
+    return slice(begin, begin + TRIED_ROWS)
 
 
 def _kernel(half_width: int, order: int) -> Array:
