@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 
+# More than seven arguments: one for each group of options.
 def press(
     identified: Path | None = None,
     /,

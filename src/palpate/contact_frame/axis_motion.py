@@ -265,7 +265,7 @@ def _stroke_length(strokes: list[tuple[int, int]], position: Array) -> float:
 
 
 def _decays(strokes: list[tuple[int, int]], motion: _Motion) -> list[Array]:
-    """What remains of a change at the last reversal, for each length over which it fades; one of each row."""
+    """Remainder of a change at the last reversal, of each row, for each length over which it fades."""
     since = np.full(len(motion.speed), np.inf)
     for begin, end in strokes:
         if begin > 0:
