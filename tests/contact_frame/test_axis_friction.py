@@ -113,7 +113,7 @@ def test_one_direction_has_no_coulomb_friction():
 def test_no_motion_has_no_friction(position):
     friction = identify_friction(record(position=position))
     assert not friction.identified
-    assert "no motion" in friction.parameters["Fc"].reason
+    assert "too little motion" in friction.parameters["Fc"].reason
 
 
 def test_a_curved_friction_is_rejected():

@@ -26,6 +26,7 @@ from palpate.contact_frame.axis_motion import SlidingBlocks, several_speeds, sli
 from palpate.identification.uncertainty import Parameter, Verdict
 from palpate.records import Record, Result
 from palpate.signals.types import NORMAL
+from palpate.units import impedance_units
 
 LEVEL_SPREAD = 0.6
 """Prior standard deviation of (Fs - Fc) / Fc, which is positive: published ratios Fs / Fc are 1 to 2."""
@@ -129,7 +130,7 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
     blocks, units = sliding_blocks(record)
     notes = [dict(note) for note in record.meta.get("notes", ())]
     if blocks is None:
-        reason = "the log shows no motion above the noise of its speed; move the axis back and forth"
+        reason = "the log shows too little motion above the noise of its speed; move the axis back and forth, and longer"
         unknown = {name: Parameter.unknown(_unit(name, units), reason) for name in NAMES}
         return AxisFriction(unknown, (0.0, 0.0, 0.0), 0, units, 0.0, 0.0, 0, notes)
     return _identify(blocks, units, tolerance, notes)
@@ -188,6 +189,13 @@ def _terms(blocks: SlidingBlocks, grid: Array) -> _Terms:
     design = np.column_stack([*columns, *nuisances, *effects, blocks.mean(np.sign(rows) * rows**2)])
     scale = np.maximum(np.sqrt(np.mean(design**2, axis=0)), 1e-300)
     return _Terms(names, design / scale, scale, grid)
+
+
+class _Spread(NamedTuple):
+    """Prior standard deviations: of the root mean square of a nuisance, and of Fs - Fc."""
+
+    nuisance: float
+    rise: float
 
 
 class _Noise(NamedTuple):
@@ -298,19 +306,19 @@ def _fit(products: _Whitened, columns: Indices, variances: Array, *, stribeck: b
     return _Cells(columns, likelihood, theta, cov, rss, freedom, stribeck)
 
 
-def _all_cells(terms: _Terms, products: _Whitened, level: float) -> tuple[list[_Cells], list[_Cells]]:
+def _all_cells(terms: _Terms, products: _Whitened, spread: _Spread) -> tuple[list[_Cells], list[_Cells]]:
     """Cells without and with a Stribeck effect, of each choice of nuisances."""
     plain, effects = [], []
-    rises = (LEVEL_SPREAD * level * terms.scale[terms.effects]) ** 2
+    rises = (spread.rise * terms.scale[terms.effects]) ** 2
     for nuisances in terms.nuisances:
         columns = np.array([terms.base + nuisances])
-        spread = np.full((1, len(nuisances)), level**2)
-        plain.append(_fit(products, columns, spread))
+        variances = np.full((1, len(nuisances)), spread.nuisance**2)
+        plain.append(_fit(products, columns, variances))
         if terms.effects:
             count = len(terms.effects)
             columns = np.column_stack([np.repeat(columns, count, axis=0), np.array(terms.effects)])
-            spread = np.column_stack([np.repeat(spread, count, axis=0), rises])
-            effects.append(_fit(products, columns, spread, stribeck=True))
+            variances = np.column_stack([np.repeat(variances, count, axis=0), rises])
+            effects.append(_fit(products, columns, variances, stribeck=True))
     return plain, effects
 
 
@@ -370,14 +378,14 @@ class _Posterior(NamedTuple):
         products: likewise.
         cells: without the Stribeck effect, and with it where there are several speeds.
         shows: a Stribeck effect shows.
-        level: approximate Coulomb friction.
+        spread: of the priors.
     """
 
     terms: _Terms
     products: _Whitened
     cells: list[_Cells]
     shows: bool
-    level: float
+    spread: _Spread
 
     @property
     def best(self) -> tuple[_Cells, int, int]:
@@ -387,7 +395,7 @@ class _Posterior(NamedTuple):
         return best, int(i), int(k)
 
 
-def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
+def _refine(blocks: SlidingBlocks, force: Array, spread: _Spread) -> _Posterior:
     """Fit the grid, and refine its Stribeck speeds about the likely ones."""
     slowest, _, fastest = blocks.limits
     grid = np.geomspace(0.5 * slowest, 0.5 * fastest, STRIBECK_SPEEDS)
@@ -395,7 +403,7 @@ def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
     for attempt in range(REFINEMENTS + 1):
         terms = _terms(blocks, grid)
         products = _whiten(blocks, noise, terms.design, force)
-        plain, effects = _all_cells(terms, products, level)
+        plain, effects = _all_cells(terms, products, spread)
         if not effects:
             break
         if attempt == 0:
@@ -408,18 +416,18 @@ def _refine(blocks: SlidingBlocks, force: Array, level: float) -> _Posterior:
         # Each Stribeck speed has its share of the prior: as much as all of them has the friction without the effect.
         share = np.log(grid[1] / grid[0]) / np.log(fastest / slowest)
         effects = [c._replace(likelihood=c.likelihood + np.log(share)) for c in effects]
-    return _Posterior(terms, products, plain + effects, shows, level)
+    return _Posterior(terms, products, plain + effects, shows, spread)
 
 
 def _identify(
     blocks: SlidingBlocks, units: tuple[str, str], tolerance: float, notes: list[dict[str, str]]
 ) -> AxisFriction:
-    level, opposed = _first_fit(blocks)
+    spread, opposed = _first_fit(blocks)
     if opposed:
         text = "the force acts against the motion that it drives, so its sign is turned"
         notes.append({"code": "force-sign-turned", "text": text})
     force = -blocks.force if opposed else blocks.force
-    posterior = _refine(blocks, force, level)
+    posterior = _refine(blocks, force, spread)
     terms, draws = posterior.terms, _draw(posterior.terms, posterior.cells)
     curvature = _curvature(posterior, blocks.limits[2])
     if curvature:
@@ -438,14 +446,16 @@ def _identify(
     )  # fmt: skip
 
 
-def _first_fit(blocks: SlidingBlocks) -> tuple[float, bool]:
-    """Approximate Coulomb friction, and whether the force acts against the motion."""
+def _first_fit(blocks: SlidingBlocks) -> tuple[_Spread, bool]:
+    """Spread of the priors by approximate parameters, and whether the force acts against the motion."""
     terms = _terms(blocks, np.empty(0))
     columns = list(range(len(terms.names) + 3))
     theta = np.linalg.lstsq(terms.design[:, columns], blocks.force, rcond=1e-3)[0] / terms.scale[columns]
     by_name = dict(zip(terms.names, theta, strict=False))
     opposed = by_name.get("Fc", 0.0) + blocks.limits[1] * by_name.get("B", 0.0) < 0.0
-    return float(abs(by_name["Fc"]) if "Fc" in by_name else np.ptp(blocks.force)), opposed
+    changes = max(float(np.std(blocks.force)), 1e-9 * float(abs(blocks.force).max()), 1e-300)
+    level = max(abs(float(by_name.get("Fc", changes))), 0.01 * changes)
+    return _Spread(changes, LEVEL_SPREAD * level), opposed
 
 
 def _curvature(posterior: _Posterior, fastest: float) -> str:
@@ -459,9 +469,9 @@ def _curvature(posterior: _Posterior, fastest: float) -> str:
     place = columns.shape[1] - best.stribeck
     columns = np.insert(columns, place, len(terms.scale) - 1, axis=1)
     # The curvature is a nuisance of its own, with as wide a prior as the others.
-    variances = np.full((1, columns.shape[1] - len(terms.base)), posterior.level**2)
+    variances = np.full((1, columns.shape[1] - len(terms.base)), posterior.spread.nuisance**2)
     if best.stribeck:
-        variances[0, -1] = (LEVEL_SPREAD * posterior.level * terms.scale[columns[0, -1]]) ** 2
+        variances[0, -1] = (posterior.spread.rise * terms.scale[columns[0, -1]]) ** 2
     bent = _fit(products, columns, variances, stribeck=best.stribeck)
     theta = bent.theta[i, 0] / terms.scale[columns[0]]
     curve = theta[place] * fastest**2
@@ -528,7 +538,7 @@ class _Judge(NamedTuple):
         if self.rejected:
             parameters |= {
                 name: parameters[name].without_number(self.rejected, Verdict.REJECTED)
-                for name in ("Fc", "B", "Fs", "vs")
+                for name in ("Fc", "B", "Fs", "vs", "F")
             }
         return parameters
 
@@ -597,10 +607,6 @@ _ONE_DIRECTION = (
 def _unit(name: str, units: tuple[str, str]) -> str:
     """Unit of a parameter, from those of force and speed."""
     force, speed = units
-    if name == "vs":
-        return speed
-    if name != "B":
-        return force
-    length = speed.removesuffix("/s")
-    known = {("N", "m"): "N s/m", ("N m", "rad"): "N m s/rad"}
-    return known.get((force, length), f"{force}/({speed})")
+    if name == "B":
+        return impedance_units(force, speed.removesuffix("/s"))["B"]
+    return speed if name == "vs" else force

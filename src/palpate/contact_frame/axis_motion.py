@@ -15,6 +15,8 @@ MIN_ROWS = 50
 """Fewest rows of a log: ten for each term of the force, about."""
 MAX_BLOCKS = 320
 """Approximate blocks of rows that are fitted by their means: many in a stroke, and few enough for 0.2 s a log."""
+MIN_BLOCKS = 20
+"""Fewest blocks: twice the terms of the force."""
 HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 """Half-widths [rows] of the windows in which the speed is a local parabola's; that with the least error is taken."""
 TRIED_ROWS = 50_000
@@ -71,7 +73,7 @@ def several_speeds(speed: Array) -> bool:
 
 
 def sliding_blocks(record: Record) -> tuple[SlidingBlocks | None, tuple[str, str]]:
-    """Means over blocks of rows that slide, None without a motion; and the units of force and speed.
+    """Means over blocks of rows that slide, None where too few do; and the units of force and speed.
 
     Args:
         record: columns time, force (or torque), and position or velocity or both, in SI units.
@@ -83,6 +85,8 @@ def sliding_blocks(record: Record) -> tuple[SlidingBlocks | None, tuple[str, str
     blocks = _average(axis, _differentiate(axis))
     if blocks is not None and not several_speeds(blocks.speed):
         blocks = _without_ramps(blocks)
+    if blocks is not None and len(blocks.count) < MIN_BLOCKS:
+        blocks = None
     return blocks, (axis.force_unit, axis.speed_unit)
 
 
