@@ -130,7 +130,7 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
     blocks, units = sliding_blocks(record)
     notes = [dict(note) for note in record.meta.get("notes", ())]
     if blocks is None:
-        reason = "the log shows too little motion above the noise of its speed; move the axis back and forth, and longer"
+        reason = "the log shows too little motion above the noise of its speed; move the axis back and forth"
         unknown = {name: Parameter.unknown(_unit(name, units), reason) for name in NAMES}
         return AxisFriction(unknown, (0.0, 0.0, 0.0), 0, units, 0.0, 0.0, 0, notes)
     return _identify(blocks, units, tolerance, notes)
@@ -191,7 +191,7 @@ def _terms(blocks: SlidingBlocks, grid: Array) -> _Terms:
     return _Terms(names, design / scale, scale, grid)
 
 
-class _Spread(NamedTuple):
+class _PriorSpread(NamedTuple):
     """Prior standard deviations: of the root mean square of a nuisance, and of Fs - Fc."""
 
     nuisance: float
@@ -306,7 +306,7 @@ def _fit(products: _Whitened, columns: Indices, variances: Array, *, stribeck: b
     return _Cells(columns, likelihood, theta, cov, rss, freedom, stribeck)
 
 
-def _all_cells(terms: _Terms, products: _Whitened, spread: _Spread) -> tuple[list[_Cells], list[_Cells]]:
+def _all_cells(terms: _Terms, products: _Whitened, spread: _PriorSpread) -> tuple[list[_Cells], list[_Cells]]:
     """Cells without and with a Stribeck effect, of each choice of nuisances."""
     plain, effects = [], []
     rises = (spread.rise * terms.scale[terms.effects]) ** 2
@@ -385,7 +385,7 @@ class _Posterior(NamedTuple):
     products: _Whitened
     cells: list[_Cells]
     shows: bool
-    spread: _Spread
+    spread: _PriorSpread
 
     @property
     def best(self) -> tuple[_Cells, int, int]:
@@ -395,7 +395,7 @@ class _Posterior(NamedTuple):
         return best, int(i), int(k)
 
 
-def _refine(blocks: SlidingBlocks, force: Array, spread: _Spread) -> _Posterior:
+def _refine(blocks: SlidingBlocks, force: Array, spread: _PriorSpread) -> _Posterior:
     """Fit the grid, and refine its Stribeck speeds about the likely ones."""
     slowest, _, fastest = blocks.limits
     grid = np.geomspace(0.5 * slowest, 0.5 * fastest, STRIBECK_SPEEDS)
@@ -446,7 +446,7 @@ def _identify(
     )  # fmt: skip
 
 
-def _first_fit(blocks: SlidingBlocks) -> tuple[_Spread, bool]:
+def _first_fit(blocks: SlidingBlocks) -> tuple[_PriorSpread, bool]:
     """Spread of the priors by approximate parameters, and whether the force acts against the motion."""
     terms = _terms(blocks, np.empty(0))
     columns = list(range(len(terms.names) + 3))
@@ -455,7 +455,7 @@ def _first_fit(blocks: SlidingBlocks) -> tuple[_Spread, bool]:
     opposed = by_name.get("Fc", 0.0) + blocks.limits[1] * by_name.get("B", 0.0) < 0.0
     changes = max(float(np.std(blocks.force)), 1e-9 * float(abs(blocks.force).max()), 1e-300)
     level = max(abs(float(by_name.get("Fc", changes))), 0.01 * changes)
-    return _Spread(changes, LEVEL_SPREAD * level), opposed
+    return _PriorSpread(changes, LEVEL_SPREAD * level), opposed
 
 
 def _curvature(posterior: _Posterior, fastest: float) -> str:
@@ -490,14 +490,10 @@ def _curve(draws: dict[str, Array], blocks: SlidingBlocks) -> Array:
     """Speed, friction and both ends of its interval over the speeds of the log, in each direction."""
     slowest, _, fastest = blocks.limits
     speeds = np.geomspace(slowest, fastest, 40)
-    rows = []
-    for speed in speeds:
-        friction = _at(draws, float(speed))
-        rows.append([speed, *np.quantile(friction, (0.5, 0.025, 0.975))])
-    curve = np.array(rows)
-    mirrored = -curve[::-1][:, [0, 1, 3, 2]]
-    sides = [mirrored] * bool((blocks.speed < 0).any()) + [curve] * bool((blocks.speed > 0).any())
-    return np.concatenate(sides)
+    middle, low, high = np.quantile([_at(draws, speed) for speed in speeds], (0.5, 0.025, 0.975), axis=1)
+    forth = np.column_stack([speeds, middle, low, high])
+    back = -np.column_stack([speeds, middle, high, low])[::-1]
+    return np.concatenate([back] * bool((blocks.speed < 0).any()) + [forth] * bool((blocks.speed > 0).any()))
 
 
 def _at(draws: dict[str, Array], speed: float) -> Array:
