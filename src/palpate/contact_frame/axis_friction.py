@@ -53,6 +53,8 @@ NOISE_POWERS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
 """Variance of the change of the correlated noise over a block, over that of the white noise of a block's mean."""
 DRAWS = 6000
 """Draws from the joint distribution of parameters, which give the intervals; an end errs by 2 % of the width."""
+NUMERICAL_MARGIN = 1.05
+"""Factor of a half-width for the error of the draws and for the steps of the noise's grid, about 2 % each."""
 
 
 NAMES = {
@@ -577,7 +579,7 @@ class _Judge(NamedTuple):
         quantiles = np.quantile(draws, (0.025, 0.5, 0.975))
         value = float(quantiles[1])
         # A Stribeck effect that may be there or not makes one side short: the longer one holds for both.
-        half = float(np.diff(quantiles).max())
+        half = NUMERICAL_MARGIN * float(np.diff(quantiles).max())
         low, high = value - half, value + half
         parameter = Parameter(
             value, half / NORMAL, (low, high), unit, Verdict.NOT_IDENTIFIABLE, "", {"noise": half}
