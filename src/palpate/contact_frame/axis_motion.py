@@ -23,8 +23,8 @@ TRIED_ROWS = 50_000
 """Rows on which the windows are tried: 50 s at 1 kHz."""
 MAX_NOISE_FRACTION = 0.01
 """Standard deviation of the speed, as a fraction of the fastest, that is good enough."""
-NOISE_FACTOR = 3.0
-"""Standard deviations of the speed below which its sign is not sure."""
+NOISE_FACTOR = 5.0
+"""Standard deviations of the speed below which rows are not fitted: noise would select the fast ones among them."""
 MIN_SPEED_FRACTION = 0.005
 """Fraction of the fastest speed below which an axis counts as at rest."""
 REVERSAL_FRACTION = 0.005
