@@ -136,7 +136,7 @@ def test_a_damping_that_is_given_is_said_to_be_given(capsys, elsewhere):
         ),
         (("--to", "gazebo"), "gazebo"),
         ((*TO_MUJOCO, "--damping", "-1"), "--damping must be 0 or more"),
-        ((*TO_MUJOCO, "--damping", "nan"), "--damping: it must be a number"),
+        ((*TO_MUJOCO, "--damping", "nan"), "--damping needs a number"),
         (("--to", "mjcf-spring", "--mass", "0"), "--mass must be above 0"),
         ((*TO_MUJOCO, "--out", "scene.xml"), "is the scene itself"),
         ((*TO_MUJOCO, "--out", "nowhere/a.xml"), "there is no folder"),
