@@ -432,6 +432,8 @@ def _one(log: Path, log_options: OneLog, output: IdentifyOutput) -> int:
     from palpate.report.identification.words import unit_warnings
 
     evidence_options = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+    if not result.identified and log_options.source.position is not None:
+        evidence_options += "; if it is an axis that moves freely: --friction"
     answer = build_answer(result, origin, evidence_options, verbose=output.verbose, budget=output.budget)
     print_result(answer, json=output.json, files=files.log_files(result, origin))
     return 0 if result.identified and not unit_warnings(result) else 1
