@@ -192,9 +192,11 @@ def test_the_command_answers_as_text_and_as_json(capsys, joint_csv):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--friction", "--velocity", "qd", "--time", "t"), "with --force-column as well"),
-        (("--friction", "--force-column", "tau", "--time", "t"), "with --position or --velocity as well"),
-        (("--friction", "--force-column", "tau", "--velocity", "qd"), "with --time or --rate as well"),
+        (("--friction", "--velocity", "qd", "--time", "t"), "with --force-column (palpate topics"),
+        (("--friction", "--force-column", "tau", "--time", "t"), "with --position or --velocity (palpate"),
+        (("--friction", "--force-column", "tau", "--velocity", "qd"), "with --time or --rate (palpate"),
+        (("--friction",), "with --force-column and --position or --velocity and --time or --rate"),
+        (("--friction", "--wrench", "a,b,c"), "--friction is of one axis"),
         ((*NAMED, "--indenter", "sphere:5:mm"), "--indenter is for a press; leave out --friction"),
         ((*NAMED, "--budget"), "--budget is for a press"),
         (("--velocity", "qd"), "--velocity is for the friction of an axis; add --friction"),

@@ -42,20 +42,25 @@ class LogOptions(Signals):
         Raises:
             InputError: the log or an option is wrong, or a signal has no name.
         """
-        from palpate.logs import read_log
+        from palpate.logs.read import columns_of, read_log
 
+        bag = formats.kind_of(log).is_bag
+        present = [] if bag else columns_of(log, self.delimiter)
         roles = {"time": self.time, "position": self.position, "velocity": velocity, "force": self.force}
-        columns = {role: name for role, name in roles.items() if name is not None}
-        if self.wrench or self.pose:
+        if self.rate is not None and self.time is None:
+            del roles["time"]
+        columns: dict[str, Any] = {
+            role: name or role for role, name in roles.items() if name is not None or role in present
+        }
+        lacking = [] if "force" in columns else ["--force-column"]
+        lacking += [] if {"position", "velocity"} & {*columns} else ["--position or --velocity"]
+        lacking += [] if "time" in columns or self.rate or bag else ["--time or --rate"]
+        if lacking or self.wrench or self.pose:
+            lacking = lacking or ["--force-column"]
             raise InputError(
-                "--friction is of one axis; give --force-column with --position or --velocity, not --wrench and --pose"
+                f"--friction is of one axis: name its columns in {log} with {' and '.join(lacking)}"
+                f" (palpate topics {log} lists them)"
             )
-        if columns:
-            lacking = [] if self.force else ["--force-column"]
-            lacking += [] if self.position or velocity else ["--position or --velocity"]
-            lacking += [] if self.time or self.rate or formats.kind_of(log).is_bag else ["--time or --rate"]
-            if lacking:
-                raise InputError(f"name the columns of {log} with {' and '.join(lacking)} as well")
         reading = {name: getattr(self, name) for name in ("rate", "start", "end", "missing", "delimiter")}
         return read_log(log, limits=self.limits, **reading, **columns)
 
