@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any
 from palpate import lazy
 
 if TYPE_CHECKING:
-    from palpate.calls import identify, identify_log, pool, read_log
+    from palpate.calls import identify, identify_friction, identify_log, pool, read_log
     from palpate.errors import InputError, PalpateError
     from palpate.identification import Identification
     from palpate.records import Record
@@ -66,6 +66,7 @@ __all__ = [
     "PalpateError",
     "Record",
     "identify",
+    "identify_friction",
     "identify_log",
     "pool",
     "read_log",
@@ -76,7 +77,7 @@ lazy.report = lambda: import_module("palpate.report.values")
 
 
 _HOMES = {
-    "calls": ("identify", "identify_log", "pool", "read_log"),
+    "calls": ("identify", "identify_friction", "identify_log", "pool", "read_log"),
     "errors": ("InputError", "PalpateError"),
     "identification": ("Identification",),
     "records": ("Record",),

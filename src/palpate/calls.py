@@ -1,13 +1,16 @@
 """The calls of `import palpate`: read and identify a record, a file or a table, and pool many, in one line each."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from inspect import signature
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.errors import InputError, unknown
+from palpate.from_log import accept_stated_units
 from palpate.from_log import identify_log as identify_log_file
 from palpate.identification import Identification, Pooled
 from palpate.identification import identify as identify_record
@@ -17,6 +20,9 @@ from palpate.logs import read_log as read
 from palpate.records import Record
 from palpate.signals.low_pass import LowPass
 from palpate.text import in_python
+
+if TYPE_CHECKING:
+    from palpate.contact_frame.axis_friction import AxisFriction
 
 _READ = {name for name, own in signature(read).parameters.items() if own.kind is own.KEYWORD_ONLY}
 _OPTIONS = {*OPTION_NAMES}
@@ -90,13 +96,38 @@ def identify(
         if isinstance(source, str | Path) and not {*options} - _OPTIONS:
             return identify_log_file(source, **_split(options, columns=True)[1])
         reading, fitting = _split(options, columns=not isinstance(source, Record))
-        return _fit(source if isinstance(source, Record) else read(source, **reading), fitting)
+        if isinstance(source, Record):
+            return _fit(source, fitting)
+        record = read(source, **reading)
+        specs = {role: reading.get(role) for role in ("position", "force")}
+        return accept_stated_units(_fit(record, fitting), record, specs)
 
 
 def identify_log(path: str | Path, **options: Any) -> Identification:
     """Do what `palpate identify` does with a file, in one call; options of `palpate.from_log.identify_log`."""
     with _in_python():
         return identify_log_file(path, **options)
+
+
+def identify_friction(source: Record | Any, *, tolerance: float = 0.25, **options: Any) -> AxisFriction:
+    """Identify the friction of a joint or an axis: Coulomb, viscous, offset, and Stribeck where it shows.
+
+    `palpate.identify_friction("sweep.csv", time="t", velocity="qd:rad/s", force="tau:Nm")`
+
+    Args:
+        source: a `Record` with time, force (or torque), and position or velocity or both; or a log.
+        tolerance: largest half-width of an identified parameter's 95 % interval, as a fraction of its value.
+        options: of a log those of `palpate.read_log`, its columns among them.
+
+    Raises:
+        InputError: the log or an option is wrong, in one line.
+    """
+    from palpate.contact_frame.axis_friction import identify_friction as identify_axis
+
+    _check("tolerance", tolerance, pair=False)
+    record = source if isinstance(source, Record) else read_log(source, **options)
+    with _in_python():
+        return identify_axis(record, tolerance)
 
 
 def read_log(path: Any, **options: Any) -> Record:

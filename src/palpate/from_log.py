@@ -10,14 +10,16 @@ from palpate.contact_frame.payload import Payload, load_payload
 from palpate.contact_frame.press_or_slide import identify_contact
 from palpate.contact_frame.signals_in_base import ContactFrame
 from palpate.errors import InputError, unknown
-from palpate.identification import Identification
+from palpate.identification import Code, Identification
 from palpate.identification.indenter import Indenter, with_modulus
 from palpate.identification.options import OPTION_NAMES
 from palpate.logs.formats import log_of
 from palpate.logs.presets import preset
 from palpate.logs.read import is_run, measured_by
+from palpate.logs.roles import quantity
 from palpate.logs.signals import Signals, read_as
 from palpate.records import Record
+from palpate.units import split_spec, unit_in_name
 
 _SIDES = {None: None, "action": 1, "reaction": -1}
 
@@ -69,6 +71,7 @@ class LogIdentifier:
             options["force_sign"] = _SIDES[self.frame.force_sign]
         frame = replace(job.frame, payload=self.payload) if in_space else None
         result, along = identify_contact(record, frame, _between(job, options, samples), **options)
+        result = accept_stated_units(result, record, _specs(job.signals))
         if self.indenter is not None:
             result = with_modulus(result, self.indenter, self.poisson, options.get("tolerance", 0.25))
         return result, along
@@ -85,6 +88,34 @@ class LogIdentifier:
         if arm.position_from is None and "position_from" in remaining:
             arm = replace(arm, position_from=remaining["position_from"])
         return replace(self, signals=signals, frame=frame, arm=arm), remaining.get("read_as", "")
+
+
+def accept_stated_units(
+    result: Identification, record: Record, specs: Mapping[str, str | None]
+) -> Identification:
+    """Remove doubts about units that rest on the size of the numbers alone, where the log or the user states all units.
+
+    Cells and cantilevers have 1e-5 to 1 N/m. A unit that contradicts the file stays in doubt.
+
+    Args:
+        result: of the record.
+        record: its notes say what the file states.
+        specs: name of each column as `NAME` or `NAME:UNIT`, by role.
+    """
+    notes = record.meta.get("notes", ())
+    stated = [note["text"] for note in notes if note["code"] == "unit-stated"]
+    for role, spec in specs.items():
+        name, symbol = split_spec(spec or role)
+        by_file = any(text.startswith((repr(name), f"no unit was given for {name!r}")) for text in stated)
+        if spec is None or not (symbol or unit_in_name(name, quantity(role)) or by_file):
+            return result
+    texts = {note["text"] for note in notes}
+    warnings = [warn for warn in result.warnings if warn.code is not Code.UNIT_DOUBTFUL or warn.text in texts]
+    return replace(result, warnings=tuple(warnings))
+
+
+def _specs(signals: Signals) -> dict[str, str | None]:
+    return {"position": signals.position, "force": signals.force}
 
 
 def _between(job: LogIdentifier, options: dict[str, Any], samples: bool) -> ArmDynamics:

@@ -167,6 +167,21 @@ def test_a_unit_that_is_guessed_from_values_is_no_identification(capfd, elsewher
     assert {w["code"] for w in json.loads(out)["warnings"]} & {"unit-guess", "unit-stated"} == {"unit-stated"}
 
 
+@pytest.mark.parametrize(("unit", "code"), [("", 1), (":uN", 0)])
+def test_a_soft_surface_is_in_doubt_unless_its_units_are_stated(unit, code, capfd, elsewhere):
+    """As soft as a cell: text, JSON and Python have one verdict."""
+    rows = hostile_logs.only_unloading()
+    rows[:, 2] *= 1e-6 if code else 1.0
+    log = hostile_logs.write_log(elsewhere, rows, head="t,a,b")
+    words = ("--time", "t:s", "--position", "a:mm", "--force", f"b{unit}", "--no-figure")
+    assert check(capfd, log, *words) == code
+    answer = json.loads(identify(capfd, log, *words, "--json")[1])
+    verdicts = {p["verdict"] for p in (*answer["parameters"].values(), answer["working_point"]["stiffness"])}
+    assert ("identified" in verdicts) == (code == 0)
+    found = palpate.identify(log, time="t:s", position="a:mm", force=f"b{unit}")
+    assert ("unit-doubtful" in found.codes) == (code == 1)
+
+
 @pytest.mark.parametrize("column", ["position", "force", "both"])
 def test_tiny_numbers_are_refused_and_no_library_writes(column, capfd, elsewhere):
     """Squares of 1e-303 are 0: a fit to them fails within LAPACK, which writes on standard output itself."""

@@ -13,6 +13,9 @@ from palpate.errors import InputError
     [
         ("15", "force", 15.0),
         ("15:N", "force", 15.0),
+        ("15N", "force", 15.0),
+        ("1.5e1 N", "force", 15.0),
+        ("50 N s/m", "damping", 50.0),
         ("2:kN", "force", 2000.0),
         ("1.6:um", "length", 1.6e-6),
         ("100:us", "time", 1e-4),
@@ -31,6 +34,8 @@ def test_a_number_with_or_without_its_unit(text, kind, value):
     [
         ("3000:8000", "stiffness", (3000, 8000)),
         ("3:8:N/mm", "stiffness", (3000, 8000)),
+        ("3:8N/mm", "stiffness", (3000, 8000)),
+        ("1e2:1e6", "stiffness", (1e2, 1e6)),
         ("3:8:kN/m", "stiffness", (3000, 8000)),
         ("5200", "stiffness", (5200, 5200)),
         ("5.2:N/mm", "stiffness", (5200, 5200)),
@@ -64,6 +69,7 @@ def test_shares(text, found):
         (lambda: quantity("--force", "inf:N", "force"), "--force needs a number"),
         (lambda: quantity("--force", "15:mm", "force"), "unknown unit of force in --force 'mm'"),
         (lambda: quantity("--force", "15:", "force"), "unknown unit"),
+        (lambda: quantity("--force", "15Nm", "force"), "unknown unit of force in --force 'Nm'"),
         (lambda: spread("--mass", "50:200:N", "mass"), "unknown unit of mass in --mass 'N'"),
         (lambda: spread("--mass", "1:2:3", "mass"), "LOW:HIGH"),
         (lambda: spread("--mass", "a:b", "mass"), "unknown unit"),

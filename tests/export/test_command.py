@@ -7,6 +7,7 @@ import pytest
 from export import scenes
 from palpate.cli import main
 from palpate.export import Request, contact_from
+from palpate.force import known_from, load_arm
 
 
 @pytest.fixture(autouse=True)
@@ -135,7 +136,7 @@ def test_a_damping_that_is_given_is_said_to_be_given(capsys, elsewhere):
         ),
         (("--to", "gazebo"), "gazebo"),
         ((*TO_MUJOCO, "--damping", "-1"), "--damping must be 0 or more"),
-        ((*TO_MUJOCO, "--damping", "nan"), "--damping: it must be a number"),
+        ((*TO_MUJOCO, "--damping", "nan"), "--damping needs a number"),
         (("--to", "mjcf-spring", "--mass", "0"), "--mass must be above 0"),
         ((*TO_MUJOCO, "--out", "scene.xml"), "is the scene itself"),
         ((*TO_MUJOCO, "--out", "nowhere/a.xml"), "there is no folder"),
@@ -233,3 +234,86 @@ def test_what_is_out_of_reach_is_not_pressed_and_does_not_fail_the_check(capsys,
 def test_a_file_that_is_no_utf8_is_refused(capsys, elsewhere):
     (elsewhere / "scene.sdf").write_bytes(b"<sdf>\xff</sdf>")
     assert "not UTF-8" in refused(capsys, *TO_DRAKE)
+
+
+def behind_the_arm(elsewhere, B=(0.0, 60.0)):
+    """An identification in which the arm gives way too: K is a lower bound, B an interval."""
+    answer = scenes.found(verdicts={"K": "not identifiable", "B": "not identifiable"})
+    answer["parameters"]["K"]["reason"] = "a lower bound of the surface's stiffness; give --robot-stiffness."
+    answer["parameters"]["B"]["ci95"] = list(B)
+    answer["working_point"]["stiffness"] |= {
+        "value": None,
+        "verdict": "not identifiable",
+        "ci95": [4900.0, 5100.0],
+    }
+    answer["warnings"] = [{"code": "series-compliance", "text": "the arm gives way"}]
+    (elsewhere / "found.json").write_text(json.dumps(answer))
+    return answer
+
+
+def test_numbers_without_a_log(capsys, elsewhere):
+    numbers = ("--stiffness", "20kN/m", "--damping", "50")
+    assert main(["export", *numbers, *TO_MUJOCO, "--check", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["check"][0]["passed"]
+    assert {name: p["value"] for name, p in answer["parameters"].items()} == {"K": 20000.0, "B": 50.0}
+    assert {p["origin"] for p in answer["parameters"].values()} == {"given, not identified"}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "or --stiffness and --damping (0 for a pure spring)"),
+        (("--stiffness", "2e4"), "or --stiffness and --damping (0 for a pure spring)"),
+        (("--stiffness", "-1", "--damping", "0"), "--stiffness must be above 0"),
+        (("--stiffness", "2e4:kg", "--damping", "0"), "unknown unit of stiffness in --stiffness 'kg'"),
+    ],
+)
+def test_numbers_that_are_no_contact_are_one_line(capsys, elsewhere, words, said):
+    assert main(["export", *words, *TO_DRAKE]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_the_remedies_are_options_of_this_command(capsys, elsewhere):
+    behind_the_arm(elsewhere)
+    said = refused(capsys, *TO_DRAKE, here=elsewhere)
+    assert "name the arm with --arm, or give one with --stiffness" in said
+    assert "--robot-stiffness" not in said
+    (elsewhere / "found.json").write_text('{"K": 20000, "B": 50}')
+    assert "give one with --stiffness" in refused(capsys, *TO_DRAKE, here=elsewhere)
+
+
+def test_the_arm_of_the_log_is_taken_out_as_tune_does(capsys, elsewhere):
+    answer = behind_the_arm(elsewhere)
+    arm = load_arm("ur5e")
+    assert run(capsys, *TO_DRAKE, "--arm", "ur5e")[0] == 0
+    parameters = json.loads((elsewhere / "scene-foam.sdf.json").read_text())["parameters"]
+    known = known_from(answer, "found.json").beyond(arm)
+    assert parameters["K"]["ci95"] == list(known.stiffness)
+    assert parameters["K"]["value"] == pytest.approx(1 / (1 / 5100.0 - 1 / arm.series))
+    assert parameters["B"]["value"] == known.damping[1]
+    assert "assumed" in parameters["B"]["origin"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("found.json", "--to", "c"), "add --arm and --force"),
+        (("--stiffness", "2e4", "--to", "c", "--arm", "ur5e"), "add --arm and --force"),
+        (("found.json", *TO_DRAKE, "--force", "15N"), "--force is for a law; add --to c"),
+        (("gains.toml", "--to", "c", "--damping", "3"), "--damping is for a scene; leave out --to c"),
+    ],
+)
+def test_a_law_is_of_gains(capsys, elsewhere, words, said):
+    assert main(["export", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_law_of_numbers_is_that_of_their_gains(capsys, elsewhere):
+    tuned = ("--stiffness", "20kN/m", "--arm", "ur5e", "--force", "15N")
+    assert main(["tune", *tuned, "--damping-max", "50", "--out", "gains.toml"]) == 0
+    assert main(["export", "gains.toml", "--to", "c", "--out", "of-gains"]) == 0
+    assert main(["export", *tuned, "--damping", "50", "--to", "c", "--out", "of-numbers"]) == 0
+    texts = [(elsewhere / place / "palpate_force.c").read_text() for place in ("of-gains", "of-numbers")]
+    assert texts[0] == texts[1]

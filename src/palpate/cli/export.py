@@ -1,17 +1,22 @@
 """`palpate export`: an identified surface as the contact of a simulator's scene, or a law as C."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from palpate.cli.options.common import WRITTEN, FileOptions, read_found
-from palpate.cli.options.values import FLAG, SIGNED, options, vector
+from palpate.cli.options import values
+from palpate.cli.options.common import QUIET, WRITTEN, FileOptions, LoopArm, read_found
+from palpate.cli.options.values import FLAG, SIGNED, only, options, vector
 from palpate.cli.toolkit import STYLE, command, console, head, place, print_answer, show_table
 from palpate.errors import InputError
-from palpate.files import MADE, fresh_folder, whole, with_author, write_json
+from palpate.files import MADE, fresh_folder, whole, with_author, write_json, write_text
 
 if TYPE_CHECKING:
+    from palpate.export.contact import Given
     from palpate.export.exporting import Checked, Exported
+    from palpate.force import Gains
 
 
 @options("The scene", 1)
@@ -33,13 +38,31 @@ class SceneOptions:
 class GivenOptions:
     """Numbers in place of identified ones."""
 
-    damping: Annotated[float | None, SIGNED] = None
-    "B in N s/m, if it was not identified, or to override it; 0 for a pure spring."
-    mass: Annotated[float | None, SIGNED] = None
+    stiffness: values.Stiffness | None = None
+    "K, if there is no log, if it was not identified, or to override it: N/m, or with a unit as 20:kN/m."
+    damping: values.Damping | None = None
+    "B in N s/m, likewise; 0 for a pure spring."
+    mass: values.Mass | None = None
     "M in kg of the plate of mjcf-spring, likewise."
+    arm: Annotated[LoopArm | None, QUIET] = None
+    """Arm by which the log was measured, as for palpate tune: its compliance is taken out of K where the log includes
+    it, and a B that is not identified is assumed at the upper end of its interval."""
     working_point: Annotated[bool, FLAG] = False
     """Use the stiffness at the working point instead of the model's K, for a surface that no linear model
     explains."""
+
+    def given(self) -> "Given":
+        """The numbers, as `palpate.export` takes them."""
+        from palpate.export.contact import Given
+        from palpate.force import load_arm
+
+        return Given(
+            stiffness=values.si(self.stiffness),
+            damping=values.si(self.damping),
+            mass=values.si(self.mass),
+            working_point=self.working_point,
+            arm=None if self.arm is None else load_arm(self.arm),
+        )
 
 
 @options("The law, of C", 3)
@@ -54,6 +77,8 @@ class LawOptions:
     "Of recursive-least-squares, 3 or 4."
     forgetting: Annotated[float, SIGNED] = 1.0
     "Of recursive-least-squares: its forgetting factor."
+    force: values.Force | None = None
+    "Of force-loop, with FOUND.json or --stiffness, and --arm: the desired force, for which gains are tuned first."
 
 
 @options(WRITTEN)
@@ -87,6 +112,8 @@ def export(
 
     palpate export gains.toml --to c --out force_loop --check
 
+    palpate export --stiffness 20:kN/m --damping 50 --to drake --geom slab
+
     The scene's own file is not changed: the new file includes it (MuJoCo) or is a copy (Drake).
 
     Parameters
@@ -95,9 +122,39 @@ def export(
         The output of palpate identify --json; for a force loop in C the gains file of palpate tune.
     """
     parameters, output = parameters or GivenOptions(), output or ExportOutput()
-    if scene.to == "c":
-        return export_law(found, law or LawOptions(), output)
-    return export_scene(found, scene, parameters, output)
+    law = law or LawOptions()
+    if scene.to != "c":
+        only(law, "a law; add --to c")
+        return export_scene(found, scene, parameters, output)
+    if parameters.stiffness is None and (found is None or found.suffix.lower() != ".json"):
+        only(replace(parameters, arm=None), "a scene; leave out --to c")
+        return export_law(found, law, output)
+    with TemporaryDirectory() as folder:
+        gains = Path(folder) / "gains.toml"
+        write_text(gains, _tuned(found, parameters, law).to_toml())
+        return export_law(gains, law, output)
+
+
+def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -> "Gains":
+    """Gains of a force loop for an identified surface or for given numbers.
+
+    Raises:
+        InputError: no arm or no force.
+    """
+    from palpate.force import Known, known_from, load_arm, tune
+
+    if parameters.arm is None or law.force is None:
+        raise InputError(
+            "a law in C is of gains for an arm and a force; add --arm and --force, as --force 15:N"
+        )
+    if parameters.stiffness is None:
+        assert identified is not None
+        known = known_from(read_found(identified), str(identified))
+    else:
+        known = Known.of_range((parameters.stiffness.si,) * 2)
+    return tune(
+        load_arm(parameters.arm), law.force.si, known.with_damping_up_to(values.si(parameters.damping))
+    ).gains
 
 
 def export_scene(
@@ -111,22 +168,15 @@ def export_scene(
     Raises:
         InputError: nothing to export, a parameter that is not identified, a scene without such a surface.
     """
-    from palpate.export.contact import contact_from
+    from palpate.export.contact import contact_from, given_contact
     from palpate.export.exporting import Request, prepare
 
-    if found is None:
-        raise InputError("nothing to export; give the output of palpate identify --json")
+    given = parameters.given()
     request = Request(scene.to, scene.model, scene.geom, scene.probe)
     out = output.out or request.default_place()
     beside = out.with_name(f"{out.name}.json")
     _check_places((out, beside), output, scene.model)
-    contact = contact_from(
-        read_found(found),
-        found.name,
-        damping=parameters.damping,
-        mass=parameters.mass,
-        working_point=parameters.working_point,
-    )
+    contact = given_contact(given) if found is None else contact_from(read_found(found), found.name, given)
     exported = prepare(contact, request, out)
     checked = _write(exported, out, output.check)
     answer = _as_json(exported, out, checked)

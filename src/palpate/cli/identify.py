@@ -19,7 +19,7 @@ from palpate.cli._streams import INTERRUPTED
 from palpate.cli._terminal import bar, console, kind_of, say
 from palpate.cli.options.common import WRITTEN, CellOptions, FigureFile, ReportOption
 from palpate.cli.options.log import ArmOptions, FrameOptions, IndenterOptions, LogOptions, ModelOptions
-from palpate.cli.options.values import FLAG, changed_fields, options, plain_value
+from palpate.cli.options.values import FLAG, changed_fields, only, options, plain_value
 from palpate.errors import InputError, PalpateError
 from palpate.files import check_place, write_text
 from palpate.logs import formats
@@ -296,6 +296,17 @@ class CovariateOptions:
         return formats.read_covariates(logs, self.covariate, source.missing, source.delimiter)
 
 
+@options("Friction of an axis", 6)
+class FrictionOptions:
+    """Friction of a joint or an axis in place of a surface."""
+
+    friction: Annotated[bool, FLAG] = False
+    """Identify the friction of a joint or an axis that moves freely: Coulomb, viscous, offset, Stribeck. The log has
+    its force or torque, and its position or speed."""
+    velocity: str | None = None
+    "With --friction: column of the speed, in m/s if no unit is given, as qd:rad/s; made from --position if not given."
+
+
 # More than seven arguments: one for each group of options.
 def identify(
     *logs: Path,
@@ -305,6 +316,7 @@ def identify(
     fitted: ModelOptions | None = None,
     pressed_by: IndenterOptions | None = None,
     beside: CovariateOptions | None = None,
+    axis: FrictionOptions | None = None,
     output: IdentifyOutput | None = None,
     cell: CellOptions | None = None,
 ) -> int:
@@ -327,6 +339,10 @@ def identify(
     palpate identify presses/ --table presses.csv
 
     palpate identify presses/ --covariate temperature_C
+
+    The friction of a joint or an axis, from a log in which it moves freely in both directions and at several speeds:
+
+    palpate identify joint.csv --friction --time t --velocity qd:rad/s --force-column tau:Nm
 
     Options of a cell can be saved and loaded again:
 
@@ -351,7 +367,43 @@ def identify(
     log_options.pressed_by.check()
     cell.check()
     cell.save(log_options.parts)
+    axis = axis or FrictionOptions()
+    if axis.friction:
+        return _friction(logs, log_options, beside or CovariateOptions(), axis, output)
+    only(axis, "the friction of an axis; add --friction")
     return _identify(logs, log_options, beside or CovariateOptions(), output)
+
+
+def _friction(
+    logs: tuple[Path, ...],
+    log_options: OneLog,
+    beside: CovariateOptions,
+    axis: FrictionOptions,
+    output: IdentifyOutput,
+) -> int:
+    """Identify the friction of an axis from one log."""
+    if len(logs) != 1:
+        raise InputError(f"--friction takes one log, got {len(logs)}")
+    fitted, press = log_options.fitted, "a press; leave out --friction"
+    for part in (replace(fitted, tolerance=0.25), log_options.frame, log_options.arm, log_options.pressed_by):
+        only(part, press)
+    only(replace(IdentifyOutput(), table=output.table, budget=output.budget, verbose=output.verbose), press)
+    only(beside, press)
+    log, source = logs[0], log_options.source
+    figure, report = output.png(log.stem), output.page()
+    from palpate.contact_frame.axis_friction import identify_friction
+    from palpate.report import friction as view
+    from palpate.report.style import save
+
+    result = identify_friction(source.read_axis(log, axis.velocity), fitted.tolerance)
+    files = []
+    if figure is not None and len(result.points):
+        files.append(OutputFile("figure:", figure, lambda: save(view.draw(result), figure, dpi=output.dpi)))
+    if report is not None:
+        text = view.page(result, log.name, command())
+        files.append(OutputFile("report:", report, lambda: write_text(report, text)))
+    print_result(view.build_answer(result, log.name), json=output.json, files=files)
+    return 0 if result.identified else 1
 
 
 def _identify(
@@ -380,6 +432,8 @@ def _one(log: Path, log_options: OneLog, output: IdentifyOutput) -> int:
     from palpate.report.identification.words import unit_warnings
 
     evidence_options = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+    if not result.identified and log_options.source.position is not None:
+        evidence_options += "; if it is an axis that moves freely: --friction"
     answer = build_answer(result, origin, evidence_options, verbose=output.verbose, budget=output.budget)
     print_result(answer, json=output.json, files=files.log_files(result, origin))
     return 0 if result.identified and not unit_warnings(result) else 1

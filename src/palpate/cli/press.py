@@ -13,6 +13,7 @@ from palpate.cli._terminal import console
 from palpate.cli.options.common import CellOptions
 from palpate.cli.options.press import AskOptions, LimitOptions, PhantomOptions, SimulatedOptions, WireOptions
 from palpate.cli.options.values import FLAG, only
+from palpate.errors import InputError
 from palpate.files import RECORD, fresh_folder, with_author, write_json
 from palpate.text import printable
 
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from palpate.records import Record
 
 
+# More than seven arguments: one for each group of options.
 def press(
+    identified: Path | None = None,
+    /,
     *,
     task: AskOptions | None = None,
     simulated: SimulatedOptions | None = None,
@@ -37,6 +41,10 @@ def press(
     readings of its encoders and its force sensor:
 
     palpate press --arm fr3 --force 20:N --surface K=5000,B=50 --out runs/press
+
+    On the surface that palpate identify found, with gains of palpate tune and the force that they are for:
+
+    palpate press found.json --arm ur5e --gains gains.toml
 
     It maps a phantom, a surface with lumps, by presses at places that it chooses itself:
 
@@ -57,13 +65,20 @@ def press(
 
     Parameters
     ----------
+    identified
+        The output of palpate identify --json, in place of --surface.
     json
         Print one JSON object and nothing else; for a real arm it needs --yes or --dry-run.
     """
     task, simulated = task or AskOptions(), simulated or SimulatedOptions()
     wire, limits, cell = wire or WireOptions(), limits or LimitOptions(), cell or CellOptions()
     cell.check()
-    if wire.wire is not None or wire.recover is not None:
+    real = wire.wire is not None or wire.recover is not None
+    if identified is not None and (real or (phantom is not None and phantom.map is not None)):
+        raise InputError(
+            f"{identified} is the surface of a simulated press; leave it out with --wire and with --map"
+        )
+    if real:
         only(simulated, "a simulated arm, and --wire names a real one; leave out --wire")
         from palpate.cli._press_over_wire import press_over
 
@@ -77,17 +92,20 @@ def press(
             code = press_map(task, simulated, phantom, json=json)
         else:
             only(phantom or PhantomOptions(), "a map of a phantom, and --map is missing; add --map")
-            code = _simulate(task, simulated, json)
+            code = _simulate(identified, task, simulated, json)
     cell.save((task, simulated, wire, limits), "press")
     return code
 
 
-def _simulate(task: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
+def _simulate(identified: Path | None, task: AskOptions, simulated: SimulatedOptions, json: bool) -> int:
     from palpate.bench.summary import DONE, INTERRUPTED
     from palpate.press.prepare import prepare_press
     from palpate.report.press import build_answer
 
-    spec, folder = simulated.spec(task), simulated.folder
+    spec, folder = (
+        simulated.spec(task, None if identified is None else simulated.read_surface(identified)),
+        simulated.folder,
+    )
     with notice_signals() as interrupted, fresh_folder(folder, replace=simulated.replace) as fresh:
         pressing = prepare_press(spec)
         start = "starting (the first run compiles, which takes some seconds)"

@@ -13,6 +13,7 @@ from palpate.lazy import importer
 
 if TYPE_CHECKING:
     from palpate.contact_frame.arm import ArmDynamics, describe, robot_stiffness, with_arm
+    from palpate.contact_frame.axis_friction import AxisFriction, identify_friction
     from palpate.contact_frame.payload import Payload, load_payload, load_text
     from palpate.contact_frame.press_or_slide import identify_contact
     from palpate.contact_frame.projecting import project
@@ -21,11 +22,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmDynamics",
+    "AxisFriction",
     "ContactFrame",
     "Payload",
     "Weighed",
     "describe",
     "identify_contact",
+    "identify_friction",
     "load_payload",
     "load_text",
     "project",
@@ -36,6 +39,7 @@ __all__ = [
 
 _HOMES = {
     "arm": ("ArmDynamics", "describe", "robot_stiffness", "with_arm"),
+    "axis_friction": ("AxisFriction", "identify_friction"),
     "press_or_slide": ("identify_contact",),
     "payload": ("Payload", "load_payload", "load_text"),
     "projecting": ("project",),

@@ -1,11 +1,13 @@
 """The contact that a simulator is to have: a spring and a damper, from what `palpate identify --json` prints."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
 from palpate.errors import InputError
+from palpate.force.arm import Arm
+from palpate.force.known_surface import known_from
 
 LINEAR = ("kelvin-voigt", "kelvin-voigt-mass")
 """Models whose force is K x + B v (+ M a), as that of a simulator's contact."""
@@ -70,43 +72,112 @@ class Contact:
         return self.damping.value / self.stiffness.value
 
 
+@dataclass(frozen=True)
+class Given:
+    """Numbers in place of identified ones, and what replaces them in a refusal.
+
+    Args:
+        stiffness: K [N/m]; None for the identified one.
+        damping: B [N s/m], likewise.
+        mass: M [kg], likewise.
+        working_point: take the stiffness at the working point in place of the model's K.
+        arm: by which the log was measured: its compliance is taken out of a K that includes it, and a B that is not
+            identified is assumed at the upper end of its interval, as `palpate tune` does.
+        give_stiffness, give_damping, name_arm: remedies, in the options of the command.
+    """
+
+    stiffness: float | None = None
+    damping: float | None = None
+    mass: float | None = None
+    working_point: bool = False
+    arm: Arm | None = None
+    give_stiffness: str = "give one with --stiffness"
+    give_damping: str = "give one with --damping (0 for a pure spring)"
+    name_arm: str = "name the arm with --arm"
+
+
+def given_contact(given: Given) -> Contact:
+    """The contact of numbers alone, without a log.
+
+    Raises:
+        InputError: one is missing, or is none that a contact has.
+    """
+    K = _given_quantity("stiffness", given.stiffness, "N/m")
+    B = _given_quantity("damping", given.damping, "N s/m")
+    if K is None or B is None:
+        raise InputError(
+            "nothing to export; give the output of palpate identify --json, or --stiffness and --damping (0 for a pure"
+            " spring)"
+        )
+    M = _given_quantity("mass", given.mass, "kg")
+    return Contact(K, B, M, None, "kelvin-voigt", "given numbers", (_LAW,))
+
+
 def contact_from(
-    answer: Mapping[str, Any],
-    source: str,
-    *,
-    damping: float | None = None,
-    mass: float | None = None,
-    working_point: bool = False,
+    answer: Mapping[str, Any], source: str, given: Given | None = None, **numbers: Any
 ) -> Contact:
     """The contact of an identification.
 
     Args:
         answer: the object that `palpate identify --json` prints, for one log or pooled.
         source: what to call it.
-        damping: B [N s/m], where none was identified, or instead of that.
-        mass: M [kg], likewise.
-        working_point: take the stiffness at the working point in place of the model's K.
+        given: numbers where none was identified, or instead of these.
+        numbers: fields of `Given`.
 
     Raises:
         InputError: it is no such object; the model is not linear; K or B is not identified.
     """
+    given = replace(given or Given(), **numbers)
     result = answer.get("pooled") if "logs" in answer else answer
     parameters = result.get("parameters") if isinstance(result, Mapping) else None
     if not isinstance(result, Mapping) or not isinstance(parameters, Mapping):
-        raise InputError(f"{source}: not the output of palpate identify --json; give that output")
+        raise InputError(
+            f"{source}: not the output of palpate identify --json; give that output, or {given.give_stiffness}"
+        )
     model = str(result.get("model") or "kelvin-voigt" if "logs" in answer else result.get("model"))
     point = result.get("working_point")
-    K = _stiffness(parameters, point, model, source, working_point)
-    B = _given_quantity("damping", damping, "N s/m") or _identified_quantity(
-        parameters, "B", "N s/m", source, _GIVE_DAMPING
-    )
-    M = _given_quantity("mass", mass, "kg") or _if_identified(parameters.get("M"), "kg")
-    return Contact(
-        K, B, M, _force(point), model, source, _assumptions(parameters, point, model, working_point)
-    )
+    K = _given_quantity("stiffness", given.stiffness, "N/m")
+    B = _given_quantity("damping", given.damping, "N s/m")
+    if given.arm is not None:
+        alone = _behind_arm(answer, source, given, given.arm)
+        K = K or alone[0]
+        B = B or _if_identified(parameters.get("B"), "N s/m") or alone[1]
+    warnings = result.get("warnings")
+    codes = [
+        warn.get("code")
+        for warn in (warnings if isinstance(warnings, list) else [])
+        if isinstance(warn, Mapping)
+    ]
+    if "series-compliance" in codes and given.arm is None and given.name_arm:
+        given = replace(given, give_stiffness=f"{given.name_arm}, or {given.give_stiffness}")
+    K = K or _stiffness(parameters, point, model, source, given)
+    B = B or _identified_quantity(parameters, "B", "N s/m", source, given.give_damping)
+    M = _given_quantity("mass", given.mass, "kg") or _if_identified(parameters.get("M"), "kg")
+    assumptions = _assumptions(parameters, point, model, given.working_point)
+    return Contact(K, B, M, _force(point), model, source, assumptions)
 
 
-_GIVE_DAMPING = "give one with --damping (0 for a pure spring), or excite more (palpate excite)"
+_LAW = "the force is K x + B v of the penetration x, and never pulls"
+
+
+def _behind_arm(
+    answer: Mapping[str, Any], source: str, given: Given, arm: Arm
+) -> tuple[Quantity | None, Quantity | None]:
+    """K of the surface behind an arm that gives way, and B as far as the log bounds it; None where neither applies."""
+    try:
+        measured = known_from(answer, source)
+    except InputError as error:
+        raise InputError(f"{str(error).partition('; ')[0]}; {given.give_stiffness}") from None
+    known = measured.beyond(arm)
+    K = B = None
+    if "stiffness" in known.assumed:
+        low, high = known.stiffness
+        value = high if measured.value is None else min(arm.surface(measured.value), high)
+        K = Quantity(value, "N/m", (low, high), f"identified, without the arm's {arm.series / 1e3:.3g} kN/m")
+    if isfinite(known.damping[1]):
+        origin = "assumed: the upper end of its interval"
+        B = Quantity(known.damping[1], "N s/m", known.damping, origin)
+    return K, B
 
 
 def _given_quantity(name: str, value: float | None, unit: str) -> Quantity | None:
@@ -119,18 +190,18 @@ def _given_quantity(name: str, value: float | None, unit: str) -> Quantity | Non
 
 
 def _stiffness(
-    parameters: Mapping[str, Any], point: object, model: str, source: str, at_point: bool
+    parameters: Mapping[str, Any], point: object, model: str, source: str, given: Given
 ) -> Quantity:
     measured = point.get("stiffness") if isinstance(point, Mapping) else None
     known = _if_identified(measured, "N/m")
-    if at_point:
+    if given.working_point:
         return known or _identified_quantity(
             {"K": measured or {}}, "K", "N/m", source, "export the model's K instead"
         )
     remedy = (
         f"the stiffness at the working point is: {known.value:.6g} N/m; take it with --working-point"
         if known
-        else "excite more (palpate excite)"
+        else given.give_stiffness
     )
     if model not in LINEAR:
         raise InputError(
@@ -151,7 +222,12 @@ def _identified_quantity(
         raise InputError(
             f"{source}: {name} is in {known['unit']}, not {unit}; name the units of the log's columns"
         )
-    verdict, reason = known.get("verdict", "not there"), str(known.get("reason") or "").rstrip(".")
+    # Remedies of palpate identify are no options of this command.
+    verdict, reason = (
+        known.get("verdict", "not there"),
+        str(known.get("reason") or "").partition("; give --")[0],
+    )
+    reason = reason.rstrip(".")
     because = f" ({reason})" if reason else ""
     raise InputError(f"{source}: {name} is {verdict}{because}, and is not exported; {remedy}")
 
@@ -185,7 +261,7 @@ def _force(point: object) -> float | None:
 
 
 def _assumptions(parameters: Mapping[str, Any], point: object, model: str, at_point: bool) -> tuple[str, ...]:
-    lines = ["the force is K x + B v of the penetration x, and never pulls"]
+    lines = [_LAW]
     force = _force(point)
     if force is not None:
         lines.append(f"K was measured at a mean force of {force:.3g} N; far from it the stiffness may differ")

@@ -38,6 +38,7 @@ _FAMILIES = {
     "position": _Family("length", "m", frozenset({"angle", "number"})),
     "force": _Family("force", "N", frozenset({"torque", "number"})),
     "torque": _Family("torque", "N m"),
+    "velocity": _Family("velocity", "m/s", frozenset({"angular velocity", "number"})),
     "quaternion": _ANY_NUMBER,
     "rotvec": _ANGLE,
     "rpy": _ANGLE,

@@ -28,6 +28,7 @@ Facts = list[tuple[str, str]]
 _UNITS = {"M": "kg", "B": "N s/m", "K": "N/m", "offset": "N"}
 """Units of an estimate's parameters by their usual names; others are printed without one."""
 _VIEWS = {
+    "AxisFriction": "friction",
     "Identification": "identification.answer",
     "Pooled": "many.page",
     "Record": "record",

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from palpate.cli.options import values
 from palpate.cli.options.common import QUIET, Model
 from palpate.errors import InputError
+from palpate.logs import formats
 from palpate.logs.signals import Rotation, Signals  # noqa: F401 - cyclopts looks for Rotation here
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from palpate.contact_frame.payload import Payload
     from palpate.contact_frame.signals_in_base import ContactFrame
     from palpate.identification.indenter import Indenter
+    from palpate.records import Record
 
 
 @values.options("Signals of the log", 1)
@@ -29,6 +31,38 @@ class LogOptions(Signals):
     "Leave out the rows before, in seconds from the first row."
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
+
+    def read_axis(self, log: Path, velocity: str | None) -> Record:
+        """The record of an axis: time, force, and position or velocity or both.
+
+        Args:
+            log: path of it.
+            velocity: column of the speed; None where it is made from the position.
+
+        Raises:
+            InputError: the log or an option is wrong, or a signal has no name.
+        """
+        from palpate.logs.read import columns_of, read_log
+
+        bag = formats.kind_of(log).is_bag
+        present = [] if bag else columns_of(log, self.delimiter)
+        roles = {"time": self.time, "position": self.position, "velocity": velocity, "force": self.force}
+        if self.rate is not None and self.time is None:
+            del roles["time"]
+        columns: dict[str, Any] = {
+            role: name or role for role, name in roles.items() if name is not None or role in present
+        }
+        lacking = [] if "force" in columns else ["--force-column"]
+        lacking += [] if {"position", "velocity"} & {*columns} else ["--position or --velocity"]
+        lacking += [] if "time" in columns or self.rate or bag else ["--time or --rate"]
+        if lacking or self.wrench or self.pose:
+            lacking = lacking or ["--force-column"]
+            raise InputError(
+                f"--friction is of one axis: name its columns in {log} with {' and '.join(lacking)}"
+                f" (palpate topics {log} lists them)"
+            )
+        reading = {name: getattr(self, name) for name in ("rate", "start", "end", "missing", "delimiter")}
+        return read_log(log, limits=self.limits, **reading, **columns)
 
 
 @values.options("Wrench and pose, and the sign of the force", 2)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from palpate.cli.options import values
-from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm
+from palpate.cli.options.common import QUIET, Controller, Mode, Physics, SerialArm, read_found
 from palpate.cli.options.values import FLAG, SIGNED, WHOLE, options, si
 from palpate.errors import InputError
 
@@ -52,6 +52,15 @@ class AskOptions:
         return None if self.payload is None else load_payload(self.payload)
 
     @property
+    def force_or_gains(self) -> float:
+        """Desired force, or that of the gains if none is given [N]."""
+        if self.force is None and self.gains is not None:
+            from palpate.force import load_gains
+
+            return load_gains(self.gains).force
+        return self.desired_force
+
+    @property
     def desired_force(self) -> float:
         """Desired force F_d [N]."""
         if self.force is None:
@@ -88,6 +97,34 @@ class SimulatedOptions:
     replace: Annotated[bool, FLAG] = False
     "Replace the results at --out."
 
+    def read_surface(self, identified: Path) -> KelvinVoigt:
+        """The surface of an identification; without the arm's compliance where the log includes it.
+
+        Raises:
+            InputError: --surface is given too, or the stiffness or the damping is unknown.
+        """
+        from palpate.environments.kelvin_voigt import KelvinVoigt
+        from palpate.export.contact import LINEAR, Given, contact_from
+        from palpate.force import load_arm
+        from palpate.force.arm import names
+
+        if self.surface is not None:
+            raise InputError("give a file or --surface, not both")
+        answer, remedy = read_found(identified), "give the surface with --surface, as K=5000,B=50"
+        contact = contact_from(
+            answer,
+            str(identified),
+            Given(
+                working_point="logs" not in answer and str(answer.get("model")) not in LINEAR,
+                arm=load_arm(str(self.arm)) if self.arm in names() else None,
+                give_stiffness=remedy,
+                give_damping=remedy,
+                name_arm="",
+            ),
+        )
+        mass = contact.mass.value if contact.mass is not None else 0.0
+        return KelvinVoigt(contact.stiffness.value, contact.damping.value, mass)
+
     def spec(self, task: AskOptions, surface: KelvinVoigt | None = None) -> PressSpec:
         """The press to simulate, on a surface that is given here or by --surface."""
         from palpate.press.prepare import PressSpec, surface_of
@@ -98,12 +135,13 @@ class SimulatedOptions:
             )
         if surface is None and self.surface is None:
             raise InputError(
-                "the surface is missing; add --surface, as --surface K=5000,B=50 in N/m and N s/m"
+                "the surface is missing; give FOUND.json of palpate identify --json, or --surface K=5000,B=50 in N/m"
+                " and N s/m"
             )
         touched = surface if surface is not None else surface_of(str(self.surface))
         return PressSpec(
             arm=self.arm,
-            force=task.desired_force,
+            force=task.force_or_gains,
             surface=touched,
             site=self.site,
             mode=self.mode,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import partial
@@ -51,8 +52,18 @@ _SMALLEST = 1e-15
 """Smallest value in SI besides 0: no sensor resolves less."""
 
 
+_NUMBER_AND_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d:].*)")
+
+
+def _separate_unit(text: str) -> str:
+    """`15N` as `15:N`: a unit that follows its number directly."""
+    head, colon, last = text.rpartition(":")
+    match = None if _is_number(last) else _NUMBER_AND_UNIT.fullmatch(last.strip())
+    return f"{head}{colon}{match[1]}:{match[2]}" if match else text
+
+
 def quantity(option: str, text: str, kind: str) -> float:
-    """`NUMBER` or `NUMBER:UNIT` in SI.
+    """`NUMBER`, `NUMBER:UNIT` or `NUMBERUNIT` in SI.
 
     Args:
         option: that it was given for, as in `--force`; errors name it.
@@ -62,19 +73,19 @@ def quantity(option: str, text: str, kind: str) -> float:
     Raises:
         InputError: no number, no such unit, or a number that no robot has.
     """
-    number, colon, symbol = text.partition(":")
+    number, colon, symbol = _separate_unit(text).partition(":")
     return _in_range(
         option, _number(option, text, number), _factor(option, symbol, kind) if colon else 1.0, kind
     )
 
 
 def spread(option: str, text: str, kind: str) -> tuple[float, float]:
-    """`LOW:HIGH`, `LOW:HIGH:UNIT`, `VALUE` or `VALUE:UNIT` in SI; a value alone is both ends.
+    """`LOW:HIGH`, `LOW:HIGH:UNIT`, `VALUE` or `VALUE:UNIT` in SI, or without the last colon; a value is both ends.
 
     Raises:
         InputError: no numbers, or no such unit.
     """
-    parts = text.split(":")
+    parts = _separate_unit(text).split(":")
     factor = 1.0
     if len(parts) > 1 and not _is_number(parts[-1]):
         factor = _factor(option, parts.pop(), kind)

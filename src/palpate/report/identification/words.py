@@ -348,10 +348,15 @@ class Source:
 
 
 def as_json(result: Identification, source: Source) -> dict[str, Any]:
-    """The object that `palpate identify --json` prints for one log."""
+    """The object that `palpate identify --json` prints for one log; a unit in doubt identifies nothing."""
     from importlib.metadata import version
 
     values = result.to_json()
+    if doubts := unit_warnings(result):
+        point = values["working_point"]
+        for parameter in [*values["parameters"].values(), *([point["stiffness"]] if point else [])]:
+            if parameter["verdict"] == Verdict.IDENTIFIED:
+                parameter |= {"verdict": str(Verdict.NOT_IDENTIFIABLE), "reason": f"in doubt: {doubts[0]}"}
     return {
         "file": source.file,
         **values,
