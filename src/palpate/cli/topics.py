@@ -80,7 +80,7 @@ def topics(
 
 
 def _tried(log: Path, proposal: Proposal) -> Proposal:
-    """A proposal whose command answers; its fallback, or the reason why there is none, if the command refuses the log."""
+    """A proposal whose command answers; if the log is refused its fallback, or the reason why there is none."""
     if not proposal.options or (log.is_file() and log.stat().st_size > _MAX_TRIED_BYTES):
         return proposal
     try:

@@ -94,7 +94,7 @@ class ColumnStatistics:
         step = np.diff(self.finite)
         if len(step) < 3 or len(self.finite) < _MIN_TIMED * len(self.values):
             return False
-        forward = np.count_nonzero(step > 0)
+        forward = int(np.count_nonzero(step > 0))
         if self.named.kind == "time":
             return bool((step >= 0).all()) and forward * _MAX_REPEATED_STAMPS >= len(step)
         return bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.arrays import Array
+from palpate.arrays import Array, Counts
 from palpate.errors import InputError
 from palpate.logs.columns import ColumnStatistics, read_columns
 from palpate.logs.proposal import clock_of, time_factor
@@ -29,7 +29,7 @@ class _Timed:
     columns: list[ColumnStatistics]
     clock: ColumnStatistics
     time: Array
-    rows: Array
+    rows: Counts
 
 
 def join_sheets(first: Sheet, second: Sheet) -> Sheet:

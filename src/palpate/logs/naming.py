@@ -7,8 +7,8 @@ from functools import lru_cache
 from palpate.units import known_unit, unit
 
 OTHER_UNITS = {
-    "v", "mv", "uv", "kv", "a", "ma", "ua", "w", "°c", "c", "degc", "k", "%", "hex", "hz", "khz", "mhz", "pa", "kpa", "mpa",
-    "gpa", "bar", "mbar", "psi", "rpm", "db", "t", "mt", "ohm", "counts", "count", "raw", "bits", "j", "mj", "ev", "px",
+    "v", "mv", "uv", "kv", "a", "ma", "ua", "w", "°c", "c", "degc", "k", "%", "hex", "hz", "khz", "mhz", "pa", "kpa",
+    "mpa", "gpa", "bar", "mbar", "psi", "rpm", "db", "t", "mt", "ohm", "counts", "count", "raw", "bits", "j", "mj",
 }  # fmt: skip
 """Units of quantities that no contact is identified from, in lower case."""
 _BRACKETS = re.compile(r"[\[(<]\s*([^\[\]()<>]{1,12}?)\s*[\])>]\s*$|[,/]\s*([^\s,/:]{1,6})\s*$")
@@ -70,12 +70,14 @@ class ColumnName:
         axis: `x`, `y`, `z` or `w`; empty without one.
         stem: the tokens without axis and unit, in lower case.
         command: the value is desired, not measured.
+        worded: a word of the name says the kind, not a unit.
     """
 
     kind: str | None
     axis: str
     stem: tuple[str, ...]
     command: bool
+    worded: bool = True
 
 
 _QUANTITIES = {
@@ -96,6 +98,7 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     tokens = [token for token in _TOKEN.findall(plain) if token not in {"header", "field", "actual"}]
     lower = [token.lower() for token in tokens]
     kind = _kind(lower)
+    worded = kind is not None
     quantity = _quantity(stated or symbol)
     ending = re.search(r"_([A-Za-z\u00b5\u03bc]{1,4})$", plain)
     if (
@@ -111,7 +114,7 @@ def read_name(name: str, stated: str = "") -> ColumnName:
         kind = "other"
     if kind is None and not all(_OPAQUE.fullmatch(token) for token in lower):
         kind = "other"
-    return ColumnName(kind, axis, stem, any(_COMMAND.match(token) for token in lower))
+    return ColumnName(kind, axis, stem, any(_COMMAND.match(token) for token in lower), worded)
 
 
 def _part_unit(name: str) -> tuple[str, str]:

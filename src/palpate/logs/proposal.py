@@ -75,7 +75,7 @@ class Proposal:
         if words is None:
             return None
         path = str(log) if not str(log).startswith("-") else f"./{log}"
-        return " ".join(["palpate identify", *map(shlex.quote, (path, *words))])
+        return " ".join([f"palpate {self.verb}", *map(shlex.quote, (path, *words))])
 
 
 def from_columns(
@@ -209,7 +209,7 @@ def side_by_side(columns: Sequence[ColumnStatistics]) -> dict[str, list[ColumnSt
     for column in columns:
         kind, stem = column.named.kind, column.named.stem
         for i, token in enumerate(stem):
-            if kind in {"time", "position", "force"} and token not in _NO_LABEL:
+            if column.named.worded and kind in {"time", "position", "force"} and token not in _NO_LABEL:
                 rest = (*stem[:i], "", *stem[i + 1 :], column.named.axis)
                 families.setdefault(kind, {}).setdefault(rest, {}).setdefault(token, column)
     for places in families.get("position", {}).values():
@@ -298,7 +298,11 @@ def clock_of(table: Sheet, columns: Sequence[ColumnStatistics]) -> ColumnStatist
 
     One that counts rows is none, unless it is called a time; where the file states its rate, it must be called so too.
     """
-    times = [column for column in columns if column.is_time and (column.named_time or not column.counts_rows)]
+    times = [
+        column
+        for column in columns
+        if column.may_be("time") and column.is_time and (column.named_time or not column.counts_rows)
+    ]
     best = max(times, key=lambda column: (column.clock, column.score("time", "time")), default=None)
     return None if best and table.rate is not None and not best.named_time else best
 
@@ -417,8 +421,8 @@ def _of_one_axis(position: ColumnStatistics, force: ColumnStatistics) -> bool:
 def _of_one_number(position: ColumnStatistics, force: ColumnStatistics) -> bool:
     """False if the names of a position and a force are words for both with different numbers: two devices, or axes."""
     numbers = [re.findall(r"\d+", " ".join(column.named.stem)) for column in (position, force)]
-    named = position.named.kind == "position" and force.named.kind == "force"
-    return not (named and all(numbers) and numbers[0] != numbers[1])
+    worded = position.named.worded and force.named.worded
+    return not (worded and all(numbers) and numbers[0] != numbers[1])
 
 
 def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> ColumnStatistics | None:

@@ -237,7 +237,7 @@ def _unglue(line: TextLine, block: _Block) -> list[str]:
     cells = block.dialect.header(line.text) if block.dialect.delimiter != " " else []
     if len(cells) != 2 * block.filled - 1 or block.filled < 2:
         return []
-    glued = re.fullmatch(r"(.*?[^\d\s.eE+-])\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)", cells[block.filled - 1])
+    glued = re.fullmatch(r"(.+?)\s*([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)", cells[block.filled - 1])
     titles = cells[: block.filled - 1]
     if glued is None or any(block.dialect.kind(cell) == 1 for cell in titles):
         return []
@@ -298,7 +298,8 @@ def read_preamble(lines: Sequence[str], names: Sequence[str], cells: Sequence[st
         if LABVIEW_HEADER_END.lower() in {line.strip().lower() for line in lines}
         else {}
     )
-    labels = [match.groups() for line in lines if (match := _LABEL.match(line[:_MAX_RATE_LETTERS]))]
+    matches = (_LABEL.match(line[:_MAX_RATE_LETTERS]) for line in lines)
+    labels: list[_Label] = [(m[1], m[2], m[3], m[4]) for m in matches if m]
     spring = _labelled_ratio(labels, r"(?:spring|force).?const", ("force", "length")) or _labelled_plain(
         labels, r"spring.?const"
     )
