@@ -56,6 +56,12 @@ _PLACE = re.compile(
 """Tokens of the things whose place is meant by an axis alone, as in `tcp_x`."""
 _TRANSFORM = re.compile(r"(?:^|[._/])(?:O|F|EE|NE)_(?:T|F|ddP|dP)_[A-Za-z]")
 """Element of a matrix or a vector of a robot's state in Franka's notation, which only the whole has a meaning."""
+_VECTOR = re.compile(
+    r"(?:^|(?<=[._/ ]))(?:(wrench|pose|ft|f_ext|force_torque)[._\[]|(pos|position|forces?)[.\[])"
+    r"(\d)\]?$",
+    re.IGNORECASE,
+)
+"""Number of a list, as `wrench.2`, `pose[0]` and `ee.pos.1`."""
 _LENGTH_LIMIT = 60
 """Longest name that is looked at: others are text."""
 
@@ -95,6 +101,9 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     plain, symbol = _part_unit(name[:_LENGTH_LIMIT])
     if _TRANSFORM.search(plain):
         return ColumnName("other", "", (), False)
+    vector = _VECTOR.search(plain)
+    if vector:
+        return _component((vector[1] or vector[2]).lower(), int(vector[3]), plain[: vector.start()])
     tokens = [token for token in _TOKEN.findall(plain) if token not in {"header", "field", "actual"}]
     lower = [token.lower() for token in tokens]
     kind = _kind(lower)
@@ -115,6 +124,17 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     if kind is None and not all(_OPAQUE.fullmatch(token) for token in lower):
         kind = "other"
     return ColumnName(kind, axis, stem, any(_COMMAND.match(token) for token in lower), worded)
+
+
+def _component(vector: str, place: int, device: str) -> ColumnName:
+    """The name of one number of a list: of a wrench the force first, of a pose the position."""
+    kinds = {"pose": ("position", "orientation"), "wrench": ("force", "torque")}
+    whole = {"pos": "position", "position": "position", "force": "force", "forces": "force"}
+    first, second = kinds.get(vector, kinds["wrench"]) if vector not in whole else (whole[vector], "other")
+    if place > 5 or (place > 2 and second != "torque"):
+        return ColumnName("other", "", (device, vector), False)
+    kind = first if place < 3 else second
+    return ColumnName(kind, "xyz"[place % 3], (device, vector, kind), bool(_COMMAND.search(device.lower())))
 
 
 def _part_unit(name: str) -> tuple[str, str]:

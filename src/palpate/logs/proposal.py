@@ -98,7 +98,7 @@ def from_columns(
         return (Proposal(None, (_JOINTS_ONLY,)),)
     groups = side_by_side(rows)
     proposals = [
-        replace(proposal, facts=(f"{label}, one of {len(groups)} logs side by side", *proposal.facts))
+        replace(proposal, facts=(f"{label!r}, one of {len(groups)} logs side by side", *proposal.facts))
         for label, group in groups.items()
         if (proposal := _one_log(table, group, given)).options is not None
     ]
@@ -169,7 +169,11 @@ def _lacking(columns: Sequence[ColumnStatistics]) -> str:
             f"a force ({listed}) and no position that moves: join the log of the positions with --join FILE; with the"
             " orientation of the sensor in free motion, palpate payload weighs its tool"
         )
+    joints = [column.name for column in columns if column.named.kind == "joint"]
     places = [column.name for column in columns if column.named.kind == "position" and column.changes]
+    if joints and not places and not forces:
+        listed = shorten(", ".join(joints), _LISTED)
+        return f"joints ({listed}) and no position and force of the tip: record these, or join them with --join FILE"
     if places and not any(column.may_be("force") and column.changes for column in columns):
         listed = shorten(", ".join(places), _LISTED)
         return f"a position ({listed}) and no force: join the log of the force with --join FILE"
@@ -449,6 +453,8 @@ def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: l
     """A column's name and unit; an unstated unit is guessed from the size of its values."""
     call = _call(table, column)
     symbol = column.unit or unit_in_name(column.name, quantity)
+    if symbol is None and _MESSAGE.search(column.name):
+        symbol = {"length": "m", "force": "N"}[quantity]
     if symbol:
         return f"{call}:{symbol}"
     tail = re.search(r"(?:[_\[(]\s*)([A-Za-z]{1,3})\s*[\])]?$", column.name)
@@ -461,6 +467,10 @@ def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: l
         f"no unit is given for {column.name!r}, which goes over {column.span:.3g}: {symbol} is a guess"
     )
     return f"{call}:{symbol}"
+
+
+_MESSAGE = re.compile(r"wrench\.force\.[xyz]$|(?:pose\.position|transform\.translation)\.[xyz]$")
+"""Fields of ROS messages, which are SI by their definition."""
 
 
 def _call(table: Sheet, column: ColumnStatistics) -> str:

@@ -33,7 +33,7 @@ _STAMP = re.compile(r"\s*(\d{1,2}:\d{2}:\d{2}(?:\.\d+)?|\d+(?:\.\d+)?)\s*(?:->|[
 _LIST = re.compile(
     rf'"?(?:array|tensor|Vector\d?|Quaternion)?\(?[\[(]+\s*(?:({_NUMBER})(?:[\s,;]+(?:{_NUMBER}))*)?\s*,?\s*[\])]+"?'
 )
-_HOLE = "\x1d"
+_HOLE = "\x02"
 """Stands in a line for a list of it."""
 
 
@@ -188,12 +188,14 @@ def _pairs(line: str) -> list[tuple[str, str]]:
 
 
 def _labelled(texts: Iterable[str], labels: tuple[str, ...]) -> Iterator[str]:
-    """Lines of the values behind some labels; other lines stay as they are, and are no rows."""
+    """Lines of the values behind some labels; other lines among them stay as they are, and are no rows."""
     yield "\t".join(labels)
+    begun = False
     for text in texts:
         pairs = _pairs(text)
         whole = tuple(name for name, _ in pairs) == labels
-        yield "\t".join(value for _, value in pairs) if whole else text.replace("\t", " ")
+        begun |= whole
+        yield "\t".join(value for _, value in pairs) if whole else text.replace("\t", " ") * begun
 
 
 def _outer(lines: Sequence[str]) -> tuple[str, list[str]]:
