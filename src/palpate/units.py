@@ -1,6 +1,7 @@
 """Units of logs and their way into SI, and numbers in SI for people, with as many digits as mean something."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from palpate.errors import InputError, unknown
@@ -38,6 +39,8 @@ UNITS: dict[str, Unit] = {
     "kN": Unit("force", "N", 1e3),
     "mN": Unit("force", "N", 1e-3),
     "uN": Unit("force", "N", 1e-6),
+    "nN": Unit("force", "N", 1e-9),
+    "pN": Unit("force", "N", 1e-12),
     "gf": Unit("force", "N", GRAVITY * 1e-3),
     "g": Unit("force", "N", GRAVITY * 1e-3),
     "kgf": Unit("force", "N", GRAVITY),
@@ -76,6 +79,9 @@ _ALIASES = {
     "Seconds": "s",
     "millimeters": "mm",
     "meters": "m",
+    "milliseconds": "ms",
+    "microseconds": "us",
+    "nanoseconds": "ns",
     "newton": "N",
     "newtons": "N",
     "Newton": "N",
@@ -124,6 +130,7 @@ def split_spec(spec: str) -> tuple[str, str | None]:
 
 def unit_in_name(name: str, quantity: str) -> str | None:
     """The unit that a column's name carries, such as `mm` in `position_mm` or `pos [mm]`, if it fits the quantity."""
+    name = re.sub(r"([\])])\.\d+$", r"\1", name)  # pandas numbers repeated names
     tail = name.rstrip(" ])").replace("[", "_").replace("(", "_").rsplit("_", 1)
     if len(tail) < 2:
         return None

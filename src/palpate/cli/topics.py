@@ -2,42 +2,51 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
 from palpate.cli._program import print_result
 from palpate.cli._terminal import print_lines
 from palpate.cli.options.common import WRITTEN
+from palpate.errors import InputError
 from palpate.logs.signals import GB, Signals
 
 if TYPE_CHECKING:
     from palpate.logs.listing import Listing, SignalEntry
+    from palpate.logs.proposal import Proposal
 
 
 _HOW = Group("Reading", sort_key=1)
+_MAX_TRIED_BYTES = 200e6
+"""Largest log that a proposed command is tried on: a bag of gigabytes is listed at once."""
 
 
 def topics(
     log: Path,
     /,
     *,
+    join: Annotated[Path | None, Parameter(group=_HOW)] = None,
     delimiter: Annotated[str | None, Parameter(group=_HOW)] = None,
     max_size: Annotated[float, Parameter(group=_HOW)] = GB,
     max_seconds: Annotated[float, Parameter(group=_HOW)] = 600.0,
     json: Annotated[bool, Parameter(negative=(), group=WRITTEN)] = False,
 ) -> int:
-    """List the signals of a log, and propose a command to identify it.
+    """List the signals of a log, and propose a command to identify it; a command is tried before it is proposed.
 
     palpate topics press.mcap
 
     Parameters
     ----------
     log
-        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP.
+        Text in columns, JSON, Parquet, a spreadsheet, MATLAB, HDF5, npz, TDMS, an AFM curve, a ROS 1 bag, a ROS 2 bag
+        or MCAP.
+    join
+        A second log with further columns, joined by time.
     delimiter
         Between two cells of a text log; detected if not given.
     max_size
@@ -50,19 +59,74 @@ def topics(
     from palpate.logs.listing import list_log
     from palpate.report.page import Answer
 
-    listing = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits)
-    command = listing.proposal.command(log)
-    proposal = {"command": command, "guesses": list(listing.proposal.guesses)}
+    listing = list_log(log, delimiter, Signals(max_size=max_size, max_seconds=max_seconds).limits, join)
+    proposals = [_tried(log, proposal) for proposal in listing.proposals]
+    plain_proposals = [
+        {"command": proposal.command(log), "guesses": list(proposal.guesses)} for proposal in proposals
+    ]
     # A log of gigabytes is listed at once, and so is not read through for a digest.
     plain = {
         "files": [{"file": str(log), "sha256": None}],
         "entries": [entry.to_json() for entry in listing.entries],
         "troubles": listing.troubles,
-        "identify": proposal,
+        "identify": plain_proposals[0],
+        "others": plain_proposals[1:],
     }
-    lines = [*_table(log, listing), *_proposal_lines(listing, command)]
+    lines = _table(log, listing)
+    for proposal in proposals:
+        lines += _proposal_lines(proposal, proposal.command(log))
     print_result(Answer(plain, show=lambda _: print_lines(*lines)), json=json)
     return 0
+
+
+def _tried(log: Path, proposal: Proposal) -> Proposal:
+    """A proposal whose command answers; if the log is refused its fallback, or the reason why there is none."""
+    if not proposal.options or (log.is_file() and log.stat().st_size > _MAX_TRIED_BYTES):
+        return proposal
+    try:
+        answers = _weighs(log, proposal) if proposal.verb == "payload" else _identifies(log, proposal)
+    except (InputError, MemoryError) as error:
+        reason = " ".join(str(error).split())
+        refused = f"{proposal.verb} refuses what the names suggest: {reason}"
+    else:
+        if answers or proposal.fallback is None:
+            return proposal
+        refused = ""
+    if proposal.fallback is not None:
+        return _tried(log, proposal.fallback)
+    return replace(proposal, options=None, guesses=(refused,), facts=())
+
+
+def _identifies(log: Path, proposal: Proposal) -> bool:
+    """True if `palpate identify` reads a log as proposed; what it identifies is its own answer."""
+    from palpate.from_log import log_identifier
+
+    options: dict[str, Any] = dict(proposal.options or {})
+    if "rate" in options:
+        options["rate"] = float(options["rate"])
+    if "robot_stiffness" in options:
+        options["robot_stiffness"] = (float(options["robot_stiffness"]), 0.0)
+    if "join" in options:
+        options["join"] = Path(options["join"])
+    log_identifier(options).identify(log)
+    return True
+
+
+def _weighs(log: Path, proposal: Proposal) -> bool:
+    """True if `palpate payload` gives the mass of a tool from a log as proposed."""
+    from palpate.contact_frame.signals_in_base import ContactFrame
+    from palpate.contact_frame.tool_payload import weigh
+
+    options: dict[str, Any] = dict(proposal.options or {})
+    frame = ContactFrame(wrench_frame=options.pop("wrench_frame"))
+    options |= {
+        name: make(options[name]) for name, make in (("rate", float), ("join", Path)) if name in options
+    }
+    return weigh(Signals(**options).read(log), frame, _TOLERANCE).payload is not None
+
+
+_TOLERANCE = 0.25
+"""Relative half-width up to which a mass counts as identified: the default of `palpate payload`."""
 
 
 def _table(log: Path, listing: Listing) -> list[str]:
@@ -86,16 +150,17 @@ def _table(log: Path, listing: Listing) -> list[str]:
     return [*lines, *listing.facts, *listing.troubles]
 
 
-def _proposal_lines(listing: Listing, command: str | None) -> list[str]:
+def _proposal_lines(proposal: Proposal, command: str | None) -> list[str]:
     """The proposed command, and its guessed parts."""
-    guesses = [f"  {guess}" for guess in listing.proposal.guesses]
+    guesses = [f"  {guess}" for guess in proposal.guesses]
     if command is None:
         return ["", "no command is proposed:", *guesses]
+    purpose = "to identify it" if proposal.verb == "identify" else "to weigh the tool on the sensor"
     return [
         "",
-        "to identify it:" if not guesses else "to identify it (guessed parts are listed below):",
+        f"{purpose}:" if not guesses else f"{purpose} (guessed parts are listed below):",
         f"  {command}",
-        *(f"  {fact}" for fact in listing.proposal.facts),
+        *(f"  {fact}" for fact in proposal.facts),
         *guesses,
     ]
 

@@ -1,13 +1,15 @@
 """Statistics of a column before its role is known."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from palpate.arrays import Array
-from palpate.logs.tables.sheet import find_sentinel
+from palpate.errors import InputError
+from palpate.logs.naming import ColumnName, read_name
+from palpate.logs.tables.sheet import Sheet, Stated, find_sentinel
 from palpate.units import known_unit, unit, unit_in_name
 
 NAMES = {
@@ -19,6 +21,10 @@ NAMES = {
     "force": r"forc|^f$|^f[nxyz]$|[_.]f[nxyz]?$|^f_|load|kraft|fuerza|weight|scale|effort|torque|newton|press",
 }
 """Usual names of columns in laboratories."""
+_MAX_REPEATED_STAMPS = 20
+"""Rows that may share a stamp on average: drivers that poll their sensor repeat three or four."""
+_MIN_TIMED = 0.2
+"""Smallest fraction of rows with a time: of two tests side by side, the shorter one ends in empty cells."""
 _BLOCKS = 16
 """Blocks of a log over which a coherence is averaged, half overlapping: two columns of noise have about one over their
 number."""
@@ -62,16 +68,36 @@ class ColumnStatistics:
         return _of_unit_length(np.gradient(self.unit_readings))
 
     @cached_property
+    def named(self) -> ColumnName:
+        """What the name and the stated unit say."""
+        reading = read_name(self.name, self.unit or "")
+        return replace(reading, kind="time") if self.clock else reading
+
+    @cached_property
+    def finite(self) -> Array:
+        """The numbers of the column, without rows that hold none."""
+        return self.values[np.isfinite(self.values)]
+
+    @cached_property
     def step(self) -> float:
-        """Median difference from row to row."""
-        step = np.diff(self.values)
-        return float(np.median(step)) if len(step) and np.isfinite(step).any() else 0.0
+        """Typical difference from row to row, likewise where stamps repeat."""
+        step = np.diff(self.finite)
+        middle = float(np.median(step)) if len(step) else 0.0
+        return middle or (float(np.mean(step)) if len(step) else 0.0)
 
     @cached_property
     def is_time(self) -> bool:
-        """True if the column grows in even steps, as a time does."""
-        step = np.diff(self.values)
-        return len(step) > 2 and bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
+        """True if the column grows as a time does: in even steps, or, if it is called a time, never falling.
+
+        A driver that reads faster than its clock repeats stamps; one that counts whole seconds repeats most of them.
+        """
+        step = np.diff(self.finite)
+        if len(step) < 3 or len(self.finite) < _MIN_TIMED * len(self.values):
+            return False
+        forward = int(np.count_nonzero(step > 0))
+        if self.named.kind == "time":
+            return bool((step >= 0).all()) and forward * _MAX_REPEATED_STAMPS >= len(step)
+        return bool((step > 0).all() and np.median(step) > 0.5 * np.mean(step))
 
     @cached_property
     def counts_rows(self) -> bool:
@@ -107,11 +133,17 @@ class ColumnStatistics:
         return float(high - low)
 
     def score(self, role: str, quantity: str) -> int:
-        """Evidence for a role: its unit, then its name."""
+        """Evidence for a role: its unit, then its name; 0 where name or unit say another quantity."""
+        if self.named.kind != role:
+            return 0
         symbol = self.unit or unit_in_name(self.name, quantity)
         fits = symbol is not None and known_unit(symbol) and unit(symbol).quantity == quantity
-        contradicts = bool(self.unit) and not fits and self.unit != "1"
-        return 2 * fits + bool(re.search(NAMES[role], self.name, re.I)) - 3 * contradicts
+        worded = bool(re.search(NAMES[role], self.name, re.IGNORECASE))
+        return 2 * fits + (1 if worded or not fits else 0)
+
+    def may_be(self, role: str) -> bool:
+        """True if neither name nor unit say another quantity than a role's."""
+        return self.named.kind in {None, role}
 
 
 def _of_unit_length(values: Array) -> Array:
@@ -227,3 +259,21 @@ def roughness(column: ColumnStatistics) -> float:
         if column.span > 0 and len(values) > 2
         else np.inf
     )
+
+
+def read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:
+    """Every column's values and unit; and why there are no values, where they cannot be read."""
+    places = list(range(len(table.names)))
+    unread = []
+    try:
+        columns = table.glance(places)
+    except InputError as error:
+        columns = [np.empty(0) for _ in places]
+        unread = [str(error)]
+    statistics = []
+    for index, values in zip(places, columns, strict=True):
+        name = table.names[index]
+        stated = table.stated.get(name, Stated(None))
+        scaled = (values + stated.offset) * stated.scale
+        statistics.append(ColumnStatistics(index, name, scaled, stated.unit, name in table.clocks))
+    return statistics, unread

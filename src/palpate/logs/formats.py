@@ -22,6 +22,10 @@ class Kind(Enum):
     PARQUET = "Parquet"
     MAT = "a MATLAB file"
     SHEETS = "a spreadsheet"
+    HDF5 = "HDF5"
+    NPZ = "a NumPy file"
+    TDMS = "TDMS"
+    AFM = "an AFM curve"
     BAG1 = "a ROS 1 bag"
     MCAP = "MCAP"
     SQLITE = "a ROS 2 bag (sqlite3)"
@@ -44,15 +48,20 @@ _BEGINNINGS = {
     b"\x89MCAP": Kind.MCAP,
     b"SQLite format 3\x00": Kind.SQLITE,
     b"MATLAB 5.0 MAT-file": Kind.MAT,
+    b"MATLAB 7.3 MAT-file": Kind.HDF5,
+    b"\x89HDF\r\n\x1a\n": Kind.HDF5,
+    b"TDSm": Kind.TDMS,
+    b"\x93NUMPY": Kind.NPZ,
 }
-_HDF5 = (b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n")
+_AFM = {".jpk-force", ".jpk-force-map", ".jpk-qi-data", ".jpk-qi-series", ".ibw"}
+"""Endings of the files of atomic force microscopes that are no text."""
 
 
 def kind_of(path: Path) -> Kind:
     """Look at a log.
 
     Raises:
-        InputError: there is no such file; it is empty, a pipe, or a folder that is no bag; it is MATLAB's v7.3.
+        InputError: there is no such file; it is empty, a pipe, or a folder that is no bag.
     """
     if _is_sheet(path):
         return Kind.SHEETS
@@ -73,10 +82,12 @@ def kind_of(path: Path) -> Kind:
         begin = file.read(32)
     if not begin:
         raise InputError(f"{path} is empty; give a log with a row of numbers for each sample")
-    if begin.startswith(_HDF5) and (begin.startswith(b"MATLAB") or path.suffix.lower() == ".mat"):
-        raise InputError(f"{path} is a MATLAB file of version 7.3 (HDF5); save it in MATLAB with: save -v7")
+    if path.suffix.lower() in _AFM:
+        return Kind.AFM
     if begin.startswith(b"PK\x03\x04") and _is_spreadsheet(path):
         return Kind.SHEETS
+    if begin.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz":
+        return Kind.NPZ
     detected = next((kind for magic, kind in _BEGINNINGS.items() if begin.startswith(magic)), Kind.TEXT)
     return Kind.MAT if detected is Kind.TEXT and path.suffix.lower() == ".mat" else detected
 
@@ -96,14 +107,27 @@ def _is_spreadsheet(path: Path) -> bool:
 
 
 def open_table(
-    path: Path, kind: Kind, delimiter: str | None = None, limits: ReadingLimits | None = None
+    path: Path,
+    kind: Kind,
+    delimiter: str | None = None,
+    limits: ReadingLimits | None = None,
+    join: Path | None = None,
 ) -> Sheet:
-    """A file of columns, read where they are asked for.
+    """A file of columns, read where they are asked for; with those of a second file that is joined by its time.
 
     Raises:
-        InputError: it cannot be read, or is larger than the limits.
+        InputError: it cannot be read, or is larger than the limits; the times of the two do not overlap.
     """
     budget = ReadingBudget(path, limits or ReadingLimits())
+    if join is not None:
+        from palpate.logs.joining import join_sheets
+
+        second = kind_of(join)
+        if second.is_bag:
+            raise InputError(f"{join} is a bag; --join takes a file of columns")
+        return join_sheets(
+            open_table(path, kind, delimiter, limits), open_table(join, second, delimiter, limits)
+        )
     match kind:
         case Kind.MAT:
             from palpate.logs.tables.matlab import read_matlab
@@ -113,6 +137,10 @@ def open_table(
             from palpate.logs.tables.spreadsheet import read_book
 
             return read_book(path, budget)
+        case Kind.HDF5 | Kind.NPZ | Kind.TDMS | Kind.AFM:
+            from palpate.logs.tables.arrays import read_arrays
+
+            return read_arrays(path, kind.name, kind.value, budget)
         case Kind.PARQUET:
             from palpate.logs.tables.parquet import read_parquet
 
@@ -124,7 +152,8 @@ def open_table(
 
 
 ENDINGS = {
-    ".csv", ".tsv", ".txt", ".dat", ".ddf", ".lvm", ".xlsx", ".parquet", ".mat", ".bag", *STORAGES
+    ".csv", ".tsv", ".txt", ".tab", ".dat", ".ddf", ".lvm", ".jsonl", ".xlsx", ".parquet", ".mat", ".h5", ".hdf5",
+    ".npz", ".tdms", ".bag", *_AFM, *STORAGES,
 }  # fmt: skip
 """File endings that count as logs in a folder."""
 

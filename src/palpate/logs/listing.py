@@ -10,20 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from palpate.errors import InputError
 from palpate.files.reading import ReadingLimits
 from palpate.logs import bags
 from palpate.logs.arm_logs import is_pose, is_wrench
-from palpate.logs.columns import NAMES, ColumnStatistics
+from palpate.logs.columns import NAMES, ColumnStatistics, read_columns
 from palpate.logs.formats import Kind, kind_of, open_table
 from palpate.logs.presets import preset_among
-from palpate.logs.proposal import Proposal, clock_of, from_columns
+from palpate.logs.proposal import Proposal, clock_of, from_columns, time_factor
 from palpate.logs.read import is_run
-from palpate.logs.roles import epoch_unit
-from palpate.logs.tables.sheet import Sheet, Stated
+from palpate.logs.tables.sheet import Sheet
 from palpate.logs.tables.spreadsheet import equal_sheets
 from palpate.text import shorten
-from palpate.units import unit, unit_in_name
 
 
 @dataclass(frozen=True)
@@ -61,23 +58,34 @@ class Listing:
     Args:
         entries: of the log, in its order.
         troubles: its faults, a sentence each.
-        proposal: how to identify it.
+        proposals: how to identify it; several if it holds logs side by side.
         facts: its statements about itself.
     """
 
     entries: list[SignalEntry]
     troubles: list[str]
-    proposal: Proposal
+    proposals: tuple[Proposal, ...]
     facts: list[str] = field(default_factory=list)
 
+    @property
+    def proposal(self) -> Proposal:
+        """The first of the proposals."""
+        return self.proposals[0]
 
-def list_log(path: str | Path, delimiter: str | None = None, limits: ReadingLimits | None = None) -> Listing:
+
+def list_log(
+    path: str | Path,
+    delimiter: str | None = None,
+    limits: ReadingLimits | None = None,
+    join: Path | None = None,
+) -> Listing:
     """Contents of a log, its faults, and a command to identify it.
 
     Args:
         path: of the log.
         delimiter: of a text log; found when None.
         limits: of unpacked size and time; those of `read_log` when None.
+        join: a second log with further columns of the same time.
 
     Raises:
         InputError: the file is missing or unreadable.
@@ -88,26 +96,28 @@ def list_log(path: str | Path, delimiter: str | None = None, limits: ReadingLimi
         with bags.Bag(path, kind, limits) as bag:
             fields = {name: _fields(bag, name) for name in bag.topics}
             entries = [_of_topic(bag, name, fields[name]) for name in bag.topics]
-            return Listing(entries, bag.troubles, from_topics(bag, fields))
-    table = open_table(path, kind, delimiter, limits)
-    columns, unread = _read_columns(table)
+            return Listing(entries, bag.troubles, (from_topics(bag, fields),))
+    table = open_table(path, kind, delimiter, limits, join)
+    columns, unread = read_columns(table)
     clock = clock_of(table, columns)
     entries = [_of_column(column, clock) for column in columns]
     entries += [SignalEntry(name, "-", 0, None, None, None, what) for name, what in table.left_out.items()]
-    proposal = Proposal({}) if is_run(path) else from_columns(table, columns, delimiter)
+    given = {"delimiter": delimiter, "join": None if join is None else str(join)}
+    words = {name: word for name, word in given.items() if word is not None}
+    proposals = (Proposal({}),) if is_run(path) else from_columns(table, columns, words)
     repeats = equal_sheets(path, limits or ReadingLimits()) if kind is Kind.SHEETS and path.is_file() else []
     if repeats:
         first = list_log(repeats[0], limits=limits).proposal
         text = f"{len(repeats)} sheets have the same columns and are pooled, as repeats of one test: "
         named = shorten(", ".join(sheet.name for sheet in repeats), 120)
-        proposal = replace(first, guesses=(*first.guesses, text + named))
+        proposals = (replace(first, guesses=(*first.guesses, text + named)),)
     facts = [f"{table.rate:g} rows a second, as the file states"] if table.rate else []
-    return Listing(entries, unread + [note["text"] for note in table.notes], proposal, facts)
+    return Listing(entries, unread + [note["text"] for note in table.notes], proposals, facts)
 
 
 def propose(table: Sheet) -> Proposal:
     """Options that identify a table of columns."""
-    return from_columns(table, _read_columns(table)[0])
+    return from_columns(table, read_columns(table)[0], {})[0]
 
 
 def _fields(bag: bags.Bag, name: str) -> tuple[str, ...]:
@@ -211,24 +221,6 @@ def _fields_by_name(fields: Mapping[str, Sequence[str]], guesses: list[str]) -> 
     return {"position": f"{pair[0]}:m", "force": f"{pair[1]}:N"}
 
 
-def _read_columns(table: Sheet) -> tuple[list[ColumnStatistics], list[str]]:
-    """Every column's values and unit; and why there are no values, where they cannot be read."""
-    places = list(range(len(table.names)))
-    unread = []
-    try:
-        columns = table.glance(places)
-    except InputError as error:
-        columns = [np.empty(0) for _ in places]
-        unread = [str(error)]
-    statistics = []
-    for index, values in zip(places, columns, strict=True):
-        name = table.names[index]
-        stated = table.stated.get(name, Stated(None))
-        scaled = (values + stated.offset) * stated.scale
-        statistics.append(ColumnStatistics(index, name, scaled, stated.unit, name in table.clocks))
-    return statistics, unread
-
-
 def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> SignalEntry:
     finite = np.isfinite(column.values)
     count = int(finite.sum())
@@ -239,15 +231,9 @@ def _of_column(column: ColumnStatistics, clock: ColumnStatistics | None) -> Sign
     about += f" {column.unit}" if column.unit not in {None, "1"} else ""
     if clock is None or count < 2 or len(clock.values) != len(column.values):
         return SignalEntry(column.name, kind, count, None, None, None, about)
-    time = clock.values[finite] * _factor(clock)
+    time = clock.values[finite & np.isfinite(clock.values)] * time_factor(clock)
+    if len(time) < 2:
+        return SignalEntry(column.name, kind, count, None, None, None, about)
     rate = (count - 1) / float(time[-1] - time[0]) if time[-1] > time[0] else None
     about += " (time?)" if column is clock else ""
     return SignalEntry(column.name, kind, count, rate, float(time[0]), float(time[-1]), about)
-
-
-def _factor(clock: ColumnStatistics) -> float:
-    """Factor from a time's own unit to seconds."""
-    if clock.clock:
-        return 1.0
-    symbol = clock.unit or unit_in_name(clock.name, "time") or epoch_unit(float(clock.values[0]), clock.step)
-    return unit(symbol).factor if symbol and unit(symbol).quantity == "time" else 1.0

@@ -1,9 +1,9 @@
-"""The proposed `palpate identify` command of a log, from its names, units and values."""
+"""The proposed command of a log, from its names, units and values."""
 
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from itertools import combinations, islice
 from pathlib import Path
@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from palpate.logs import columns as statistics
-from palpate.logs.columns import NAMES, ColumnStatistics
+from palpate.logs.columns import ColumnStatistics
+from palpate.logs.naming import OTHER_UNITS
 from palpate.logs.presets import preset, preset_among
 from palpate.logs.roles import epoch_unit, usual_unit
 from palpate.logs.tables.sheet import Sheet
-from palpate.units import known_unit, unit, unit_in_name
+from palpate.text import shorten
+from palpate.units import unit, unit_in_name
 
 _SIZES = {"length": (0.5, "m", "mm"), "force": (1000.0, "N", "g")}
 """Largest plausible range in SI units, and the assumed unit above it."""
@@ -42,17 +44,21 @@ _EXAMPLE_RATE = 1000
 
 @dataclass(frozen=True)
 class Proposal:
-    """Options of `palpate identify LOG`, and what of them is guessed.
+    """Options of `palpate identify LOG` or `palpate payload LOG`, and what of them is guessed.
 
     Args:
         options: by name, as `wrench_frame`; None if the log does not suffice.
         guesses: a sentence each.
         facts: what the log shows of itself, likewise.
+        verb: the command, `identify` or `payload`.
+        fallback: a second proposal, for a log that the first is refused for.
     """
 
     options: Mapping[str, str] | None
     guesses: tuple[str, ...] = ()
     facts: tuple[str, ...] = ()
+    verb: str = "identify"
+    fallback: "Proposal | None" = None
 
     @property
     def words(self) -> tuple[str, ...] | None:
@@ -69,55 +75,190 @@ class Proposal:
         if words is None:
             return None
         path = str(log) if not str(log).startswith("-") else f"./{log}"
-        return " ".join(["palpate identify", *map(shlex.quote, (path, *words))])
+        return " ".join([f"palpate {self.verb}", *map(shlex.quote, (path, *words))])
 
 
-def from_columns(table: Sheet, columns: Sequence[ColumnStatistics], delimiter: str | None = None) -> Proposal:
-    """The command for a log of columns: a preset whose columns are all there, a wrench and a pose, or two columns."""
-    guesses: list[str] = []
+def from_columns(
+    table: Sheet, columns: Sequence[ColumnStatistics], given: Mapping[str, str]
+) -> tuple[Proposal, ...]:
+    """The commands for a table: of a preset, of a wrench and a pose, or of two columns, one for each log in it.
+
+    Args:
+        table: the names and what the file states.
+        columns: of it, in its order.
+        given: options that each command repeats.
+    """
     length = max((len(column.values) for column in columns), default=0)
     rows = [column for column in columns if len(column.values) == length]
-    options = {} if delimiter is None else {"delimiter": delimiter}
-    timing, clock = _timing(table, rows, guesses)
     members = {_member(column.name): column for column in rows}
     name = preset_among(members)
     if name is not None:
-        facts = _motion(name, members)
-        if "time" in preset(name):
-            return Proposal({**options, "preset": name}, (), facts)
-        timing, guesses = _state_time(clock) if clock else (timing, guesses)
-        usual = {key: preset(name)[key] for key in ("wrench", "pose")}
-        chosen = {
-            key: ",".join(members[member].name for member in value.split(",")) for key, value in usual.items()
-        }
-        changed = {} if chosen == usual else chosen
-        return Proposal({**options, "preset": name, **timing, **changed}, tuple(guesses), facts)
+        return (_by_preset(table, name, rows, members, given),)
     if all(f"{part}[{i}]" in members for part in ("q", "tau_ext_hat_filtered") for i in range(7)):
-        return Proposal(None, (_JOINTS_ONLY,))
-    varying = [column for column in rows if column is not clock and column.changes and not column.counts_rows]
-    unique: dict[tuple[bool, bool, bytes], ColumnStatistics] = {}
-    for column in varying:
-        unique.setdefault(_identity(column), column)
-    varying = list(unique.values())
-    space = _in_space(table, varying, guesses)
-    if space:
-        return Proposal({**options, **timing, **space}, tuple(guesses))
-    pair = _pair(varying, guesses)
+        return (Proposal(None, (_JOINTS_ONLY,)),)
+    groups = side_by_side(rows)
+    proposals = [
+        replace(proposal, facts=(f"{label!r}, one of {len(groups)} logs side by side", *proposal.facts))
+        for label, group in groups.items()
+        if (proposal := _one_log(table, group, given)).options is not None
+    ]
+    return tuple(proposals) or (_one_log(table, rows, given),)
+
+
+def _by_preset(
+    table: Sheet,
+    name: str,
+    rows: Sequence[ColumnStatistics],
+    members: Mapping[str, ColumnStatistics],
+    given: Mapping[str, str],
+) -> Proposal:
+    """The command for a log that has all columns of a preset."""
+    guesses: list[str] = []
+    facts = _motion(name, members)
+    if "time" in preset(name):
+        return Proposal({**given, "preset": name}, (), facts)
+    timing, clock = _timing(table, rows, guesses)
+    timing, guesses = _state_time(clock) if clock else (timing, guesses)
+    usual = {key: preset(name)[key] for key in ("wrench", "pose")}
+    chosen = {
+        key: ",".join(members[member].name for member in value.split(",")) for key, value in usual.items()
+    }
+    changed = {} if chosen == usual else chosen
+    return Proposal({**given, "preset": name, **timing, **changed}, tuple(guesses), facts)
+
+
+def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str, str]) -> Proposal:
+    """The command for columns that are of one log."""
+    guesses: list[str] = []
+    timing, clock = _timing(table, rows, guesses)
+    usable = [column for column in rows if column is not clock and column.named.kind != "time"]
+    space = _in_space(table, usable, {**given, **timing}, tuple(guesses))
+    if space is not None:
+        return space
+    unique: dict[tuple[str | None, bytes], ColumnStatistics] = {}
+    for column in usable:
+        if column.changes and not column.counts_rows:
+            unique.setdefault(_identity(column), column)
+    pair = _pair([*unique.values()], guesses)
     if pair is None:
-        return Proposal(None, (_NO_PAIR,))
+        return Proposal(None, (_lacking(usable),))
     position, force = pair
     position_spec = _with_unit(table, position, "length", guesses)
     force_spec = _with_unit(table, force, "force", guesses)
-    return Proposal({**options, **timing, "position": position_spec, "force": force_spec}, tuple(guesses))
+    options = {**given, **timing, "position": position_spec, "force": force_spec}
+    facts = []
+    if table.spring and 0 < table.spring < np.inf:
+        options["robot_stiffness"] = f"{table.spring:g}"
+        facts.append(
+            f"the cantilever of {table.spring:g} N/m, as the file states, is between position and surface"
+        )
+    return Proposal(options, tuple(guesses), tuple(facts))
 
 
-def _identity(column: ColumnStatistics) -> tuple[bool, bool, bytes]:
-    """Quantities of a column's name, and a digest of its numbers: those of 1 N/mm are the same in two quantities."""
-    position, force = (
-        bool(re.search(NAMES[kind], column.name, re.IGNORECASE)) for kind in ("position", "force")
-    )
+def _lacking(columns: Sequence[ColumnStatistics]) -> str:
+    """The signal that a log lacks, and what the log is good for."""
+    forces = [column.name for column in columns if column.named.kind == "force" and column.changes]
+    places = [
+        column.name
+        for column in columns
+        if column.may_be("position") and column.counts >= _MIN_POSITION_STEPS
+    ]
+    if forces and not places:
+        listed = shorten(", ".join(forces), _LISTED)
+        return (
+            f"a force ({listed}) and no position that moves: join the log of the positions with --join FILE; with the"
+            " orientation of the sensor in free motion, palpate payload weighs its tool"
+        )
+    joints = [column.name for column in columns if column.named.kind == "joint"]
+    places = [column.name for column in columns if column.named.kind == "position" and column.changes]
+    if joints and not places and not forces:
+        listed = shorten(", ".join(joints), _LISTED)
+        return f"joints ({listed}) and no position and force of the tip: record these, or join them with --join FILE"
+    if places and not any(column.may_be("force") and column.changes for column in columns):
+        listed = shorten(", ".join(places), _LISTED)
+        return f"a position ({listed}) and no force: join the log of the force with --join FILE"
+    return _NO_PAIR
+
+
+_LISTED = 80
+"""Letters of a list of names."""
+_NO_LABEL = {
+    "x",
+    "y",
+    "z",
+    "w",
+    "raw",
+    "filtered",
+    "filt",
+    "target",
+    "actual",
+    "measured",
+    "desired",
+    "cmd",
+    "left",
+    "right",
+}
+"""Tokens by which names differ within one log."""
+
+
+def side_by_side(columns: Sequence[ColumnStatistics]) -> dict[str, list[ColumnStatistics]]:
+    """The columns of each log of a table that holds several side by side, by label; none of a table of one log.
+
+    Names repeat (Time, Extension, Load twice), or differ by one word (extend and retract) or number.
+    """
+    repeated = _repeats(columns)
+    if len(repeated) > 1:
+        return repeated
+    families: dict[str, dict[tuple[str, ...], dict[str, ColumnStatistics]]] = {}
+    for column in columns:
+        kind, stem = column.named.kind, column.named.stem
+        for i, token in enumerate(stem):
+            if column.named.worded and kind in {"time", "position", "force"} and token not in _NO_LABEL:
+                rest = (*stem[:i], "", *stem[i + 1 :], column.named.axis)
+                families.setdefault(kind, {}).setdefault(rest, {}).setdefault(token, column)
+    for places in families.get("position", {}).values():
+        for forces in families.get("force", {}).values():
+            if len(places) > 1 and places.keys() == forces.keys() and "0" not in places:
+                times = next(
+                    (
+                        family
+                        for family in families.get("time", {}).values()
+                        if family.keys() == places.keys()
+                    ),
+                    {},
+                )
+                alone = [column for column in columns if column.named.kind == "time"] if not times else []
+                return {
+                    label: [*alone, *([times[label]] if times else []), places[label], forces[label]]
+                    for label in places
+                }
+    return {}
+
+
+def _repeats(columns: Sequence[ColumnStatistics]) -> dict[str, list[ColumnStatistics]]:
+    """The columns of each repetition of a table's names, by the names' first and last."""
+    counts: dict[str, int] = {}
+    groups: dict[int, list[ColumnStatistics]] = {}
+    bases = {column.name for column in columns}
+    for column in columns:
+        base = re.sub(r"\.\d+$", "", column.name)  # pandas numbers repeated names
+        name = base if base in bases else column.name
+        groups.setdefault(counts.get(name, 0), []).append(column)
+        counts[name] = counts.get(name, 0) + 1
+    kinds = [{column.named.kind for column in group} for group in groups.values()]
+    if len(groups) < 2 or not all({"position", "force"} <= kind for kind in kinds):
+        return {}
+    alone = [column for column in groups[0] if column.named.kind == "time"]
+    return {
+        f"columns {group[0].place} to {group[-1].place}": group if "time" in kind else [*alone, *group]
+        for group, kind in zip(groups.values(), kinds, strict=True)
+    }
+
+
+def _identity(column: ColumnStatistics) -> tuple[str | None, bytes]:
+    """Kind of column, and a digest of its numbers: those of 1 N/mm are the same in two quantities."""
     numbers = np.where(np.isnan(column.values), np.nan, column.values) + 0.0  # one NaN, one zero
-    return position, force, blake2b(numbers.tobytes()).digest()
+    return column.named.kind, blake2b(numbers.tobytes()).digest()
 
 
 def _stem(column: ColumnStatistics) -> str:
@@ -161,9 +302,21 @@ def clock_of(table: Sheet, columns: Sequence[ColumnStatistics]) -> ColumnStatist
 
     One that counts rows is none, unless it is called a time; where the file states its rate, it must be called so too.
     """
-    times = [column for column in columns if column.is_time and (column.named_time or not column.counts_rows)]
+    times = [
+        column
+        for column in columns
+        if column.may_be("time") and column.is_time and (column.named_time or not column.counts_rows)
+    ]
     best = max(times, key=lambda column: (column.clock, column.score("time", "time")), default=None)
     return None if best and table.rate is not None and not best.named_time else best
+
+
+def time_factor(clock: ColumnStatistics) -> float:
+    """Factor from a time's own unit to seconds."""
+    if clock.clock:
+        return 1.0
+    symbol = clock.unit or unit_in_name(clock.name, "time") or epoch_unit(float(clock.finite[0]), clock.step)
+    return unit(symbol).factor if symbol and unit(symbol).quantity == "time" else 1.0
 
 
 def _timing(
@@ -174,7 +327,11 @@ def _timing(
     if clock is None and table.rate is not None:
         return {}, None
     if clock is None:
-        named = [name for name in table.names if re.search(NAMES["time"], name, re.IGNORECASE)]
+        places = [column for column in columns if column.named.kind == "position" and column.step]
+        if table.speed and places:
+            length = unit(places[0].unit or unit_in_name(places[0].name, "length") or "m").factor
+            return {"rate": f"{table.speed / (abs(places[0].step) * length):.4g}"}, None
+        named = [column.name for column in columns if column.named.kind == "time"]
         none = f"{named[0]!r} is no time that is read, and " if named else ""
         guesses.append(f"{none}the log does not state its rate: --rate {_EXAMPLE_RATE} is only an example")
         return {"rate": f"{_EXAMPLE_RATE}"}, None
@@ -184,7 +341,7 @@ def _timing(
     symbol = clock.unit or unit_in_name(clock.name, "time")
     if symbol is None and not clock.clock:
         counted = "ms" if clock.counts_rows else usual_unit(clock.step)
-        symbol = epoch_unit(float(clock.values[0]), clock.step) or counted
+        symbol = epoch_unit(float(clock.finite[0]), clock.step) or counted
         if symbol != "s":
             guesses.append(
                 f"the time is assumed to be in {symbol}: it would be {1 / clock.step:.3g} rows a second in s"
@@ -199,19 +356,21 @@ def _pair(
 
     A column that hardly moves is no position, and one that does not follow it is no force.
     """
-    moving = [column for column in columns if column.counts >= _MIN_POSITION_STEPS]
-    forces = _best(columns, lambda column: column.score("force", "force"))
-    places = _best(
-        [column for column in moving if column not in forces[:1]],
-        lambda column: column.score("position", "length"),
-    )
+    moving = [
+        column for column in columns if column.may_be("position") and column.counts >= _MIN_POSITION_STEPS
+    ]
+    loads = [column for column in columns if column.may_be("force")]
+    forces = _best(_measured(loads), lambda column: column.score("force", "force"))
+    places = _best(_measured(moving), lambda column: column.score("position", "length"))
     places = places[:_MAX_PAIRS]
     places = [
         candidate
         for candidate in places
         if not any(candidate is not p and statistics.is_rate(candidate, p) for p in places)
     ]
-    candidates = ((a, b) for a in places or moving for b in forces or columns if a is not b)
+    candidates = (
+        (a, b) for a in places or moving for b in forces or loads if a is not b and _of_one_number(a, b)
+    )
     by_name = bool(places and forces)
     follow = [
         pair
@@ -223,8 +382,15 @@ def _pair(
     if not pairs:
         return None
     position, force = max(
-        pairs, key=lambda pair: (_stem(pair[0]) == _stem(pair[1]), statistics.rank_correlation(*pair))
+        pairs,
+        key=lambda pair: (
+            _stem(pair[0]) == _stem(pair[1]),
+            _of_one_axis(*pair),
+            statistics.rank_correlation(*pair),
+        ),
     )
+    if _of_one_axis(position, force):
+        pairs = [pair for pair in pairs if _of_one_axis(*pair)]
     unused = dict.fromkeys(
         column.name for pair in pairs for column in pair if column not in (position, force)
     )
@@ -244,6 +410,23 @@ def _pair(
             " the position"
         )
     return position, force
+
+
+def _measured(columns: Sequence[ColumnStatistics]) -> Sequence[ColumnStatistics]:
+    """The columns of measured values; those of desired ones where there are no others."""
+    return [column for column in columns if not column.named.command] or columns
+
+
+def _of_one_axis(position: ColumnStatistics, force: ColumnStatistics) -> bool:
+    """True if the names of a position and a force say the same axis."""
+    return bool(position.named.axis) and position.named.axis == force.named.axis
+
+
+def _of_one_number(position: ColumnStatistics, force: ColumnStatistics) -> bool:
+    """False if the names of a position and a force are words for both with different numbers: two devices, or axes."""
+    numbers = [re.findall(r"\d+", " ".join(column.named.stem)) for column in (position, force)]
+    worded = position.named.worded and force.named.worded
+    return not (worded and all(numbers) and numbers[0] != numbers[1])
 
 
 def _cause(moving: Sequence[ColumnStatistics], *pair: ColumnStatistics) -> ColumnStatistics | None:
@@ -270,10 +453,12 @@ def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: l
     """A column's name and unit; an unstated unit is guessed from the size of its values."""
     call = _call(table, column)
     symbol = column.unit or unit_in_name(column.name, quantity)
+    if symbol is None and _MESSAGE.search(column.name):
+        symbol = {"length": "m", "force": "N"}[quantity]
     if symbol:
         return f"{call}:{symbol}"
     tail = re.search(r"(?:[_\[(]\s*)([A-Za-z]{1,3})\s*[\])]?$", column.name)
-    if tail and not known_unit(tail[1]) and tail[1][0].isupper():
+    if tail and tail[1].lower() in OTHER_UNITS:
         guesses.append(f"{column.name!r} is taken as plain numbers, as {tail[1]} is no unit of {quantity}")
         return f"{call}:1"
     limit, small, large = _SIZES[quantity]
@@ -284,41 +469,79 @@ def _with_unit(table: Sheet, column: ColumnStatistics, quantity: str, guesses: l
     return f"{call}:{symbol}"
 
 
+_MESSAGE = re.compile(r"wrench\.force\.[xyz]$|(?:pose\.position|transform\.translation)\.[xyz]$")
+"""Fields of ROS messages, which are SI by their definition."""
+
+
 def _call(table: Sheet, column: ColumnStatistics) -> str:
     """Identifier of a column: its name, or its number if the name would be misread."""
     plain = re.fullmatch(r"[^\W\d-][^\x00-\x1f\x7f-\x9f,:]*", column.name) is not None
     return column.name if plain and table.names.count(column.name) == 1 else str(column.place)
 
 
-def _in_space(table: Sheet, columns: Sequence[ColumnStatistics], guesses: list[str]) -> dict[str, str]:
-    """The options for a wrench and a pose in three dimensions, where six columns or more are named so."""
-    force = _triple(columns, r"(?:f|force)[_. ]?{}")
-    position = _triple(columns, r"(?:(?:pos|position|p|x|tcp|tip)[_. ]?)?{}")
-    if not (force and position and max(column.counts for column in position) >= _MIN_POSITION_STEPS):
-        return {}
-    torque = _triple(columns, r"(?:t|m|torque|moment)[_. ]?{}")
-    turn = _triple(columns, r"(?:q|quaternion|orientation)[_. ]?{}", "xyzw")
-    guesses.append(
-        "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
+def _in_space(
+    table: Sheet, columns: Sequence[ColumnStatistics], options: Mapping[str, str], timing: tuple[str, ...]
+) -> Proposal | None:
+    """The command for a wrench and a pose in three dimensions: a tool that turns is weighed, a press identified."""
+    guesses = [*timing]
+    force = _triple(columns, "force", guesses)
+    position = _triple(columns, "position", guesses)
+    if not (force and position and any(column.changes for column in force)):
+        return None
+    torque = _triple(columns, "torque", [])
+    turn = _triple(columns, "orientation", [], "xyzw")
+    turned = bool(turn) and _turn(turn) > _MIN_TURN
+    if not turned and max(column.counts for column in position) < _MIN_POSITION_STEPS:
+        return None
+    wrench = [_with_unit(table, column, "force", guesses) for column in force]
+    wrench += [_call(table, column) for column in torque]
+    pose = [_with_unit(table, column, "length", guesses) for column in position]
+    pose += [_call(table, column) for column in turn]
+    named = {**options, "wrench": ",".join(wrench), "pose": ",".join(pose)}
+    moves = max(column.counts for column in position) >= _MIN_POSITION_STEPS
+    axes = "the wrench's axes are taken for the base's: say --wrench-frame tool if they are the tool's"
+    press = Proposal({**named, "wrench_frame": "base"}, (*guesses, axes)) if moves else None
+    if not turned:
+        return press
+    axes = "the wrench's axes are taken for the tool's: say --wrench-frame base if they are the base's"
+    angle = f"the tool turns by up to {np.degrees(_turn(turn)):.0f} degrees"
+    return Proposal({**named, "wrench_frame": "tool"}, (*guesses, axes), (angle,), "payload", press)
+
+
+_MIN_TURN = np.radians(30.0)
+"""Smallest turn of a log by which a tool may be weighed [rad]: that which `palpate payload` asks for."""
+
+
+def _turn(quaternion: Sequence[ColumnStatistics]) -> float:
+    """Largest angle between the first orientation and another [rad]."""
+    rows = np.column_stack([column.values for column in quaternion])
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    if len(rows) < 2 or not (np.abs(size - 1.0) < 0.1).all():
+        return 0.0
+    cosines = np.abs((rows / size) @ (rows[0] / size[0]))
+    return float(2 * np.arccos(np.clip(cosines.min(), 0.0, 1.0)))
+
+
+def _triple(
+    columns: Sequence[ColumnStatistics], kind: str, guesses: list[str], axes: str = "xyz"
+) -> list[ColumnStatistics]:
+    """The columns of a quantity along all axes; none if one is missing.
+
+    Of several such sets it is the first that was measured and changes.
+    """
+    sets: dict[tuple[str, ...], dict[str, ColumnStatistics]] = {}
+    for column in columns:
+        if column.named.kind == kind and column.named.axis and len(column.finite):
+            sets.setdefault(column.named.stem, {}).setdefault(column.named.axis, column)
+    whole = [[axis_of[axis] for axis in axes] for axis_of in sets.values() if {*axes} <= axis_of.keys()]
+    if not whole:
+        return []
+    best = max(
+        whole,
+        key=lambda triple: (not triple[0].named.command, any(column.changes for column in triple)),
     )
-    wrench = [_with_unit(table, column, "force", guesses) for column in force] + [
-        _call(table, column) for column in torque
-    ]
-    pose = [_with_unit(table, column, "length", guesses) for column in position] + [
-        _call(table, column) for column in turn
-    ]
-    return {"wrench": ",".join(wrench), "pose": ",".join(pose), "wrench_frame": "base"}
-
-
-def _triple(columns: Sequence[ColumnStatistics], pattern: str, axes: str = "xyz") -> list[ColumnStatistics]:
-    """The columns of all axes whose names end as a pattern does, before a unit; none if one is missing."""
-    triple = []
-    for axis in axes:
-        ends = re.compile(rf"(?:^|.*[_. ]){pattern.format(axis)}(?:[_ ]*[\[(]?[A-Za-z]{{1,3}}[\])]?)?", re.I)
-        match = next(
-            (column for column in columns if ends.fullmatch(column.name) and column not in triple), None
-        )
-        if match is None:
-            return []
-        triple.append(match)
-    return triple
+    if len(whole) > 1:
+        others = ", ".join(triple[0].name for triple in whole if triple is not best)
+        guesses.append(f"{best[0].name!r} and its axes are used; those of {shorten(others, _LISTED)} fit too")
+    return best

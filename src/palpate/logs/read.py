@@ -30,6 +30,7 @@ def read_log(
     delimiter: str | None = None,
     held: str | None = None,
     limits: ReadingLimits | None = None,
+    join: Path | None = None,
     **columns: str,
 ) -> Record:
     """Read columns of a log into a record.
@@ -53,6 +54,7 @@ def read_log(
         held: the column whose readings are not moved in time where a bag's other topic has more of them, as
             `identify(force_filter=...)` wants its force; each stands in the first row after it.
         limits: of unpacked size and time; 2 GB and 600 s when None.
+        join: a second log with further columns of the same time.
         columns: by the name that the record gives it, a column's name or number with its unit: `NAME:UNIT`; of a bag
             `TOPIC.FIELD:UNIT`.
 
@@ -76,7 +78,7 @@ def read_log(
         with bags.Bag(path, kind, limits) as bag:
             loaded = bags.from_bag(bag, columns, missing, held)
     else:
-        loaded = from_table(open_table(path, kind, delimiter, limits), columns, rate, missing)
+        loaded = from_table(open_table(path, kind, delimiter, limits, join), columns, rate, missing)
     roles.check_range(loaded.columns, {role: split_spec(spec)[0] for role, spec in columns.items()}, path)
     if "time" in columns:
         loaded.notes += roles.implausible_times(loaded.columns, loaded.start, columns["time"])
@@ -230,6 +232,9 @@ def from_table(
     roles.check_apart(places, {role: table.names[index] for role, index in places.items()}, table.path)
     words = [str(word) for word in missing]
     arrays = dict(zip(places, table.numbers(list(places.values()), words), strict=True))
+    filled = np.flatnonzero(np.any([np.isfinite(values) for values in arrays.values()], axis=0))
+    if len(filled):  # of two tests side by side, the shorter ends in empty cells
+        arrays = {role: values[: filled[-1] + 1] for role, values in arrays.items()}
     if not len(next(iter(arrays.values()))):
         raise InputError(f"{table.path} holds a header and no rows; give a log with a row for each sample")
     loaded = roles.Loaded(arrays, {"time": "s"}, 0.0, list(table.notes))
@@ -246,7 +251,7 @@ def from_table(
         arrays[role] *= stated.scale * unit(symbol).factor
         if stated.scale != 1.0:
             loaded.facts.append(
-                f"{name!r} is scaled by {stated.scale:g} {stated.unit} a volt, as {stated.where} says"
+                f"{name!r} is scaled by {stated.scale:g} {stated.unit} a {stated.of}, as {stated.where} says"
             )
         origin *= unit(symbol).factor if role == "time" else 1.0
     loaded.start = _time(table, arrays, rate, loaded) + origin
@@ -264,7 +269,7 @@ def _subtract_start(table: Sheet, places: Mapping[str, int], arrays: Mapping[str
     time = arrays["time"]
     origin = float(time[0])
     counts = table.counts(places["time"]) if abs(origin) >= _LOSSLESS else None
-    time[:] = time - origin if counts is None else counts - counts[0]
+    time[:] = time - origin if counts is None else (counts - counts[0])[: len(time)]
     return origin
 
 

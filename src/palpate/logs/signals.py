@@ -2,7 +2,7 @@
 
 # No annotations from the future: the command line looks for those of a base class where it inherits them.
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from pathlib import Path
@@ -57,6 +57,8 @@ class Signals:
     "Leave out the rows after, in seconds from the first row."
     missing: tuple[str, ...] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
+    join: Path | None = None
+    "A second log with further columns, as the forces of an arm's positions; both have a column of the same time."
     delimiter: str | None = None
     "Between two cells of a text log; detected if not given."
     max_size: float = GB
@@ -106,7 +108,10 @@ class Signals:
             return self, {name: about.meta[name] for name in own_frame} if about else {}
         from palpate.logs.listing import list_log
 
-        proposal = list_log(path, self.delimiter, self.limits).proposal
+        listing = list_log(path, self.delimiter, self.limits, self.join)
+        if len(listing.proposals) > 1:
+            raise InputError(_list_several(path, listing.proposals))
+        proposal = listing.proposal
         guesses = [
             guess
             for guess in proposal.guesses
@@ -114,7 +119,7 @@ class Signals:
         ]
         if bag and (proposal.options is None or guesses):
             return self, {}  # a bag's only wrench and pose need no names
-        if proposal.options is None or guesses:
+        if proposal.options is None or guesses or proposal.verb != "identify":
             raise InputError(_list_guesses(path, proposal))
         options: dict[str, Any] = dict(proposal.options)
         if "preset" in options:
@@ -140,15 +145,18 @@ class Signals:
             return read_run(path, **cut)
         if kind_of(path).is_bag:
             return self._of_bag(path, cut, samples)
-        return self._of_table(path, cut | {"delimiter": self.delimiter, "rate": self.rate})
+        own = {"delimiter": self.delimiter, "rate": self.rate, "join": self.join}
+        return self._of_table(path, cut | own)
 
     def _names(self, path: Path) -> list[str]:
-        return list(open_table(path, kind_of(path), self.delimiter, self.limits).names)
+        return list(open_table(path, kind_of(path), self.delimiter, self.limits, self.join).names)
 
     def _of_bag(self, path: Path, cut: dict[str, Any], samples: bool) -> Record:
         from palpate.logs.arm_logs import read_wrench_and_pose
 
         axis = self._one_axis()
+        if self.join is not None:
+            raise InputError(f"{path} is a bag; --join is of files of columns, leave it out")
         if self.time or self.rate:
             raise InputError(f"the messages of {path} have their own times; leave out --time and --rate")
         if axis is None:
@@ -157,7 +165,7 @@ class Signals:
         return read_named(path, held="force" if samples else None, **cut, **axis)
 
     def _of_table(self, path: Path, cut: dict[str, Any]) -> Record:
-        table = open_table(path, kind_of(path), self.delimiter, cut["limits"])
+        table = open_table(path, kind_of(path), self.delimiter, cut["limits"], self.join)
         present = list(table.names)
         time = self.time or ("time" if "time" in present and self.rate is None else None)
         columns: dict[str, Any] = {} if time is None else {"time": time}
@@ -221,7 +229,9 @@ def read_log(path: str | Path | Any, **options: Any) -> Record:
         return read_named(path, **(options | _columns_of(path, options)))
     path = Path(path)
     fields: dict[str, Any] = {
-        name: options[name] for name in ("rate", "start", "end", "missing", "delimiter") if name in options
+        name: options[name]
+        for name in ("rate", "start", "end", "missing", "delimiter", "join")
+        if name in options
     }
     named = set(options) - {*fields, "held", "limits"}
     if named or (kind_of(path) is Kind.PARQUET and stored_about(path) is not None):
@@ -274,7 +284,13 @@ def _with_underscores(options: dict[str, Any]) -> dict[str, Any]:
 
 def _list_guesses(path: Path, proposal: "Proposal") -> str:
     """The guesses of a log whose signals nobody named, and the command that would be tried."""
-    guesses = "; ".join(proposal.guesses)
+    guesses = "; ".join(proposal.guesses) or "; ".join(proposal.facts)
     if proposal.options is None:
         return f"{path}: {guesses} (palpate topics {path} lists them; --time, --position and --force-column name them)"
     return f"{path}: {guesses}. If that is right: {proposal.command(path)}"
+
+
+def _list_several(path: Path, proposals: "Sequence[Proposal]") -> str:
+    """The commands for the logs that a table holds side by side."""
+    commands = "; or: ".join(str(proposal.command(path)) for proposal in proposals)
+    return f"{path} holds {len(proposals)} logs side by side; identify one: {commands}"

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from palpate.errors import InputError
 from palpate.files.reading import ReadingBudget
+from palpate.logs.naming import read_name
 from palpate.logs.tables.lines import THOUSANDS, Dialect, TextLine
 from palpate.logs.tables.sheet import Stated
-from palpate.units import known_unit
+from palpate.units import known_unit, unit
 
 _DIALECTS = (
     Dialect(","),
@@ -183,7 +184,7 @@ def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     if len(above) > 1 and _is_units(titles := block.dialect.header(above[-1].text), block):
         symbols = titles
         above = above[:-1]
-    titles = _header(above[-1], block) if above else []
+    titles = (_unglue(above[-1], block) or _header(above[-1], block)) if above else []
     header = above.pop().text if titles else ""
     if titles and len(titles) < block.filled:
         raise InputError(
@@ -231,6 +232,18 @@ def _header(line: TextLine, block: _Block) -> list[str]:
     return titles if len(titles) > 1 or block.filled == 1 else []
 
 
+def _unglue(line: TextLine, block: _Block) -> list[str]:
+    """The names in a line whose end is the first row, as the line break between them is missing; none otherwise."""
+    cells = block.dialect.header(line.text) if block.dialect.delimiter != " " else []
+    if len(cells) != 2 * block.filled - 1 or block.filled < 2:
+        return []
+    glued = re.fullmatch(r"(.+?)\s*([+-]?\d[\d.]*(?:[eE][+-]?\d+)?)", cells[block.filled - 1])
+    titles = cells[: block.filled - 1]
+    if glued is None or any(block.dialect.kind(cell) == 1 for cell in titles):
+        return []
+    return [*titles, glued[1]]
+
+
 def _trim_cells(cells: list[str]) -> list[str]:
     """Cells without quotes, and without empty ones at the end."""
     while cells and not cells[-1]:
@@ -255,13 +268,17 @@ class Preamble:
     Args:
         rate: rows per second [1/s]; None if they do not say.
         columns: by name.
+        speed: of the probe [m/s], likewise.
+        spring: stiffness of a cantilever [N/m], likewise.
     """
 
     rate: float | None = None
     columns: dict[str, Stated] = field(default_factory=dict)
+    speed: float | None = None
+    spring: float | None = None
 
 
-def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
+def read_preamble(lines: Sequence[str], names: Sequence[str], cells: Sequence[str] = ()) -> Preamble:
     """Read rate, units and scales from the lines above the rows.
 
     A line of labels, such as `Units` and then a cell for each channel, goes by the line `Channel` with their names;
@@ -270,6 +287,7 @@ def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
     Args:
         lines: above the header.
         names: of the columns.
+        cells: of the first row.
     """
     rate = next(
         (frequency for frequency in (_rate(line[:_MAX_RATE_LETTERS]) for line in lines) if frequency), None
@@ -280,7 +298,85 @@ def read_preamble(lines: Sequence[str], names: Sequence[str]) -> Preamble:
         if LABVIEW_HEADER_END.lower() in {line.strip().lower() for line in lines}
         else {}
     )
-    return Preamble(rate, columns or _volt_scales(rows, lines, names))
+    matches = (_LABEL.match(line[:_MAX_RATE_LETTERS]) for line in lines)
+    labels: list[_Label] = [(m[1], m[2], m[3], m[4]) for m in matches if m]
+    spring = _labelled_ratio(labels, r"(?:spring|force).?const", ("force", "length")) or _labelled_plain(
+        labels, r"spring.?const"
+    )
+    speed = _labelled_ratio(
+        labels, r"(?:z|approach|tip|ramp|extend|forward).?(?:rate|speed|velocity)", ("length", "time")
+    )
+    columns = columns or _volt_scales(rows, lines, names) or _counts(labels, names, cells)
+    return Preamble(rate, columns or _cantilever(labels, names, spring), speed, spring)
+
+
+_LABEL = re.compile(
+    r"[\s#%;\"'-]*([A-Za-z][A-Za-z .()/_-]{1,50}?)(?:[\"']?[\s]*[\[(,]\s*([A-Za-z\u00b5/]{1,8})\s*[\])]?)?[\"']?\s*"
+    r"[:=\t,]\s*[\"']?([+-]?[\d.]+(?:[eE][+-]?\d+)?|[A-Za-z\u00b5]{1,5}$)\s*([A-Za-z\u00b5/]{0,8})"
+)
+"""A label, its unit in brackets or behind a comma, its value, and the unit behind that."""
+_VOLTS = {"V": 1.0, "mV": 1e-3}
+_Label = tuple[str, str | None, str, str]
+
+
+def _ratio(symbol: str) -> tuple[str, str, float] | None:
+    """Quantities and factor to SI of a unit such as `nN/nm` or `nm/V`."""
+    top, slash, bottom = symbol.partition("/")
+    parts = [
+        ("voltage", _VOLTS[part]) if part in _VOLTS else (unit(part).quantity, unit(part).factor)
+        for part in (top, bottom)
+        if part in _VOLTS or known_unit(part)
+    ]
+    return (parts[0][0], parts[1][0], parts[0][1] / parts[1][1]) if slash and len(parts) == 2 else None
+
+
+def _labelled_ratio(labels: Sequence[_Label], pattern: str, quantities: tuple[str, str]) -> float | None:
+    """The value of a label in SI, where its unit is a ratio of two quantities."""
+    for label, before, number, after in labels:
+        ratio = _ratio(before or after or "")
+        value = _value(number)
+        if re.search(pattern, label, re.IGNORECASE) and value and ratio and ratio[:2] == quantities:
+            return value * ratio[2]
+    return None
+
+
+def _labelled_plain(labels: Sequence[_Label], pattern: str) -> float | None:
+    """The value of a label without a unit, which is SI."""
+    numbers = (_value(number) for label, before, number, after in labels
+               if re.search(pattern, label, re.IGNORECASE) and not (before or after))  # fmt: skip
+    return next((number for number in numbers if number), None)
+
+
+def _cantilever(labels: Sequence[_Label], names: Sequence[str], spring: float | None) -> dict[str, Stated]:
+    """The force of channels in volts, by the stiffness and the sensitivity of a cantilever."""
+    words = r"sensitiv|lever.?gain|inv.?ols"
+    gain = _labelled_ratio(labels, words, ("voltage", "length"))
+    sensitivity = _labelled_ratio(labels, words, ("length", "voltage")) or (1 / gain if gain else None)
+    if spring is None or sensitivity is None:
+        return {}
+    volts = {name: re.search(r"[\[(]\s*(m?V)\s*[\])]$", name) for name in names}
+    where = "the header's force constant and sensitivity"
+    return {
+        name: Stated("N", where, spring * sensitivity * _VOLTS[match[1]], of=match[1])
+        for name, match in volts.items()
+        if match and not re.search(r"lateral|frict|sum|ampl|phase|aux|user", name, re.IGNORECASE)
+    }
+
+
+def _counts(labels: Sequence[_Label], names: Sequence[str], cells: Sequence[str]) -> dict[str, Stated]:
+    """Forces and torques in counts, by the counts per unit that the header states."""
+    stated = {}
+    for kind, usual in (("force", "N"), ("torque", "Nm")):
+        label = rf"counts?.?(?:per|/).?(?:unit.?)?{kind}|{kind}.*counts?.?(?:per|/)"
+        counts = _labelled_plain(labels, label)
+        symbols = [
+            number for name, _, number, _ in labels if re.search(rf"{kind}.?units?", name, re.IGNORECASE)
+        ]
+        symbol = next((symbol for symbol in symbols if known_unit(symbol)), usual)
+        for name, cell in zip(names, cells, strict=False):
+            if counts and read_name(name).kind == kind and re.fullmatch(r"[+-]?\d+", cell):
+                stated[name] = Stated(symbol, f"the header's counts per {kind}", 1 / counts, of="count")
+    return stated
 
 
 def _rate(line: str) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -34,10 +34,8 @@ _OTHER_FORMATS = {
     b"\x28\xb5\x2f\xfd": "is compressed by zstd; unpack it first",
     b"PK\x03\x04": "is a zip archive; unpack it first",
     b"\xd0\xcf\x11\xe0": "is a spreadsheet of the old kind (.xls); save it as .xlsx or CSV",
-    b"\x89HDF": "is HDF5; write its columns out as CSV or Parquet",
     b"\xff\xfe": "is UTF-16 text; save it as UTF-8",
     b"\xfe\xff": "is UTF-16 text; save it as UTF-8",
-    b"TDSm": "is a TDMS file of LabVIEW; write its channels out as CSV or .lvm",
 }
 """First bytes of other file formats."""
 THOUSANDS = r"[+-]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?"
@@ -148,7 +146,7 @@ def lines_of(path: Path, text: str) -> list[TextLine]:
     """
     lines: list[TextLine] = []
     letters = 0
-    for number, raw in enumerate(re.split(r"\r\n|\n|\r", text)[:_MAX_HEAD_LINES], 1):
+    for number, raw in enumerate(join_quoted(re.split(r"\r\n|\n|\r", text)[:_MAX_HEAD_LINES]), 1):
         letters += len(raw)
         if letters > _MAX_HEAD_LETTERS and len(lines) >= _MIN_HEAD_LINES:
             break
@@ -162,6 +160,48 @@ def lines_of(path: Path, text: str) -> list[TextLine]:
         if body.strip():
             lines.append(TextLine(number, body, mark is not None and mark != ";"))
     return lines
+
+
+_MAX_CELL_LINES = 100
+"""Lines that one quoted cell may hold; a quote that never ends is a mark of inches."""
+
+
+def join_quoted(lines: Iterable[str]) -> Iterator[str]:
+    """Lines in which a line break between the quotes of a cell (RFC 4180) is a space.
+
+    Empty lines follow a joined one, so that lines keep their numbers.
+    """
+    pending: list[str] = []
+    for line in lines:
+        if not pending and '"' not in line:
+            yield line
+            continue
+        inside = _ends_quoted(line, bool(pending))
+        pending.append(line)
+        if not inside:
+            yield " ".join(pending)
+            yield from [""] * (len(pending) - 1)
+            pending = []
+        elif len(pending) > _MAX_CELL_LINES:
+            yield from pending
+            pending = []
+    yield from pending
+
+
+def _ends_quoted(line: str, inside: bool) -> bool:
+    """True if a line ends between the quotes of a cell: a quote opens at a cell's beginning, and two are a letter."""
+    pieces = line.split('"')
+    quote = 0
+    while quote < len(pieces) - 1:
+        before = pieces[quote].rstrip(" ")
+        if not inside:
+            inside = not before or before[-1] in {",", ";", "\t", "|"}
+        elif quote + 2 < len(pieces) and not pieces[quote + 1]:
+            quote += 1
+        else:
+            inside = False
+        quote += 1
+    return inside
 
 
 def _decode(begin: bytes) -> str:

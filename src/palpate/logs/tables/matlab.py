@@ -52,12 +52,13 @@ def read_matlab(path: Path, budget: ReadingBudget) -> Sheet:
         example = next((f": {name} is {what}" for name, what in left_out.items()), "")
         raise InputError(f"{path} holds no array of numbers with a value for each sample{example}")
     return Sheet(
-        path, names, lambda places, missing: ([_cells(arrays[names[i]], missing) for i in places], []),
+        path, names, lambda places, missing: ([finite_cells(arrays[names[i]], missing) for i in places], []),
         lambda index: as_counts(arrays[names[index]]), left_out=left_out,
     )  # fmt: skip
 
 
-def _cells(values: AnyArray, missing: Sequence[str]) -> Cells:
+def finite_cells(values: AnyArray, missing: Sequence[str]) -> Cells:
+    """An array as a column; infinite and complex values are no numbers."""
     if np.iscomplexobj(values):
         return Cells(np.full(len(values), np.nan), ("row 1", str(values[0])))
     column = values.astype(float)
@@ -96,7 +97,12 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyA
             value for part in parts for value in part.values() if isinstance(value, matlab.MatlabOpaque)
         )
         objects = [_class(value) for value in opaque]
-    arrays = dict(_arrays(variables))
+    columns, images = columns_of_arrays(dict(_arrays(variables)))
+    return columns, {"objects": objects, "images": images}
+
+
+def columns_of_arrays(arrays: Mapping[str, AnyArray]) -> tuple[dict[str, AnyArray], dict[str, str]]:
+    """The columns of arrays without sides of one place, by name; and what is too wide for columns."""
     images = {name: _size(value) for name, value in arrays.items() if _width(value) > _MAX_COLUMNS}
     columns = {
         title: column
@@ -104,7 +110,7 @@ def unpack(path: Path, size: int, question: None = None) -> tuple[dict[str, AnyA
         if 0 < _width(value) <= _MAX_COLUMNS
         for title, column in _columns(name, value)
     }
-    return columns, {"objects": objects, "images": images}
+    return columns, images
 
 
 def _unpacked_sizes(path: Path) -> Iterator[int]:

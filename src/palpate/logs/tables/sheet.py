@@ -27,12 +27,14 @@ class Stated:
         unit: its symbol; None if the file gives none that palpate knows.
         where: the words for it: "the row of units"; empty where it goes without saying.
         scale, offset: a value in that unit is (number + offset) x scale.
+        of: what the number counts.
     """
 
     unit: str | None
     where: str = ""
     scale: float = 1.0
     offset: float = 0.0
+    of: str = "volt"
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,8 @@ class Sheet:
         counts: a column of whole numbers, as exact as the file has them; None if it holds others.
         stated: statements of the file about its columns, by name.
         rate: rows per second, where the file states it [1/s].
+        speed: of the probe, likewise [m/s].
+        spring: stiffness of the cantilever that is the force sensor, likewise [N/m].
         left_out: variables that are no columns, by name, with their kinds.
         doubts: likely reason for a missing column, by its name.
         shorter: places of columns by further names.
@@ -90,6 +94,8 @@ class Sheet:
     tables: tuple[str, ...] = ()
     clocks: set[str] = field(default_factory=set)
     notes: list[dict[str, Any]] = field(default_factory=list)
+    speed: float | None = None
+    spring: float | None = None
 
     def __post_init__(self) -> None:
         self.names = [shorten(name, LONGEST) for name in self.names]

@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.files.reading import ReadingBudget
 from palpate.logs.tables import lines
 from palpate.logs.tables.layout import LABVIEW_HEADER_END, Layout, find_layout, read_preamble
+from palpate.logs.tables.rewriting import is_json, rewrite_json, rewriter
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
 
 _NO_DELIMITER = "\x1f"
@@ -25,38 +26,52 @@ _CELL_MARK = "\x1e"
 _MIN_WIDE_COLUMNS = 32
 """Columns from which on each line is split as a whole."""
 _BYTES, _PIECE_BYTES = 8, 1 << 20
+_FIRST_BYTES = 4096
 
 
 def read_text_sheet(
-    path: Path, budget: ReadingBudget, delimiter: str | None = None, content: str | None = None
+    path: Path,
+    budget: ReadingBudget,
+    delimiter: str | None = None,
+    content: str | None = None,
+    above: int = 0,
 ) -> Sheet:
-    """A log of lines of text: CSV in any of its dialects, .lvm, .ddf, a sheet of a spreadsheet.
+    """A log of lines of text: CSV in any of its dialects, .lvm, .ddf, JSON, a sheet of a spreadsheet.
 
     Args:
         path: the file, for messages too.
         budget: of the log.
         delimiter: between two cells; found when None.
         content: the text itself, where it does not come from the file.
+        above: lines of it that the file does not have.
 
     Raises:
         InputError: the file is no text, or has no rows of numbers.
     """
     if content is None:
         budget.take(path.stat().st_size)
+        with path.open("rb") as file:
+            json = is_json(file.read(_FIRST_BYTES))
+        if json:
+            return read_text_sheet(path, budget, ",", rewrite_json(path, budget), above=1)
         head, bare_returns = lines.first_lines(path)
+        rewrite = None if bare_returns else rewriter(head)
+        if rewrite is not None:
+            return read_text_sheet(path, budget, delimiter, *rewrite(path, budget))
     else:
         head = lines.lines_of(path, content)
         bare_returns = False
     layout = find_layout(path, head, budget, delimiter)
     names = list(layout.names)
-    preamble = read_preamble(layout.above, names)
+    first = next((line.text for line in head if line.number == layout.first_row), "")
+    preamble = read_preamble(layout.above, names, layout.dialect.split(first))
     units = {name: Stated(symbol, "the row of units") for name, symbol in layout.units.items()}
     if content is None and not layout.quoted and layout.dialect.delimiter != " ":
         layout = replace(layout, quoted=_holds_quotes(path, layout.first_row))
-    rows = _TextRows(path, layout, budget, bare_returns, content)
+    rows = _TextRows(path, layout, budget, bare_returns, content, above)
     return Sheet(
         path, names, rows.read, rows.counts, units | preamble.columns, preamble.rate,
-        doubts=lambda name: _doubts(name, layout),
+        doubts=lambda name: _doubts(name, layout), speed=preamble.speed, spring=preamble.spring,
     )  # fmt: skip
 
 
@@ -91,6 +106,7 @@ class _TextRows:
     budget: ReadingBudget
     bare_returns: bool
     content: str | None
+    above: int = 0
 
     def read(self, places: Sequence[int], missing: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
         """Columns of the whole rows; a note says once which lines are none."""
@@ -98,6 +114,9 @@ class _TextRows:
         notes = self._note_skipped(frame)
         rows = frame.filter("whole")
         return [self._column(rows, index, missing) for index in places], notes
+
+    def _place(self, row: int, line: int) -> str:
+        return f"row {row + 1} (line {line - self.above})"
 
     def _column(self, rows: polars.DataFrame, index: int, missing: Sequence[str]) -> Cells:
         first = self._first[index].strip() if index < len(self._first) else ""
@@ -116,7 +135,7 @@ class _TextRows:
         seconds = [lines.seconds_of_text(text) for text in cells]
         self.budget.take(0)
         row = seconds.index(None) if None in seconds else None
-        wrong = None if row is None else (_place(row, frame["line"][row]), str(cells[row]))
+        wrong = None if row is None else (self._place(row, frame["line"][row]), str(cells[row]))
         return Cells(np.array(seconds, float), wrong, clock=True)
 
     def _wrong(self, index: int, missing: Sequence[str]) -> tuple[str, str] | None:
@@ -126,7 +145,7 @@ class _TextRows:
         finite = self._number(cell).is_finite().fill_null(False)
         wrong = cell.is_not_null() & ~cell.str.to_lowercase().is_in(words) & ~finite
         rows = self._cells(index).with_row_index("row").filter(wrong).head(1)
-        return next(((_place(row, line), str(text)) for row, line, text in rows.rows()), None)
+        return next(((self._place(row, line), str(text)) for row, line, text in rows.rows()), None)
 
     def counts(self, index: int) -> Counts | None:
         """A column of whole numbers, exact; None if it holds others."""
@@ -139,10 +158,10 @@ class _TextRows:
             raise InputError(f"{self.path} holds a header and no rows; give a log with a row for each sample")
         if not len(lost):
             return []
-        first = lost[0]
+        first = lost[0] - self.above
         cells = len(self.layout.names)
         text = f"{len(lost)} lines are no rows of {cells} cells and are left out (the first is line {first})"
-        if len(lost) == 1 and first == frame["line"][-1]:
+        if len(lost) == 1 and lost[0] == frame["line"][-1]:
             text = f"the last line ({first}) is cut short and is left out"
         return [{"code": "lines-skipped", "text": text}]
 
@@ -273,21 +292,14 @@ class _TextRows:
 
     def _join_unquoted(self, texts: Iterable[str]) -> bytes:
         out = io.BytesIO()
-        for line in texts:
-            out.write(
-                _CELL_MARK.join(_cells(line.rstrip("\r\n"), self.layout.dialect)).encode(errors="replace")
-                + b"\n"
-            )
+        for line in lines.join_quoted(text.rstrip("\r\n") for text in texts):
+            out.write(_CELL_MARK.join(_cells(line, self.layout.dialect)).encode(errors="replace") + b"\n")
             self.budget.take(0)
         return out.getvalue()
 
 
 def _cell(index: int) -> polars.Expr:
     return polars.col("cells").struct.field(f"field_{index}").str.strip_chars()
-
-
-def _place(row: int, line: int) -> str:
-    return f"row {row + 1} (line {line})"
 
 
 def _cells(line: str, dialect: lines.Dialect) -> list[str]:

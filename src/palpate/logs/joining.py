@@ -1,0 +1,101 @@
+"""Two files of columns, joined by their times."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palpate.arrays import Array, Counts
+from palpate.errors import InputError
+from palpate.logs.columns import ColumnStatistics, read_columns
+from palpate.logs.proposal import clock_of, time_factor
+from palpate.logs.tables.sheet import Cells, Sheet, Stated
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A file of columns with its own time.
+
+    Args:
+        sheet: the file.
+        columns: of it, without that of the time.
+        clock: that of the time.
+        time: of each row [s], shape (n,).
+        rows: at which there is a time, in its order, shape (n,).
+    """
+
+    sheet: Sheet
+    columns: list[ColumnStatistics]
+    clock: ColumnStatistics
+    time: Array
+    rows: Counts
+
+
+def join_sheets(first: Sheet, second: Sheet) -> Sheet:
+    """The columns of two files over their common time, in the rows of the file that has more of them.
+
+    A reading of the other file stands in the nearest row, interpolated to that row's time, so that it counts once; the
+    rows between hold none. A name that both have is that of the first; `FILE.NAME` is that of the second.
+
+    Raises:
+        InputError: a file has no column of the time, or the times do not overlap.
+    """
+    pair = (_timed(first), _timed(second))
+    begin = max(float(one.time[0]) for one in pair)
+    end = min(float(one.time[-1]) for one in pair)
+    if not begin < end:
+        spans = " and ".join(
+            f"{one.time[0]:.10g} to {one.time[-1]:.10g} s ({one.sheet.path})" for one in pair
+        )
+        raise InputError(f"the times of the two logs do not overlap: {spans}; give logs of one clock")
+    inside = [one.time[(one.time >= begin) & (one.time <= end)] for one in pair]
+    time = max(inside, key=len)
+    names = [pair[0].clock.name]
+    arrays = [time / time_factor(pair[0].clock)]
+    stated: dict[str, Stated] = {}
+    if pair[0].clock.name in first.stated and not pair[0].clock.clock:
+        stated[names[0]] = first.stated[names[0]]
+    for one in pair:
+        for column in one.columns:
+            name = f"{one.sheet.path.stem}.{column.name}" if column.name in names else column.name
+            names.append(name)
+            arrays.append(_at(time, one, column.values))
+            if column.unit:
+                where = one.sheet.stated[column.name].where
+                stated[name] = Stated(column.unit, where)
+
+    def read(places: Sequence[int], _: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
+        return [Cells(arrays[i].copy(), clock=i == 0 and pair[0].clock.clock) for i in places], []
+
+    spring = first.spring or second.spring
+    return Sheet(first.path, names, read, stated=stated, spring=spring)
+
+
+def _timed(sheet: Sheet) -> _Timed:
+    columns, _ = read_columns(sheet)
+    length = max((len(column.values) for column in columns), default=0)
+    rows = [column for column in columns if len(column.values) == length]
+    clock = clock_of(sheet, rows)
+    if clock is None:
+        raise InputError(f"{sheet.path} has no column of the time, by which two logs are joined; add one")
+    with_time = np.flatnonzero(np.isfinite(clock.values))
+    time = clock.values[with_time] * time_factor(clock)
+    fresh = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0)
+    others = [column for column in rows if column is not clock]
+    return _Timed(sheet, others, clock, time[fresh], with_time[fresh])
+
+
+def _at(time: Array, one: _Timed, column: Array) -> Array:
+    """A column in the rows of a time; NaN in rows between its readings."""
+    values = column[one.rows]
+    finite = np.isfinite(values)
+    at = np.full(len(time), np.nan)
+    if not finite.any():
+        return at
+    own = one.time[finite]
+    near = np.clip(np.searchsorted(time, own), 1, len(time) - 1)
+    near -= (own - time[near - 1]) < (time[near] - own)
+    near = np.unique(near[(own >= time[0]) & (own <= time[-1])])
+    at[near] = np.interp(time[near], own, values[finite])
+    return at
