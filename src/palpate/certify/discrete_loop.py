@@ -58,7 +58,7 @@ class AffineLoop(NamedTuple):
 
     Args:
         rows: next state from the state and, in the last column, from the reading of the force; shape (n, n + 1).
-        position: index of the measured position among the states.
+        position: index, among the states, of the position whose force is read.
     """
 
     rows: Any

@@ -59,11 +59,13 @@ class Timing(NamedTuple):
         rate: ticks a second.
         delay: from the command to the motion that it causes, with all that is late in the reading [s].
         interface: position or velocity, of the command.
+        sensor: the arm is where the last command was, and the force alone is late; for a position interface.
     """
 
     rate: float
     delay: float
     interface: str = "position"
+    sensor: bool = False
 
     def later(self) -> Timing:
         """The same with a delay longer by one tick."""
@@ -196,4 +198,5 @@ def _signals(law_states: int, timing: Timing) -> tuple[list[Any], ArmSignals, An
     n = law_states + whole + 1 + integrator
     rows = [np.array([Fraction(int(i == j)) for j in range(n + 1)]) for i in range(n + 1)]
     commands = rows[law_states : law_states + whole + 1]
-    return rows[:law_states], ArmSignals(rows[n - 1], commands), rows[n]
+    position = commands[0] if timing.sensor else rows[n - 1]
+    return rows[:law_states], ArmSignals(position, commands), rows[n]
