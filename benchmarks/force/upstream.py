@@ -13,7 +13,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-
 from upstream_judge import ADMITTANCE, FZI, commit, compile_judge
 
 from palpate.certify.controller_answer import ControllerRequest, certify_controller
@@ -53,7 +52,8 @@ def fzi_file(rng):
     springs = ", ".join(f"trans_{axis}: {stiffness}" for axis in "xyz")
     text = (
         f"controller_manager: {{ros__parameters: {{update_rate: {bench[0]}}}}}\n"
-        f"a: {{ros__parameters: {{ft_sensor_ref_link: s, command_interfaces: [{'velocity' if velocity else 'position'}], "
+        f"a: {{ros__parameters: {{ft_sensor_ref_link: s, "
+        f"command_interfaces: [{'velocity' if velocity else 'position'}], "
         f"solver: {{error_scale: {scale}, iterations: {iterations}}}, pd_gains: {{{gains}}}"
         + (f", stiffness: {{{springs}}}" if compliance else "")
         + "}}\n"
@@ -99,7 +99,9 @@ def compare(judge, kind, text, bench, numbers, rng, tally):
         for K in (*inside, proved[1]):
             for more in (0.0, 1.0 / bench[0]):
                 tally.runs += 1
-                tally.falsified += judge.ask(("grows", K, 3 * TICKS), (bench[0], bench[1] + more, *bench[2:]), numbers)
+                tally.falsified += judge.ask(
+                    ("grows", K, 3 * TICKS), (bench[0], bench[1] + more, *bench[2:]), numbers
+                )
     return edge, first
 
 
@@ -120,12 +122,16 @@ def correct(judge, kind, text, bench, numbers, rng, tally):
         numbers = [new["mass"], new["stiffness"], new["damping_ratio"], *numbers[3:]]
     stiffness = np.exp(rng.uniform(*np.log(surfaces), 3))
     tally.diverged += any(judge.ask(("grows", K, TICKS), bench, numbers) for K in (*surfaces, *stiffness))
-    tally.overshot += any(judge.ask(("overshoot", K, 5 * TICKS), bench, numbers) > 0.1 for K in (*surfaces, *stiffness))
+    tally.overshot += any(
+        judge.ask(("overshoot", K, 5 * TICKS), bench, numbers) > 0.1 for K in (*surfaces, *stiffness)
+    )
 
 
 def main():
     """Compare and print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("controller", choices=KINDS)
     parser.add_argument("--source", type=Path)
     parser.add_argument("--root", action="append", default=[])
@@ -149,7 +155,8 @@ def main():
     errors = np.array(tally.errors)
     print(f"{options.controller}, upstream's commit {commit(options.source)}, {options.files} random files")
     print(
-        f"  edges: {np.mean(errors <= 0.02):.1%} within 2 %, median {np.median(errors):.2%}, largest {errors.max():.2%}; "
+        f"  edges: {np.mean(errors <= 0.02):.1%} within 2 %, median {np.median(errors):.2%}, largest "
+        f"{errors.max():.2%}; "
         f"{np.mean(errors == 0):.1%} agree that every or no surface from {LOW:g} N/m to {HIGH:g} N/m is stable"
     )
     print(f"  proofs: {tally.proofs}, {tally.runs} runs of upstream inside them, {tally.falsified:.0f} grow")

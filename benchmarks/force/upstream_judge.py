@@ -4,6 +4,8 @@ The sources of ROS that they include are replaced by the stubs in `upstream/`; e
 becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real ones.
 """
 
+# ruff: noqa: S603, S607 -- it starts the compiler, and what that has made
+
 import subprocess
 import tempfile
 from pathlib import Path
@@ -20,17 +22,22 @@ ADMITTANCE = {
         kinematics_interface/kinematics_interface.hpp pluginlib/class_loader.hpp control_toolbox/filters.hpp
         trajectory_msgs/msg/joint_trajectory_point.hpp tf2_eigen/tf2_eigen.hpp rclcpp/duration.hpp""",
 }
+BASE = (
+    "ForwardDynamicsSolver",
+    "IKSolver",
+    "PDController",
+    "SpatialPDController",
+    "cartesian_controller_base",
+)
+PACKAGES = ("cartesian_force_controller", "cartesian_motion_controller", "cartesian_compliance_controller")
 FZI = {
     "main": "fzi.cpp",
     "stubs": "fzi_stubs.hpp",
-    "folders": [f"cartesian_{name}/include" for name in ("controller_base", "force_controller", "motion_controller",
-                                                          "compliance_controller")],  # fmt: skip
+    "folders": [f"{name}/include" for name in ("cartesian_controller_base", *PACKAGES)],
     "sources": [
-        *(f"cartesian_controller_base/src/{name}.cpp" for name in ("ForwardDynamicsSolver", "IKSolver", "PDController",
-          "SpatialPDController", "cartesian_controller_base")),
-        *(f"cartesian_{name}_controller/src/cartesian_{name}_controller.cpp" for name in ("force", "motion",
-          "compliance")),
-    ],  # fmt: skip
+        *(f"cartesian_controller_base/src/{name}.cpp" for name in BASE),
+        *(f"{name}/src/{name}.cpp" for name in PACKAGES),
+    ],
     "libraries": ["-lorocos-kdl"],
     "replaced": """rclcpp/rclcpp.hpp rclcpp/node.hpp rclcpp/clock.hpp rclcpp/duration.hpp
         rclcpp_lifecycle/lifecycle_node.hpp rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp
@@ -47,7 +54,9 @@ FZI = {
 
 def commit(checkout):
     """Commit of a checkout of upstream."""
-    ran = subprocess.run(["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
+    ran = subprocess.run(
+        ["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, check=True
+    )
     return ran.stdout.strip()
 
 
@@ -65,7 +74,9 @@ def compile_judge(kind, checkout, roots):
         (folder / name).write_text(f'#include "{kind["stubs"]}"\n')
     includes = [folder, HERE, *(Path(checkout) / name for name in kind["folders"])]
     includes += [Path(root) / name for root in roots for name in ("include/eigen3", "include")]
-    libraries = [path for root in roots for path in Path(root).glob("lib/*/") if list(path.glob("liborocos-kdl.so"))]
+    libraries = [
+        path for root in roots for path in Path(root).glob("lib/*/") if list(path.glob("liborocos-kdl.so"))
+    ]
     command = ["g++", "-O2", "-std=c++17", *(f"-I{path}" for path in includes), HERE / kind["main"]]
     command += [Path(checkout) / name for name in kind["sources"]]
     command += [f"-{flag}{path}" for path in libraries for flag in ("L", "Wl,-rpath,")]

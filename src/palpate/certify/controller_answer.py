@@ -5,7 +5,7 @@ The model is one axis on a spring without damping; `NOT_MODELLED` is said in the
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from palpate.certify import controller_file as files
@@ -116,7 +116,8 @@ def certify_controller(path: Path, request: ControllerRequest) -> ControllerVerd
     headline = ranges[0] if ranges else None
     holds = _covers(proved, request.surfaces)
     stable = _covers(ranges, request.surfaces)
-    corrected, text, why = None, None, "no surfaces are asked for (--stiffness LOW:HIGH)"
+    corrected, text = None, None
+    why: str | None = "no surfaces are asked for (--stiffness LOW:HIGH)"
     if request.surfaces is not None:
         why = "the loop is stable on the surfaces asked for"
         if not (holds or (stable and request.controller in ("crisp", "franka"))):
@@ -198,6 +199,8 @@ def node_laws(
         raise InputError(f"{node.where}: the file does not say it; give {' and '.join(missing)}")
     assert rate is not None
     assert request.delay is not None
+    if request.mass is not None and request.mass <= 0.0:
+        raise InputError(f"--mass must be above 0 kg, got {request.mass:g}")
     if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= request.delay * rate <= MAX_DELAY_TICKS:
         raise InputError(
             f"{node.where}: a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are "
@@ -229,7 +232,7 @@ def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerR
         "interface": timing.interface,
         "axes": axes,
         "left_out": node.defaults,
-        "notes": _notes(node, request.controller),
+        "notes": _notes(node, file, request),
     }
     if request.controller == "fzi" and timing.interface == "position" and timing.delay * timing.rate >= 1.0:
         sensor = timing._replace(sensor=True)
@@ -240,8 +243,10 @@ def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerR
     return result
 
 
-def _notes(node: ControllerNode, controller: str) -> list[str]:
-    notes = []
+def _notes(node: ControllerNode, file: ControllerFile, request: ControllerRequest) -> list[str]:
+    notes, controller = [], request.controller
+    if request.rate is not None and files.node_rate(node, file.rate) not in (None, request.rate):
+        notes.append(f"--rate {request.rate:g} replaces the update_rate of the file")
     if controller in ("ros2-admittance", "fzi"):
         kinds = node.entries.get("command_interfaces", ())
         if isinstance(kinds, list) and len(kinds) > 1:
@@ -255,7 +260,7 @@ def _notes(node: ControllerNode, controller: str) -> list[str]:
             notes.append("use_friction: its torque is taken to cancel the joints' friction")
         if (
             node.entries.get("nullspace.damping", -1.0) == -1.0
-            and not node.entries.get("nullspace.projector_type") == "none"
+            and node.entries.get("nullspace.projector_type") != "none"
         ):
             notes.append(
                 "the source takes the null space's damping -1 as it stands: a seventh joint is driven, not damped"
@@ -263,7 +268,7 @@ def _notes(node: ControllerNode, controller: str) -> list[str]:
     return notes
 
 
-@cache
+@lru_cache(256)
 def judge_law(law: Law, timing: Timing, soft: float | None = None) -> LawVerdict:
     """Where a law is stable on springs.
 
@@ -273,51 +278,46 @@ def judge_law(law: Law, timing: Timing, soft: float | None = None) -> LawVerdict
         soft: softest surface of the proof [N/m]; None for a thousandth of the edge.
     """
     loop = law.loop(timing)
-    if (
-        isinstance(law, ForwardDynamics)
-        and timing.interface == "position"
-        and not timing.sensor
-        and timing.delay
-    ):
-        ring = (
-            "behind a position interface the solver starts at the measured position, so that a motion which is late by "
-            "n ticks repeats every n ticks"
-        )
-    else:
-        ring = ""
-    if runs_away_in_free_motion(loop):
-        return LawVerdict((), None, "; ".join(filter(None, (_runaway(law, timing), ring))))
-    ranges = stable_ranges(loop)
+    ranges = () if runs_away_in_free_motion(loop) else tuple(stable_ranges(loop))
     if not ranges:
-        return LawVerdict(
-            (), None, "; ".join(filter(None, ("unstable on every surface that was scanned", ring)))
-        )
+        return LawVerdict((), None, _unstable(law, timing))
     if not isinstance(loop, AffineLoop):
-        return LawVerdict(
-            tuple(ranges), None, "the arm swings between ticks: eigenvalues alone, nothing is proved"
-        )
+        return LawVerdict(ranges, None, "the arm swings between ticks: eigenvalues alone, nothing is proved")
     later = law.loop(timing.later())
     assert isinstance(later, AffineLoop)
     if len(later.rows) > MAX_PROVED_STATES:
-        return LawVerdict(tuple(ranges), None, f"more than {MAX_PROVED_STATES} states: eigenvalues alone")
-    both = _common([ranges, stable_ranges(later)])
+        return LawVerdict(ranges, None, f"more than {MAX_PROVED_STATES} states: eigenvalues alone")
+    both = _common([list(ranges), stable_ranges(later)])
     if not both or runs_away_in_free_motion(later):
-        return LawVerdict(tuple(ranges), None, "unstable with one tick more of delay: nothing is proved")
+        return LawVerdict(ranges, None, "unstable with one tick more of delay: nothing is proved")
     low, high = both[0]
     high *= 1.0 if high == SCANNED_STIFFNESS[1] else PROVED_FRACTION
     wanted = high * PROVED_SPAN if soft is None else min(soft, high * PROVED_SPAN)
     low = max(wanted, low if low == SCANNED_STIFFNESS[0] else low / PROVED_FRACTION)
     proved = prove([loop, later], low, high) if low < high else None
-    return LawVerdict(tuple(ranges), proved, "" if proved else "no proof was found")
+    return LawVerdict(ranges, proved, "" if proved else "no proof was found")
 
 
-def _runaway(law: Law, timing: Timing) -> str:
+def _unstable(law: Law, timing: Timing) -> str:
+    """Why a law is stable on no surface."""
     if isinstance(law, Admittance):
+        decay = law.decay(timing.rate)
+        if decay >= 2.0:
+            return f"in free motion it runs away: (D/M + joint_damping)/update_rate must be below 2 and is {decay:.3g}"
+        if decay <= 0.0:
+            return "nothing damps it: D/M + joint_damping is not above 0"
+        return "unstable in free motion or on every surface that was scanned: the delay is too long for its damping"
+    if (
+        isinstance(law, ForwardDynamics)
+        and timing.interface == "position"
+        and timing.delay
+        and not timing.sensor
+    ):
         return (
-            f"in free motion it runs away: (D/M + joint_damping)/update_rate is {law.decay(timing.rate):.3g} and must "
-            "stay below about 2"
+            "unstable: behind a position interface the solver starts at the measured position, so that a motion which "
+            "is late by n ticks repeats every n ticks"
         )
-    return "it runs away in free motion"
+    return "unstable in free motion or on every surface that was scanned"
 
 
 def _overshoot(law: Law | None, timing: Timing, surfaces: Range | None) -> float | None:

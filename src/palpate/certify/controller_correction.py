@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from io import StringIO
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from palpate.arrays import FloatArray
+    from palpate.arrays import Array
     from palpate.certify.controller_file import AxisLaw, ControllerFile, ControllerNode, Law
 
 MAX_OVERSHOOT = 0.08
@@ -22,14 +22,19 @@ MAX_OVERSHOOT = 0.08
 SURFACES_TRIED = 17
 SPARE = 1.3
 """Factor by which the stiffest surface of a correction is stiffer than asked for: room for one tick more of delay."""
-NO_SETTING = "no numbers were found that this rule can run at this rate with an overshoot of at most 10 % on those surfaces"
+NO_SETTING = (
+    "no numbers were found that this rule can run at this rate and that overshoot by at most 10 % there"
+)
+
+
+AnyLaw = TypeVar("AnyLaw", Admittance, Impedance)
 
 
 class CorrectionError(Exception):
     """No numbers were found; the text says why, in a sentence."""
 
 
-def surfaces_between(low: float, high: float) -> FloatArray:
+def surfaces_between(low: float, high: float) -> Array:
     """Stiffnesses at which a loop is tried, ends included [N/m]."""
     return np.geomspace(low, high, SURFACES_TRIED)
 
@@ -63,7 +68,9 @@ def correct_node(
     return _correct_impedance(node, laws, timing, surfaces, acceptable)
 
 
-def _first(candidates: Iterator[Law], timing: Timing, surfaces: tuple[float, float], reason: str) -> Law:
+def _first(
+    candidates: Iterator[AnyLaw], timing: Timing, surfaces: tuple[float, float], reason: str
+) -> AnyLaw:
     for law in candidates:
         if is_acceptable(law, timing, surfaces):
             return law
@@ -89,7 +96,6 @@ def _correct_admittance(
             "times the stiffness, which settles too slowly on the softest surface"
         )
         better = _first(_admittances(law, timing, surfaces), timing, surfaces, reason)
-        assert isinstance(better, Admittance)
         for name, values in lists.items():
             values[i] = getattr(better, name)
     return {f"admittance.{name}": values for name, values in lists.items()}
@@ -157,8 +163,7 @@ def _correct_impedance(
             near = law.damping * np.geomspace(1e-2, 1e3, 101) if law.damping else np.geomspace(1.0, 5e3, 101)
             near = near[np.argsort(abs(np.log(near / near[40])))]
             tried = (law._replace(damping=_rounded(d)) for d in near if d <= 5e3)
-            better = _first(iter(tried), timing, surfaces, reason)
-            changes[f"task.d_pos_{axis}"] = better.damping
+            changes[f"task.d_pos_{axis}"] = _first(iter(tried), timing, surfaces, reason).damping
     return changes
 
 
@@ -196,7 +201,7 @@ def dump(content: dict[str, Any]) -> str:
 
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
-    yaml.sort_base_mapping_type_on_output = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     stream = StringIO()
     yaml.dump(content, stream)
     return stream.getvalue()

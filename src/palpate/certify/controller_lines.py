@@ -20,8 +20,7 @@ def answer_lines(answer: dict[str, Any], written: Path | None) -> list[str]:
     """
     source = answer["source"]
     lines = [
-        f"{answer['controller']}, modelled from {source['file']} of {source['repository']} at commit "
-        f"{source['commit'][:12]}.",
+        f"{answer['controller']}, modelled from {source['file']} of {source['repository']}, {source['commit'][:12]}.",
         _claim(answer),
         *(line for node in answer["controllers"] for line in _node_lines(node)),
     ]

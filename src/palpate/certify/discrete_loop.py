@@ -17,7 +17,7 @@ from palpate.certify.force_certificate import Ball, is_positive, symmetric
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from palpate.arrays import FloatArray
+    from palpate.arrays import Array
 
 SCANNED_STIFFNESS = (1.0, 1e7)
 """Stiffnesses that are scanned [N/m]: from far softer than skin to stiffer than any arm's own structure."""
@@ -39,16 +39,16 @@ MAX_STEP_TICKS = 60_000
 class Loop(Protocol):
     """One axis in contact with a spring, as a linear system of one tick."""
 
-    def matrices(self, stiffness: FloatArray) -> FloatArray:
+    def matrices(self, stiffness: Array) -> Array:
         """A(K) for each stiffness [N/m]; shape (m, n, n)."""
         ...
 
-    def inputs(self, stiffness: FloatArray) -> FloatArray:
+    def inputs(self, stiffness: Array) -> Array:
         """Change of the state by one newton of commanded force, for each stiffness; shape (m, n)."""
         ...
 
     @property
-    def position_row(self) -> FloatArray:
+    def position_row(self) -> Array:
         """Row that gives the tip's position [m] from the state; shape (n,)."""
         ...
 
@@ -64,19 +64,19 @@ class AffineLoop(NamedTuple):
     rows: Any
     position: int
 
-    def matrices(self, stiffness: FloatArray) -> FloatArray:
+    def matrices(self, stiffness: Array) -> Array:
         """A(K) for each stiffness [N/m]; shape (m, n, n)."""
         rows = self.rows.astype(float)
         A = np.repeat(rows[None, :, :-1], len(stiffness), axis=0)
         A[:, :, self.position] -= np.asarray(stiffness)[:, None] * rows[:, -1]
         return A
 
-    def inputs(self, stiffness: FloatArray) -> FloatArray:
+    def inputs(self, stiffness: Array) -> Array:
         """Change of the state by one newton of commanded force, for each stiffness; shape (m, n)."""
         return np.repeat(self.rows[None, :, -1].astype(float), len(stiffness), axis=0)
 
     @property
-    def position_row(self) -> FloatArray:
+    def position_row(self) -> Array:
         """Row that gives the tip's position [m] from the state; shape (n,)."""
         return np.eye(len(self.rows))[self.position]
 
@@ -106,20 +106,20 @@ class TorqueLoop(NamedTuple):
     whole: int
     part: float
 
-    def matrices(self, stiffness: FloatArray) -> FloatArray:
+    def matrices(self, stiffness: Array) -> Array:
         """A(K) for each stiffness [N/m]; shape (m, n, n)."""
         return self._system(stiffness)[..., :-1]
 
-    def inputs(self, stiffness: FloatArray) -> FloatArray:
+    def inputs(self, stiffness: Array) -> Array:
         """Change of the state by one newton of commanded force, for each stiffness; shape (m, n)."""
         return self._system(stiffness)[..., -1]
 
     @property
-    def position_row(self) -> FloatArray:
+    def position_row(self) -> Array:
         """Row that gives the tip's position [m] from the state; shape (n,)."""
         return np.eye(self.whole + 3)[0]
 
-    def _system(self, stiffness: FloatArray) -> FloatArray:
+    def _system(self, stiffness: Array) -> Array:
         n = self.whole + 3
         signals = np.eye(n, n + 1)
         command = -self.feedback[0] * signals[0] - self.feedback[1] * signals[1]
@@ -136,7 +136,7 @@ class TorqueLoop(NamedTuple):
         system[:, 2:] = np.array(commands[:-1])
         return system
 
-    def _oscillation(self, stiffness: FloatArray, time: float) -> tuple[FloatArray, FloatArray]:
+    def _oscillation(self, stiffness: Array, time: float) -> tuple[Array, Array]:
         """Position and velocity after a time from those before it, and from a constant force of one newton."""
         omega = np.sqrt(np.maximum(stiffness, 1e-9) / self.mass)
         cosine, sine = np.cos(omega * time), np.sin(omega * time)
@@ -152,7 +152,7 @@ def split_delay(delay: float, rate: float) -> tuple[int, Fraction]:
     return whole, Fraction(max(0.0, ticks - whole)) if ticks - whole > 1e-9 else Fraction(0)
 
 
-def growth(loop: Loop, stiffness: FloatArray) -> FloatArray:
+def growth(loop: Loop, stiffness: Array) -> Array:
     """Largest magnitude of the eigenvalues of A(K), for each stiffness [N/m]."""
     parts = np.array_split(stiffness, max(1, len(stiffness) // 64))
     return np.concatenate([abs(np.linalg.eigvals(loop.matrices(part))).max(axis=1) for part in parts])
@@ -243,15 +243,15 @@ def _shrinks(P: Ball, loop: AffineLoop, stiffness: Fraction, factors: list[Fract
     return is_positive(Ball(P.middle - after.middle, P.error + after.error))
 
 
-def _balance(A: FloatArray) -> FloatArray:
+def _balance(A: Array) -> Array:
     """Powers of two that bring rows and columns of a matrix to like size; shape (n,)."""
     from scipy.linalg import matrix_balance
 
-    scale: FloatArray = np.diag(matrix_balance(A, permute=False)[1])
+    scale: Array = np.diag(matrix_balance(A, permute=False)[1])
     return scale
 
 
-def _norm(A: FloatArray, column: FloatArray, position: int) -> FloatArray | None:
+def _norm(A: Array, column: Array, position: int) -> Array | None:
     """P that shrinks by A + s column e^T for every |s| <= 1 (bounded real lemma), e of the position; None without.
 
     Args:
@@ -264,14 +264,14 @@ def _norm(A: FloatArray, column: FloatArray, position: int) -> FloatArray | None
     Q = STRICTNESS * np.eye(len(A))
     Q[position, position] += 1.0
     try:
-        P: FloatArray = solve_discrete_are(A, column[:, None], Q, -np.eye(1))
+        P: Array = solve_discrete_are(A, column[:, None], Q, -np.eye(1))
     except (np.linalg.LinAlgError, ValueError):
         return None
     P = 0.5 * (P + P.T)
     return P / abs(P).max() if np.isfinite(P).all() else None
 
 
-def overshoot(loop: Loop, stiffness: Iterable[float]) -> FloatArray:
+def overshoot(loop: Loop, stiffness: Iterable[float]) -> Array:
     """Overshoot of the contact force after a step of the commanded force, relative to its final value; shape (m,).
 
     Infinite where the loop is unstable, or not settled after `MAX_STEP_TICKS`.
