@@ -71,6 +71,17 @@ class Tally:
         self.errors, self.proofs, self.falsified, self.runs = [], 0, 0, 0
         self.corrected, self.diverged, self.overshot, self.uncorrected = 0, 0, 0, 0
 
+    def summary(self):
+        """Three lines of figures."""
+        errors = np.array(self.errors)
+        return (
+            f"  edges: {np.mean(errors <= 0.02):.1%} within 2 %, median {np.median(errors):.2%}, largest "
+            f"{errors.max():.2%}; of them {np.mean(errors == 0):.1%} without an edge from {LOW:g} to {HIGH:g} N/m\n"
+            f"  proofs: {self.proofs}, {self.runs} runs of upstream inside them, {self.falsified:.0f} grow\n"
+            f"  corrected: {self.corrected} files, of which {self.diverged} diverge and {self.overshot} overshoot by "
+            f"more than 10 %; not corrected: {self.uncorrected}"
+        )
+
 
 def answer(text, kind, bench, surfaces=None):
     """palpate's answer about a text, and the text of its correction."""
@@ -152,19 +163,10 @@ def main():
             print(f"  file {i}: upstream {edge:.6g}, palpate {first:.6g} N/m; {bench} {numbers}")
         if i < options.corrections:
             correct(judge, options.controller, text, bench, numbers, rng, tally)
-    errors = np.array(tally.errors)
-    print(f"{options.controller}, upstream's commit {commit(options.source)}, {options.files} random files")
-    print(
-        f"  edges: {np.mean(errors <= 0.02):.1%} within 2 %, median {np.median(errors):.2%}, largest "
-        f"{errors.max():.2%}; "
-        f"{np.mean(errors == 0):.1%} agree that every or no surface from {LOW:g} N/m to {HIGH:g} N/m is stable"
-    )
-    print(f"  proofs: {tally.proofs}, {tally.runs} runs of upstream inside them, {tally.falsified:.0f} grow")
-    print(
-        f"  of {options.corrections} files: {tally.corrected} corrected, of which {tally.diverged} diverge and "
-        f"{tally.overshot} overshoot by more than 10 %; {tally.uncorrected} unstable ones not corrected"
-    )
-    return 1 if tally.falsified or tally.diverged or errors.max() > 0.02 else 0
+        if (i + 1) % 100 == 0 or i + 1 == options.files:
+            print(f"{options.controller}, upstream's commit {commit(options.source)}, {i + 1} random files")
+            print(tally.summary(), flush=True)
+    return 1 if tally.falsified or tally.diverged or max(tally.errors) > 0.02 else 0
 
 
 if __name__ == "__main__":

@@ -8,6 +8,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from palpate.certify import controller_file as files
 from palpate.certify.controller_correction import (
     CorrectionError,
@@ -223,7 +225,7 @@ def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerR
             "ranges": None if law is None else list(verdict.ranges),
             "proved": verdict.proved,
             "reason": "; ".join(filter(None, (reason, verdict.reason))),
-            "overshoot": _overshoot(law, timing, request.surfaces),
+            "overshoot": _overshoot(law, timing, request.surfaces, stable=bool(verdict.ranges)),
         }
     result: dict[str, Any] = {
         "node": node.name,
@@ -278,6 +280,10 @@ def judge_law(law: Law, timing: Timing, soft: float | None = None) -> LawVerdict
         soft: softest surface of the proof [N/m]; None for a thousandth of the edge.
     """
     loop = law.loop(timing)
+    try:
+        loop.matrices(np.array([SCANNED_STIFFNESS[1]]))
+    except OverflowError:
+        return LawVerdict((), None, "its numbers grow beyond all bounds within a tick")
     ranges = () if runs_away_in_free_motion(loop) else tuple(stable_ranges(loop))
     if not ranges:
         return LawVerdict((), None, _unstable(law, timing))
@@ -320,8 +326,8 @@ def _unstable(law: Law, timing: Timing) -> str:
     return "unstable in free motion or on every surface that was scanned"
 
 
-def _overshoot(law: Law | None, timing: Timing, surfaces: Range | None) -> float | None:
-    if law is None or surfaces is None:
+def _overshoot(law: Law | None, timing: Timing, surfaces: Range | None, *, stable: bool) -> float | None:
+    if law is None or surfaces is None or not stable:
         return None
     largest = float(overshoot(law.loop(timing), surfaces_between(*surfaces)).max())
     return largest if largest < float("inf") else None
@@ -362,7 +368,9 @@ def _correct(file: ControllerFile, request: ControllerRequest, path: Path) -> tu
         for entry, value in correct_node(node, laws, timing, request.surfaces).items():
             changes[*node.place, *entry.split(".")] = value
     text = dump(with_changes(file, changes))
-    again = files.find_controllers(parse_yaml(text, str(path)), str(path), request.controller)
+    again, _ = _with_force(
+        files.find_controllers(parse_yaml(text, str(path)), str(path), request.controller), request
+    )
     for node in again.nodes:
         laws, timing = node_laws(node, again, request)
         for _, law, _ in laws:

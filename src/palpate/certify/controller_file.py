@@ -6,7 +6,7 @@ Parameter files of ROS 2 or ROS 1, nested or with dots. Names, defaults and limi
 
 from __future__ import annotations
 
-from math import isfinite
+from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance
@@ -115,7 +115,7 @@ class ControllerNode:
         return any(name == word or name.startswith(f"{word}.") for name in self.entries)
 
     def _checked(self, name: str, value: Any, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < inf:
             raise InputError(f"{self.where}: {name} must be a number, got {shown(value)}")
         if not low <= value <= high:
             raise InputError(

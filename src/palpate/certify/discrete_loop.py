@@ -29,6 +29,7 @@ MAX_STATES = 400
 PROVED_FRACTION = 0.99
 """Fraction of the edge up to which a proof is tried; nearer to the edge its cells become too many."""
 MAX_CELLS = 600
+BALANCING_ROUNDS = 10
 STRICTNESS = 1e-6
 """Decrease of the norm in the balanced states, beside that of the position: it pays for the rounding of floats."""
 MIN_CELL_RATIO, MAX_CELL_RATIO = 1.0002, 4.0
@@ -237,18 +238,25 @@ def _cell_shrinks(loop: AffineLoop, low: float, high: float) -> bool:
 
 def _shrinks(P: Ball, loop: AffineLoop, stiffness: Fraction, factors: list[Fraction]) -> bool:
     A = loop.exact_matrix(stiffness)
-    scaled = [[value * b / a for value, b in zip(row, factors, strict=True)]
+    scaled = [[value * b / a if value else value for value, b in zip(row, factors, strict=True)]
               for row, a in zip(A, factors, strict=True)]  # fmt: skip
     after = symmetric(P, Ball.of(scaled))
     return is_positive(Ball(P.middle - after.middle, P.error + after.error))
 
 
 def _balance(A: Array) -> Array:
-    """Powers of two that bring rows and columns of a matrix to like size; shape (n,)."""
-    from scipy.linalg import matrix_balance
-
-    scale: Array = np.diag(matrix_balance(A, permute=False)[1])
-    return scale
+    """Powers of two that bring rows and columns of a matrix to like size (Osborne's iteration); shape (n,)."""
+    size = abs(A) * (1.0 - np.eye(len(A)))
+    exponents = np.zeros(len(A))
+    for i in [*range(len(A))] * BALANCING_ROUNDS:
+        row, column = size[i].sum(), size[:, i].sum()
+        if row > 0.0 and column > 0.0:
+            step = np.round(0.5 * (np.log2(row) - np.log2(column)))
+            step = np.clip(exponents[i] + step, -100.0, 100.0) - exponents[i]
+            exponents[i] += step
+            size[i] *= 2.0**-step
+            size[:, i] *= 2.0**step
+    return 2.0**exponents
 
 
 def _norm(A: Array, column: Array, position: int) -> Array | None:
