@@ -74,7 +74,9 @@ def test_the_answer_is_of_the_worst_axis():
 def test_numbers_that_run_away_are_said_and_not_proved():
     result = certify(ADMITTANCE.replace("2.8", "121.5"), "ros2-admittance").answer
     reason = result["controllers"][0]["axes"]["x"]["reason"]
-    assert "in free motion it runs away: (D/M + joint_damping)/update_rate must be below 2 and is 7.98" in reason
+    assert (
+        "in free motion it runs away: (D/M + joint_damping)/update_rate must be below 2 and is 7.98" in reason
+    )
     assert result["proved"]["stiffness"] is result["exact"]["stiffness"] is None
 
 
@@ -105,7 +107,9 @@ def test_an_axis_without_stiffness_is_corrected_with_one():
 def test_without_a_setting_a_sentence_says_why():
     verdict = certify(CRISP, "crisp", surfaces=(1e3, 1e7), rate=100.0, mass=3.0)
     assert verdict.corrected is None
-    assert "no numbers were found that this rule can run at this rate" in verdict.answer["not_corrected_because"]
+    assert (
+        "no numbers were found that this rule can run at this rate" in verdict.answer["not_corrected_because"]
+    )
 
 
 def test_a_torque_arm_is_not_called_proved():
@@ -122,7 +126,9 @@ def test_controllers_that_do_not_measure_the_force_are_passed_over():
     result = certify(FORCE, "fzi", delay=0.010).answer
     assert [node["node"] for node in result["controllers"]] == ["force"]
     assert len(result["passed_over"]) == 2
-    assert result["exact"]["stiffness"][1] == pytest.approx(23.9e3 / 2.0, rel=0.001), "error_scale is 1, not 0.5"
+    assert result["exact"]["stiffness"][1] == pytest.approx(23.9e3 / 2.0, rel=0.001), (
+        "error_scale is 1, not 0.5"
+    )
 
 
 def test_a_late_arm_behind_a_position_interface_is_told_from_a_late_force():

@@ -1,4 +1,4 @@
-"""One axis on a spring: edges that are known by hand, proofs, islands, overshoot, and the arm that swings between ticks."""
+"""One axis on a spring: edges that are known by hand, proofs, islands, overshoot, a torque arm between ticks."""
 
 from fractions import Fraction
 

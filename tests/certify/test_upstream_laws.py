@@ -1,5 +1,7 @@
 """Laws of other projects: edges derived by hand, known edges, and a step-by-step simulation of each tick."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -92,7 +94,7 @@ def simulate(tick, timing, stiffness, ticks):
     for k in range(ticks):
         if timing.interface == "velocity" and k:
             ends = np.unique([k - 1.0, k, *(np.arange(k - 2, k + 1) + late % 1.0).clip(k - 1, k)])
-            for begin, end in zip(ends, ends[1:], strict=False):
+            for begin, end in pairwise(ends):
                 given = int(np.floor(0.5 * (begin + end) - late))
                 x += (end - begin) * h * (commands[given][1] if 0 <= given < len(commands) else 0.0)
         elif timing.interface == "position":
