@@ -1,7 +1,7 @@
 """Upstream's own controllers, compiled as they are, on a spring with a delay; nothing here knows of palpate.
 
 The sources of ROS that they include are replaced by the stubs in `upstream/`; each include that the compiler asks for
-becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real ones.
+becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real ones. CRISP's is simulated.
 """
 
 # ruff: noqa: S603, S607 -- it starts the compiler, and what that has made
@@ -9,6 +9,8 @@ becomes a file that includes the stubs. Eigen and, for FZI, KDL are the real one
 import subprocess
 import tempfile
 from pathlib import Path
+
+import numpy as np
 
 HERE = Path(__file__).parent / "upstream"
 ADMITTANCE = {
@@ -106,3 +108,57 @@ class Judge:
         self._process.stdin.write(" ".join(map(str, words)) + "\n")
         self._process.stdin.flush()
         return float(self._process.stdout.readline())
+
+
+class ImpedanceSimulator:
+    """One axis of CRISP's impedance, read from its source, on an arm whose mass is moved in small steps.
+
+    Its C++ needs pinocchio and a robot's description. All stiffnesses of a task are simulated at once.
+    """
+
+    SUBSTEPS = 40
+
+    def ask(self, task, bench, numbers):
+        """Answer to one task, as that of a compiled judge; the delay must be a whole number of substeps.
+
+        Args:
+            task: `edge LOW HIGH TICKS` or `grows K TICKS`.
+            bench: rate [Hz], delay [s], and two unused flags.
+            numbers: stiffness, damping, mass, and 1 for an operational-space controller.
+        """
+        name, *ends, ticks = task
+        if name == "grows":
+            return float(self._grow(np.array(ends), ticks, bench, numbers)[0])
+        low, high = ends
+        for count in (200, 60):
+            grid = np.geomspace(low, high, count)
+            grows = self._grow(grid, ticks, bench, numbers)
+            if not grows.any():
+                return np.inf
+            first = int(np.argmax(grows))
+            if first == 0:
+                return low
+            low, high = grid[first - 1], grid[first]
+        return low
+
+    def _grow(self, stiffness, ticks, bench, numbers):
+        """True for each stiffness on which the second differences of the position grow."""
+        k, d, mass, operational = numbers
+        step = 1.0 / bench[0] / self.SUBSTEPS
+        late = round(bench[1] / step)
+        x, v = np.zeros_like(stiffness), np.full_like(stiffness, 1e-3)
+        given = [np.zeros_like(stiffness)] * (late // self.SUBSTEPS + 2)
+        first, second, peaks = x, x, np.zeros((2, len(stiffness)))
+        for tick in range(ticks):
+            given = [(mass if operational else 1.0) * (k * -x - d * v), *given[:-1]]
+            for i in range(self.SUBSTEPS):
+                force = given[(late - i + self.SUBSTEPS - 1) // self.SUBSTEPS]
+                v = v + 0.5 * step * (force - stiffness * x) / mass
+                x = x + step * v
+                v = v + 0.5 * step * (force - stiffness * x) / mass
+            if tick >= ticks // 2:
+                half = int(tick >= 3 * ticks // 4)
+                peaks[half] = np.maximum(peaks[half], abs(x - 2.0 * first + second))
+            first, second = x, first
+            x, v = (np.clip(value, -1e12, 1e12) for value in (x, v))
+        return (peaks[1] > peaks[0]) | (abs(x) > 1e9)

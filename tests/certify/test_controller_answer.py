@@ -160,8 +160,8 @@ def test_a_missing_or_impossible_number_is_asked_for(controller, text, numbers, 
 EXTREME = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e6, 1e12, -1.0, -1e12])
 
 
-@given(EXTREME, EXTREME, EXTREME, st.sampled_from([1, 2, 100]), st.sampled_from(["position", "velocity"]))
-@settings(max_examples=60, deadline=None)
+@given(EXTREME, EXTREME, EXTREME, st.sampled_from([1, 2, 20]), st.sampled_from(["position", "velocity"]))
+@settings(max_examples=20, deadline=None)
 def test_extreme_numbers_are_answered(p, d, stiffness, iterations, interface):
     verdict = judge_law(ForwardDynamics(p, d, stiffness, iterations), Timing(500.0, 0.004, interface))
     assert all(math.isfinite(end) for ends in verdict.ranges for end in ends)

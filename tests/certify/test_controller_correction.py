@@ -13,7 +13,7 @@ from palpate.certify.controller_correction import (
 )
 from palpate.certify.controller_file import AxisLaw, find_controllers
 from palpate.certify.discrete_loop import overshoot
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance, Timing
+from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance, Timing
 from palpate.files import parse_yaml
 
 NESTED = """\
@@ -78,7 +78,7 @@ def test_a_position_interface_that_repeats_its_motion_has_no_correction():
 
 def test_an_impedance_is_damped_more_for_a_stiff_surface():
     (node,) = find_controllers({"task.k_pos_x": 600.0}, "a", "crisp").nodes
-    law, timing, surfaces = Impedance(600.0, 20.0, 3.0), Timing(1000.0, 0.001, "torque"), (1e3, 2e4)
+    law, timing, surfaces = CartesianImpedance(600.0, 20.0, 3.0), Timing(1000.0, 0.001, "torque"), (1e3, 2e4)
     damping = correct_node(node, [AxisLaw("x", law)], timing, surfaces)["task.d_pos_x"]
     assert damping > 20.0
     assert overshoot(law._replace(damping=damping).loop(timing), surfaces_between(*surfaces)).max() < 0.1

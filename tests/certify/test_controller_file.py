@@ -17,7 +17,7 @@ from palpate.certify.controller_file import (
     node_rate,
     read_controllers,
 )
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance
+from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance
 from palpate.errors import InputError
 
 ADMITTANCE = """\
@@ -92,9 +92,9 @@ def test_flat_and_nested_files_of_an_impedance_are_alike(tmp_path):
     for text in (CRISP, nested):
         (node,) = read(tmp_path, text, "crisp").nodes
         x, y, z = crisp_axes(node, 3.0)
-        assert x.law == Impedance(400.0, 30.0, 3.0)
+        assert x.law == CartesianImpedance(400.0, 30.0, 3.0)
         assert y.law is None, "no stiffness makes no damping"
-        assert z.law == Impedance(500.0, 2.0 * 500.0**0.5, 3.0), "damping -1 is 2 sqrt(k)"
+        assert z.law == CartesianImpedance(500.0, 2.0 * 500.0**0.5, 3.0), "damping -1 is 2 sqrt(k)"
         assert node.unused == ["task.k_rot_x"]
 
 
@@ -106,7 +106,7 @@ def test_the_joints_of_an_impedance_without_weights_are_not_driven(tmp_path):
 
 def test_the_impedance_of_franka_is_damped_as_if_it_were_one_kilogram(tmp_path):
     (node,) = read(tmp_path, "translational_stiffness: 225.0\nnullspace_stiffness: 0.5\n", "franka").nodes
-    assert franka_axes(node, 4.0)[2].law == Impedance(225.0, 30.0, 4.0)
+    assert franka_axes(node, 4.0)[2].law == CartesianImpedance(225.0, 30.0, 4.0)
 
 
 def laws(controller):

@@ -3,6 +3,7 @@
 from palpate.certify.controller_lines import answer_lines, span
 
 AXIS = {"ranges": [(1.0, 2e3), (4e3, 1e7)], "proved": (2.0, 1.9e3), "reason": "", "overshoot": 0.31}
+STILL = {"ranges": None, "proved": None, "reason": "gain 0", "overshoot": None}
 ANSWER = {
     "controller": "fzi",
     "source": {"repository": "a/b", "commit": "0123456789abcdef", "file": "c.cpp"},
@@ -11,7 +12,7 @@ ANSWER = {
     "controllers": [
         {
             "node": "n", "rate_hz": 500.0, "delay_s": 0.01, "interface": "position",
-            "axes": {"x": AXIS, "y": AXIS, "z": AXIS | {"ranges": None, "proved": None, "reason": "gain 0", "overshoot": None}},
+            "axes": {"x": AXIS, "y": AXIS, "z": STILL},
             "left_out": {"solver.iterations": 1}, "notes": ["a note"],
             "if_only_the_force_is_late": {"exact": [], "proved": None},
         }
@@ -26,7 +27,8 @@ ANSWER = {
 def test_every_part_of_an_answer_is_said():
     text = "\n".join(answer_lines(ANSWER, None))
     for part in (
-        "c.cpp of a/b, 0123456789ab", "Proved stable in exact arithmetic on 2 N/m to 1.9 kN/m", "not modelled are six axes",
+        "c.cpp of a/b, 0123456789ab", "Proved stable in exact arithmetic on 2 N/m to 1.9 kN/m",
+        "not modelled are six axes",
         "  x, y: stable on 1 N/m to 2 kN/m and 4 kN/m to 10 MN/m; proved on 2 N/m to 1.9 kN/m; overshoot up to 31 %",
         "  z: gain 0", "only the force is late: stable on no surface", "solver.iterations 1", "Note: a note",
         "Passed over: m: no force", "Not used, of the file: n.a.(b, c)", "n.solver.error_scale 0.25 (--out FILE.yaml",

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from palpate.certify.discrete_loop import (
     AffineLoop,
-    TorqueLoop,
+    TorqueSpringLoop,
     growth,
     is_stable,
     overshoot,
@@ -71,7 +71,7 @@ def test_what_is_proved_is_stable_and_nothing_unstable_is_proved(seed):
 
 def test_every_island_of_stability_is_found():
     """A late torque damps the swing again where it is late by whole periods."""
-    loop = TorqueLoop((600.0, 60.0), 3.0, 1e-3, 10, 0.0)
+    loop = TorqueSpringLoop((600.0, 60.0), 3.0, 1e-3, 10, 0.0)
     ranges = stable_ranges(loop)
     assert len(ranges) == 4
     edges = [edge for ends in ranges for edge in ends if 1.0 < edge < 1e7]
@@ -85,7 +85,7 @@ def test_every_island_of_stability_is_found():
 @settings(max_examples=30)
 def test_a_torque_arm_moves_as_its_differential_equation(stiffness, mass, whole, part, seed):
     h = 1e-3
-    loop = TorqueLoop((500.0, 30.0), mass, h, whole, part)
+    loop = TorqueSpringLoop((500.0, 30.0), mass, h, whole, part)
     state = np.random.default_rng(seed).normal(size=whole + 3)
     (A,) = loop.matrices(np.array([stiffness]))
     forces = [-500.0 * state[0] - 30.0 * state[1], *state[2:]]
@@ -102,7 +102,7 @@ def test_a_torque_arm_moves_as_its_differential_equation(stiffness, mass, whole,
 def test_the_overshoot_of_a_second_order_loop_is_that_of_the_textbook():
     """A mass of 1 kg with a damper of 2 zeta sqrt(K), ticked fast: exp(-pi zeta / sqrt(1 - zeta^2))."""
     zeta, K = 0.3, 1e4
-    loop = TorqueLoop((0.0, 2.0 * zeta * 100.0), 1.0, 1e-5, 0, 0.0)
+    loop = TorqueSpringLoop((0.0, 2.0 * zeta * 100.0), 1.0, 1e-5, 0, 0.0)
     assert overshoot(loop, [K])[0] == pytest.approx(np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2)), abs=2e-3)
     assert overshoot(integrator(0.01, 500), [1e3, 1e5 * 1.01]).tolist() == [0.0, np.inf]
 

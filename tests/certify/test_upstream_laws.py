@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.certify.discrete_loop import growth, runs_away_in_free_motion, stable_ranges
-from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, Impedance, Timing
+from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, CartesianImpedance, Timing
 
 TEST_PARAMS = Admittance(5.5, 214.1, 2.828427, 5.0, 0.005)
 """The x axis of test_params.yaml of ros2_controllers."""
@@ -140,13 +140,13 @@ def test_an_impedance_is_stable_on_every_spring_without_delay_but_by_its_tick():
     """Half a tick late, and damped by d: stable while d > k h/2, on soft and on stiff springs."""
     stiff, h = 2000.0, 1e-3
     for damping, stable in ((0.9 * stiff * h / 2.0, False), (1.2 * stiff * h / 2.0, True)):
-        loop = Impedance(stiff, damping, 3.0).loop(Timing(1.0 / h, 0.0))
+        loop = CartesianImpedance(stiff, damping, 3.0).loop(Timing(1.0 / h, 0.0))
         assert (growth(loop, np.array([1e2, 1e4])) < 1.0).tolist() == [stable] * 2
 
 
 def test_an_operational_impedance_scales_with_the_mass():
-    one = Impedance(100.0, 10.0, 3.0, operational=True).loop(Timing(1000.0, 0.001))
-    same = Impedance(300.0, 30.0, 3.0).loop(Timing(1000.0, 0.001))
+    one = CartesianImpedance(100.0, 10.0, 3.0, operational=True).loop(Timing(1000.0, 0.001))
+    same = CartesianImpedance(300.0, 30.0, 3.0).loop(Timing(1000.0, 0.001))
     assert np.array_equal(one.matrices(np.array([500.0])), same.matrices(np.array([500.0])))
 
 

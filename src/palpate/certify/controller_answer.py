@@ -6,7 +6,7 @@ The model is one axis on a spring without damping; `NOT_MODELLED` is said in the
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,12 +24,13 @@ from palpate.certify.discrete_loop import (
     PROVED_FRACTION,
     SCANNED_STIFFNESS,
     AffineLoop,
+    SpringLoop,
     overshoot,
     prove,
     runs_away_in_free_motion,
     stable_ranges,
 )
-from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, Impedance, Timing
+from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, CartesianImpedance, Timing
 from palpate.errors import InputError
 from palpate.files import parse_yaml
 
@@ -53,6 +54,14 @@ NOT_MODELLED = {
     "change, friction, elastic joints",
 }
 Range = tuple[float, float]
+
+
+class OneAxisLaw(Protocol):
+    """A law that closes a loop of one axis; it can be hashed."""
+
+    def loop(self, timing: Timing) -> SpringLoop:
+        """One tick of the loop."""
+        ...
 
 
 class ControllerRequest(NamedTuple):
@@ -257,6 +266,9 @@ def _notes(node: ControllerNode, file: ControllerFile, request: ControllerReques
             notes.append(
                 "the source declares solver/forward_dynamics/link_mass, with slashes: the entry has no effect"
             )
+    whole = [name for name in node.used if name != "solver.iterations" and _has_integer(node.entries[name])]
+    if whole and controller != "franka":
+        notes.append(f"ROS 2 may refuse a number without a decimal point here: {files.named(sorted(whole))}")
     if controller == "crisp":
         if node.entries.get("use_friction") is True:
             notes.append("use_friction: its torque is taken to cancel the joints' friction")
@@ -270,8 +282,13 @@ def _notes(node: ControllerNode, file: ControllerFile, request: ControllerReques
     return notes
 
 
+def _has_integer(value: Any) -> bool:
+    values = value if isinstance(value, list) else [value]
+    return any(isinstance(v, int) and not isinstance(v, bool) for v in values)
+
+
 @lru_cache(256)
-def judge_law(law: Law, timing: Timing, soft: float | None = None) -> LawVerdict:
+def judge_law(law: OneAxisLaw, timing: Timing, soft: float | None = None) -> LawVerdict:
     """Where a law is stable on springs.
 
     Args:
@@ -304,7 +321,7 @@ def judge_law(law: Law, timing: Timing, soft: float | None = None) -> LawVerdict
     return LawVerdict(ranges, proved, "" if proved else "no proof was found")
 
 
-def _unstable(law: Law, timing: Timing) -> str:
+def _unstable(law: OneAxisLaw, timing: Timing) -> str:
     """Why a law is stable on no surface."""
     if isinstance(law, Admittance):
         decay = law.decay(timing.rate)
@@ -378,7 +395,7 @@ def _correct(file: ControllerFile, request: ControllerRequest, path: Path) -> tu
                 continue
             verdict = judge_law(law, timing, request.surfaces[0])
             proved = [verdict.proved] if verdict.proved else []
-            if isinstance(law, Impedance):
+            if isinstance(law, CartesianImpedance):
                 proved = list(verdict.ranges)
             if not _covers(proved, request.surfaces):
                 raise CorrectionError("the corrected numbers could not be proved when they were read back")

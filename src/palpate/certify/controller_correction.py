@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from palpate.certify.discrete_loop import overshoot, runs_away_in_free_motion
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance, Timing
+from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance, Timing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,7 +27,7 @@ NO_SETTING = (
 )
 
 
-AnyLaw = TypeVar("AnyLaw", Admittance, Impedance)
+AnyLaw = TypeVar("AnyLaw", Admittance, CartesianImpedance)
 
 
 class CorrectionError(Exception):
@@ -85,7 +85,8 @@ def _correct_admittance(
     acceptable: dict[str, bool],
 ) -> dict[str, Any]:
     lists = {
-        name: list(node.entries[f"admittance.{name}"]) for name in ("mass", "stiffness", "damping_ratio")
+        name: [float(value) for value in node.entries[f"admittance.{name}"]]
+        for name in ("mass", "stiffness", "damping_ratio")
     }
     for i, (axis, law, _) in enumerate(laws):
         if acceptable[axis]:
@@ -154,7 +155,7 @@ def _correct_impedance(
     for axis, law, _ in laws:
         if acceptable[axis]:
             continue
-        assert isinstance(law, Impedance)
+        assert isinstance(law, CartesianImpedance)
         if "translational_stiffness" in node.entries:
             tried = (law._replace(stiffness=k, damping=2.0 * sqrt(k)) for k in range(400, 0, -5))
             better = _first(iter(tried), timing, surfaces, reason)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, Impedance
+from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance
 from palpate.errors import InputError, unknown
 from palpate.files import read_yaml
 from palpate.text import printable
@@ -38,7 +38,7 @@ UNPUBLISHED = {
 }
 AXES = ("x", "y", "z")
 FRANKA_RATE = 1000.0
-Law = Admittance | ForwardDynamics | Impedance
+Law = Admittance | ForwardDynamics | CartesianImpedance
 
 
 class ControllerNode:
@@ -227,8 +227,8 @@ def node_rate(node: ControllerNode, shared: float | None) -> float | None:
     """
     if "update_rate" not in node.entries:
         return shared
-    own = node.number("update_rate", None, 0.0, MAX_RATE)
-    return own if own > 0.0 else shared
+    rate = node.number("update_rate", None, 0.0, MAX_RATE)
+    return rate if rate > 0.0 else shared
 
 
 def _is_rate(value: Any) -> bool:
@@ -236,7 +236,7 @@ def _is_rate(value: Any) -> bool:
 
 
 def node_interface(node: ControllerNode) -> str:
-    """What the controller commands; `position` where it commands position and velocity alike.
+    """Quantity that the controller commands; `position` where it commands position and velocity alike.
 
     Raises:
         InputError: neither a position nor a velocity.
@@ -327,7 +327,7 @@ def crisp_axes(node: ControllerNode, mass: float) -> list[AxisLaw]:
         k = node.number(f"task.k_pos_{axis}", 500.0, 0.0, 5000.0)
         d = node.number(f"task.d_pos_{axis}", -1.0, -1.0, 5000.0)
         d = d if d > 0.0 else 2.0 * k**0.5
-        law = Impedance(k, d, mass, operational) if k > 0.0 or d > 0.0 else None
+        law = CartesianImpedance(k, d, mass, operational) if k > 0.0 or d > 0.0 else None
         reason = "" if law else f"task.k_pos_{axis} 0 makes its damping 0 too: no torque acts along it"
         axes.append(AxisLaw(axis, law, reason))
     return axes
@@ -352,7 +352,7 @@ def franka_axes(node: ControllerNode, mass: float) -> list[AxisLaw]:
         InputError: an entry is out of range.
     """
     k = node.number("translational_stiffness", None, 0.0, 400.0)
-    law = Impedance(k, 2.0 * k**0.5, mass) if k > 0.0 else None
+    law = CartesianImpedance(k, 2.0 * k**0.5, mass) if k > 0.0 else None
     return [AxisLaw(axis, law, "" if law else "translational_stiffness 0: no torque acts") for axis in AXES]
 
 

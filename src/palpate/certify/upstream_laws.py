@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.certify.discrete_loop import AffineLoop, TorqueLoop, split_delay
+from palpate.certify.discrete_loop import AffineLoop, TorqueSpringLoop, split_delay
 
 FZI_STEP = Fraction(1, 50)
 """Simulated time of a solver's step [s], whatever the rate of the controller."""
@@ -20,7 +20,7 @@ FZI_KEPT = Fraction(9, 10)
 """Fraction of the solver's velocity that is kept from step to step."""
 
 
-class Source(NamedTuple):
+class LawSource(NamedTuple):
     """Place of a law: repository, commit, and file."""
 
     repository: str
@@ -29,22 +29,22 @@ class Source(NamedTuple):
 
 
 SOURCES = {
-    "ros2-admittance": Source(
+    "ros2-admittance": LawSource(
         "ros-controls/ros2_controllers",
         "94e74de35f9d04f313aca8f29df66c3a76004aa7",
         "admittance_controller/include/admittance_controller/admittance_rule_impl.hpp",
     ),
-    "fzi": Source(
+    "fzi": LawSource(
         "fzi-forschungszentrum-informatik/cartesian_controllers",
         "f53f798029ea5e05993e8a5d1736c713379af0e2",
         "cartesian_controller_base/src/ForwardDynamicsSolver.cpp",
     ),
-    "crisp": Source(
+    "crisp": LawSource(
         "utiasDSL/crisp_controllers",
         "809354897a2997530f10aa2516801180aee43dee",
         "src/cartesian_controller.cpp",
     ),
-    "franka": Source(
+    "franka": LawSource(
         "frankaemika/franka_ros",
         "c11f000c2737acc22ed8dfeff40555b2644a4294",
         "franka_example_controllers/src/cartesian_impedance_example_controller.cpp",
@@ -104,7 +104,7 @@ class Admittance(NamedTuple):
             Fraction, (self.mass, self.stiffness, self.damping, self.joint_damping, self.filter_coefficient)
         )
         h = 1 / Fraction(timing.rate)
-        (filtered, velocity), arm, force = _signals(2, timing)
+        (filtered, velocity), arm, force = law_signals(2, timing)
         filtered_next = (1 - alpha) * filtered + alpha * force
         acceleration = (filtered_next - D * velocity - S * arm.position) / M - d * velocity
         velocity_next = velocity + h * acceleration
@@ -133,7 +133,7 @@ class ForwardDynamics(NamedTuple):
         The first step compares with the pose at which the last tick ended; its virtual mass is 1 kg.
         """
         p, d, S = map(Fraction, (self.p, self.d, self.stiffness))
-        (velocity, last_error, pose), arm, force = _signals(3, timing)
+        (velocity, last_error, pose), arm, force = law_signals(3, timing)
         position = arm.position
         for _ in range(self.iterations):
             error = force - S * pose
@@ -145,7 +145,7 @@ class ForwardDynamics(NamedTuple):
         return arm.loop([velocity, last_error, pose], command, timing)
 
 
-class Impedance(NamedTuple):
+class CartesianImpedance(NamedTuple):
     """One axis of a Cartesian impedance, f = -k x - d v, of CRISP or Franka's example.
 
     Args:
@@ -160,12 +160,12 @@ class Impedance(NamedTuple):
     mass: float
     operational: bool = False
 
-    def loop(self, timing: Timing) -> TorqueLoop:
+    def loop(self, timing: Timing) -> TorqueSpringLoop:
         """One tick: the force of the newest commands that have arrived, held."""
         scale = self.mass if self.operational else 1.0
         whole, part = split_delay(timing.delay, timing.rate)
         feedback = (scale * self.stiffness, scale * self.damping)
-        return TorqueLoop(feedback, self.mass, 1.0 / timing.rate, whole, float(part))
+        return TorqueSpringLoop(feedback, self.mass, 1.0 / timing.rate, whole, float(part))
 
 
 class ArmSignals(NamedTuple):
@@ -191,7 +191,7 @@ class ArmSignals(NamedTuple):
         return AffineLoop(np.array(rows), len(rows) - 1)
 
 
-def _signals(law_states: int, timing: Timing) -> tuple[list[Any], ArmSignals, Any]:
+def law_signals(law_states: int, timing: Timing) -> tuple[list[Any], ArmSignals, Any]:
     """States of the law, the arm's signals, and the reading of the force, as rows of coefficients."""
     whole, _ = split_delay(timing.delay, timing.rate)
     integrator = timing.interface == "velocity"
