@@ -1,4 +1,4 @@
-"""`palpate certify`: where a tuned force loop is stable: the proof, and its check. Others' controllers are refused."""
+"""`palpate certify`: where a force loop is stable: a tuned one, with its proof, or another project's controller."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
 
 from palpate.cli.options.force import ColumnOptions, TuningOutputOptions, inner_loop
 from palpate.cli.options.values import FLAG, SIGNED, Mass, StiffnessRange, Time, TimeRange, options
@@ -73,17 +71,18 @@ class OthersOptions:
     """A controller of others, by its parameter file."""
 
     controller: str | None = None
-    """ros2-admittance, fzi, crisp, franka or ur: the file is its YAML file. None of them is modelled yet: the file is
-    refused, with each entry that decides the motion."""
-    delay: Annotated[Time | None, Parameter(show=False)] = None
-    mass: Annotated[Mass | None, Parameter(show=False)] = None
-    report: Annotated[Path | None, Parameter(show=False)] = None
+    """ros2-admittance, fzi, crisp, franka or ur: the file is its YAML file, with --stiffness of the surfaces that it
+    has to be stable on, and --rate where the file has no update_rate. With --out, a corrected file is written."""
+    delay: Time | None = None
+    """Everything that is late between a command and the force that it causes, such as 24:ms."""
+    mass: Mass | None = None
+    """Mass of the arm at its tip along the axis, for a controller that gives torques."""
 
     def check(self) -> None:
         """Refuse what belongs to --controller where no controller is named."""
-        for name in ("delay", "mass", "report"):
+        for name in ("delay", "mass"):
             if getattr(self, name) is not None:
-                raise InputError(f"--{name} is of --controller; palpate tune writes a page about gains")
+                raise InputError(f"--{name} is of --controller; the gains file of palpate tune has its own")
 
 
 def certify(
@@ -104,7 +103,7 @@ def certify(
 
     palpate certify force_loop/palpate_force.h --check certificate.json
 
-    palpate certify FILE.yaml --controller ros2-admittance
+    palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --stiffness 500:20000
 
     A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
     has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
@@ -123,14 +122,47 @@ def certify(
     if gains is None:
         raise InputError("nothing to certify; give the gains file of palpate tune, or --check CERTIFICATE")
     if foreign is not None and foreign.controller is not None:
-        from palpate.certify.controller_file import refuse_controller
-
-        refuse_controller(gains, foreign.controller)
+        return _judge_controller(gains, foreign, proof, columns or ColumnOptions(), output)
     if foreign is not None:
         foreign.check()
     output.check_new(output.out, ending=".json")
     proof.check()
     return _prove(gains, proof, columns or ColumnOptions(), output)
+
+
+def _judge_controller(
+    path: Path,
+    foreign: OthersOptions,
+    proof: ProofOptions,
+    columns: ColumnOptions,
+    output: TuningOutputOptions,
+) -> int:
+    from palpate.certify.controller_answer import ControllerRequest, certify_controller
+    from palpate.certify.controller_lines import answer_lines
+    from palpate.files import MADE, write_text
+    from palpate.report.page import Answer
+
+    output.check_new(output.out, ending=".yaml")
+    for name in ("damping_time", "loop_from"):
+        if getattr(proof, name) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} is of tuned gains; --controller takes springs and --delay"
+            )
+    request = ControllerRequest(
+        controller=str(foreign.controller),
+        delay=None if foreign.delay is None else foreign.delay.si,
+        rate=columns.rate,
+        mass=None if foreign.mass is None else foreign.mass.si,
+        surfaces=proof.surfaces,
+    )
+    verdict = certify_controller(path, request)
+    written = None
+    if output.out is not None and verdict.corrected is not None:
+        write_text(output.out, f"{MADE} certify.\n{verdict.corrected}")
+        written = output.out
+    lines = answer_lines(verdict.answer, written)
+    print_result(Answer(verdict.answer, show=lambda _: print_lines(*lines)), json=output.json)
+    return 0 if verdict.holds else 1
 
 
 def _prove(path: Path, proof: ProofOptions, columns: ColumnOptions, output: TuningOutputOptions) -> int:

@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from palpate.errors import InputError
-from palpate.files.reading import open_file, read_bytes, read_table, read_text, read_toml, read_yaml
+from palpate.files.reading import (
+    open_file,
+    parse_yaml,
+    read_bytes,
+    read_table,
+    read_text,
+    read_toml,
+    read_yaml,
+)
 from palpate.text import printable
 
 __all__ = [
@@ -27,6 +35,7 @@ __all__ = [
     "kept_folder",
     "open_file",
     "ours",
+    "parse_yaml",
     "read_bytes",
     "read_table",
     "read_text",

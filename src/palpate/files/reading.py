@@ -114,17 +114,31 @@ def read_yaml(path: Path, what: str = "a file") -> dict[str, Any]:
     Raises:
         InputError: it is no YAML with names at its top; the extra that reads it is missing.
     """
+    return parse_yaml(read_text(path, what), str(path), what)
+
+
+def parse_yaml(text: str, where: str, what: str = "a file") -> dict[str, Any]:
+    """The names of a YAML text.
+
+    Args:
+        text: the file's.
+        where: names it in errors.
+        what: it should be, for errors.
+
+    Raises:
+        InputError: it is no YAML with names at its top; the extra that reads it is missing.
+    """
     try:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import YAMLError
     except ImportError:
         raise InputError(f"{what} in YAML needs ruamel.yaml: {how_to_install('palpate[yaml]')}") from None
     try:
-        file = YAML(typ="safe", pure=True).load(read_text(path, what))
+        file = YAML(typ="safe", pure=True).load(text)
     except (YAMLError, ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no YAML file: {' '.join(str(error).split())}") from None
+        raise InputError(f"{where} is no YAML file: {' '.join(str(error).split())}") from None
     if not isinstance(file, dict):
-        raise InputError(f"{path} is no {what.removeprefix('a ')}: it has no names at its top")
+        raise InputError(f"{where} is no {what.removeprefix('a ')}: it has no names at its top")
     return file
 
 

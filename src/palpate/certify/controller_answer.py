@@ -1,0 +1,402 @@
+"""The surfaces on which another project's controller is stable: computed, proved, and corrected where asked for.
+
+The model is one axis on a spring without damping; `NOT_MODELLED` is said in the same sentence as each claim.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from palpate.certify import controller_file as files
+from palpate.certify.controller_correction import (
+    CorrectionError,
+    correct_node,
+    dump,
+    surfaces_between,
+    with_changes,
+)
+from palpate.certify.controller_file import AxisLaw, ControllerFile, ControllerNode, Law
+from palpate.certify.discrete_loop import (
+    POINTS_PER_DECADE,
+    PROVED_FRACTION,
+    SCANNED_STIFFNESS,
+    AffineLoop,
+    SpringLoop,
+    overshoot,
+    prove,
+    runs_away_in_free_motion,
+    stable_ranges,
+)
+from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, CartesianImpedance, Timing
+from palpate.errors import InputError
+from palpate.files import parse_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+MAX_PROVED_STATES = 90
+"""States of a loop that a proof takes in some minutes at most."""
+PROVED_SPAN = 1e-3
+"""Softest surface of a proof, as a fraction of the edge, unless a softer one is asked for."""
+MAX_DELAY_TICKS = 200
+NOT_MODELLED = {
+    "ros2-admittance": "the other five axes and their coupling, the kinematics with its alpha, joint limits, "
+    "saturation, the arm's servo beyond the delay",
+    "fzi": "the other five axes and their coupling, the kinematics with its virtual link masses (1 kg at the tip is "
+    "taken), joint limits, saturation, the arm's servo beyond the delay",
+    "crisp": "the other five axes and their coupling, the kinematics, the null space, error_clip, the limit "
+    "max_delta_tau of the torque's change, friction and its compensation, elastic joints",
+    "franka": "the other five axes and their coupling, the kinematics, the null space, the limit of the torque's "
+    "change, friction, elastic joints",
+}
+Range = tuple[float, float]
+
+
+class OneAxisLaw(Protocol):
+    """A law that closes a loop of one axis; it can be hashed."""
+
+    def loop(self, timing: Timing) -> SpringLoop:
+        """One tick of the loop."""
+        ...
+
+
+class ControllerRequest(NamedTuple):
+    """Numbers that the file does not hold.
+
+    Args:
+        controller: ros2-admittance, fzi, crisp or franka.
+        delay: from the command to the motion, with all that is late in the reading [s].
+        rate: ticks a second; None for the file's.
+        mass: of the arm at its tip [kg], for torque controllers.
+        surfaces: stiffnesses that the loop has to be stable on [N/m]; None for the answer alone.
+    """
+
+    controller: str
+    delay: float | None
+    rate: float | None = None
+    mass: float | None = None
+    surfaces: Range | None = None
+
+
+class LawVerdict(NamedTuple):
+    """Where one law is stable.
+
+    Args:
+        ranges: of stiffness [N/m], by eigenvalues.
+        proved: of stiffness [N/m], in exact arithmetic, for the delay and for one tick more; None without a proof.
+        reason: why there is no range or no proof; "" if nothing.
+    """
+
+    ranges: tuple[Range, ...]
+    proved: Range | None
+    reason: str = ""
+
+
+class ControllerVerdict(NamedTuple):
+    """Answer about a file.
+
+    Args:
+        answer: the object for a program, as docs/json.md has it.
+        corrected: text of the corrected file; None without one.
+        holds: the surfaces that are asked for are proved, or some without a request.
+    """
+
+    answer: dict[str, Any]
+    corrected: str | None
+    holds: bool
+
+
+def certify_controller(path: Path, request: ControllerRequest) -> ControllerVerdict:
+    """Judge a parameter file of another project's controller.
+
+    Raises:
+        InputError: no such file, entries that are not modelled, or a number that is missing.
+    """
+    file, passed = _with_force(files.read_controllers(path, request.controller), request)
+    nodes = [_judge_node(node, file, request) for node in file.nodes]
+    laws = [axis for node in nodes for axis in node["axes"].values() if axis["ranges"] is not None]
+    if not laws:
+        reasons = dict.fromkeys(axis["reason"] for node in nodes for axis in node["axes"].values())
+        raise InputError(f"{path}: no axis has a force loop: {'; '.join(reasons)}")
+    ranges = _common([axis["ranges"] for axis in laws])
+    proved = _common([[axis["proved"]] if axis["proved"] else [] for axis in laws])
+    headline = ranges[0] if ranges else None
+    holds = _covers(proved, request.surfaces)
+    stable = _covers(ranges, request.surfaces)
+    corrected, text = None, None
+    why: str | None = "no surfaces are asked for (--stiffness LOW:HIGH)"
+    if request.surfaces is not None:
+        why = "the loop is stable on the surfaces asked for"
+        if not (holds or (stable and request.controller in ("crisp", "franka"))):
+            try:
+                corrected, text = _correct(file, request, path)
+                why = None
+            except CorrectionError as error:
+                why = str(error)
+    answer = {
+        "controller": request.controller,
+        "source": SOURCES[request.controller]._asdict(),
+        "proved": {"stiffness": proved[0] if proved else None},
+        "exact": {"stiffness": headline, "ranges": ranges, "points_per_decade": POINTS_PER_DECADE},
+        "first_unstable": _first_unstable(headline),
+        "controllers": nodes,
+        "passed_over": passed,
+        "corrected": corrected,
+        "not_corrected_because": why,
+        "not_modelled": NOT_MODELLED[request.controller],
+        "unused": [
+            *(
+                f"{n['node']}.{u}".lstrip(".")
+                for n, node in zip(nodes, file.nodes, strict=True)
+                for u in node.unused
+            ),
+            *file.other,
+        ],
+    }
+    return ControllerVerdict(answer, text, holds)
+
+
+def _with_force(file: ControllerFile, request: ControllerRequest) -> tuple[ControllerFile, list[str]]:
+    """The file with the controllers that measure the force, and the names of the others.
+
+    Raises:
+        InputError: none does, an entry that is not modelled, or a number that is missing.
+    """
+    nodes, passed = [], []
+    for node in file.nodes:
+        try:
+            laws, _ = node_laws(node, file, request)
+        except files.NoForceError as error:
+            if len(file.nodes) == 1:
+                raise
+            passed.append(str(error))
+            continue
+        if any(law is not None for _, law, _ in laws) or len(file.nodes) == 1:
+            nodes.append(node)
+        else:
+            passed.append(f"{node.where}: {laws[0].reason}")
+    if not nodes:
+        raise InputError("; ".join(passed))
+    return file._replace(nodes=nodes), passed
+
+
+def node_laws(
+    node: ControllerNode, file: ControllerFile, request: ControllerRequest
+) -> tuple[list[AxisLaw], Timing]:
+    """Laws of a controller's axes, and when its commands act.
+
+    Raises:
+        InputError: an entry that is not modelled, or a number that is missing.
+    """
+    controller = request.controller
+    rate = files.node_rate(node, file.rate)
+    if request.rate is not None or controller == "franka":
+        rate = request.rate or files.FRANKA_RATE
+    torque = controller in ("crisp", "franka")
+    missing = [
+        text
+        for value, text in (
+            (rate, "--rate HZ, the controller manager's update_rate"),
+            (request.delay, "--delay, everything late between contact and motion, such as 24:ms"),
+            (request.mass if torque else 1.0, "--mass, of the arm at its tip, such as 3:kg"),
+        )
+        if value is None
+    ]
+    if missing:
+        raise InputError(f"{node.where}: the file does not say it; give {' and '.join(missing)}")
+    assert rate is not None
+    assert request.delay is not None
+    if request.mass is not None and request.mass <= 0.0:
+        raise InputError(f"--mass must be above 0 kg, got {request.mass:g}")
+    if not 1.0 <= rate <= files.MAX_RATE or not 0.0 <= request.delay * rate <= MAX_DELAY_TICKS:
+        raise InputError(
+            f"{node.where}: a rate from 1 to {files.MAX_RATE:g} Hz and a delay up to {MAX_DELAY_TICKS} ticks are "
+            f"modelled, got {rate:g} Hz and {request.delay:g} s"
+        )
+    if torque:
+        read = files.crisp_axes if controller == "crisp" else files.franka_axes
+        return read(node, float(request.mass or 0.0)), Timing(rate, request.delay, "torque")
+    axes = files.admittance_axes(node) if controller == "ros2-admittance" else files.fzi_axes(node)
+    return axes, Timing(rate, request.delay, files.node_interface(node))
+
+
+def _judge_node(node: ControllerNode, file: ControllerFile, request: ControllerRequest) -> dict[str, Any]:
+    laws, timing = node_laws(node, file, request)
+    soft = None if request.surfaces is None else request.surfaces[0]
+    axes = {}
+    for axis, law, reason in laws:
+        verdict = LawVerdict((), None) if law is None else judge_law(law, timing, soft)
+        axes[axis] = {
+            "ranges": None if law is None else list(verdict.ranges),
+            "proved": verdict.proved,
+            "reason": "; ".join(filter(None, (reason, verdict.reason))),
+            "overshoot": _overshoot(law, timing, request.surfaces, stable=bool(verdict.ranges)),
+        }
+    result: dict[str, Any] = {
+        "node": node.name,
+        "rate_hz": timing.rate,
+        "delay_s": timing.delay,
+        "interface": timing.interface,
+        "axes": axes,
+        "left_out": node.defaults,
+        "notes": _notes(node, file, request),
+    }
+    if request.controller == "fzi" and timing.interface == "position" and timing.delay * timing.rate >= 1.0:
+        sensor = timing._replace(sensor=True)
+        ideal = [judge_law(law, sensor, soft) for _, law, _ in laws if law is not None]
+        ranges = _common([list(v.ranges) for v in ideal])
+        proved = _common([[v.proved] if v.proved else [] for v in ideal])
+        result["if_only_the_force_is_late"] = {"exact": ranges, "proved": proved[0] if proved else None}
+    return result
+
+
+def _notes(node: ControllerNode, file: ControllerFile, request: ControllerRequest) -> list[str]:
+    notes, controller = [], request.controller
+    if request.rate is not None and files.node_rate(node, file.rate) not in (None, request.rate):
+        notes.append(f"--rate {request.rate:g} replaces the update_rate of the file")
+    if controller in ("ros2-admittance", "fzi"):
+        kinds = node.entries.get("command_interfaces", ())
+        if isinstance(kinds, list) and len(kinds) > 1:
+            notes.append("the arm is taken to follow the position of its two interfaces")
+        if controller == "fzi" and node.has("solver.forward_dynamics"):
+            notes.append(
+                "the source declares solver/forward_dynamics/link_mass, with slashes: the entry has no effect"
+            )
+    whole = [name for name in node.used if name != "solver.iterations" and _has_integer(node.entries[name])]
+    if whole and controller != "franka":
+        notes.append(f"ROS 2 may refuse a number without a decimal point here: {files.named(sorted(whole))}")
+    if controller == "crisp":
+        if node.entries.get("use_friction") is True:
+            notes.append("use_friction: its torque is taken to cancel the joints' friction")
+        if (
+            node.entries.get("nullspace.damping", -1.0) == -1.0
+            and node.entries.get("nullspace.projector_type") != "none"
+        ):
+            notes.append(
+                "the source takes the null space's damping -1 as it stands: a seventh joint is driven, not damped"
+            )
+    return notes
+
+
+def _has_integer(value: Any) -> bool:
+    values = value if isinstance(value, list) else [value]
+    return any(isinstance(v, int) and not isinstance(v, bool) for v in values)
+
+
+@lru_cache(256)
+def judge_law(law: OneAxisLaw, timing: Timing, soft: float | None = None) -> LawVerdict:
+    """Where a law is stable on springs.
+
+    Args:
+        law: of one axis.
+        timing: when its commands act.
+        soft: softest surface of the proof [N/m]; None for a thousandth of the edge.
+    """
+    loop = law.loop(timing)
+    try:
+        loop.matrices(np.array([SCANNED_STIFFNESS[1]]))
+    except OverflowError:
+        return LawVerdict((), None, "its numbers grow beyond all bounds within a tick")
+    ranges = () if runs_away_in_free_motion(loop) else tuple(stable_ranges(loop))
+    if not ranges:
+        return LawVerdict((), None, _unstable(law, timing))
+    if not isinstance(loop, AffineLoop):
+        return LawVerdict(ranges, None, "the arm swings between ticks: eigenvalues alone, nothing is proved")
+    later = law.loop(timing.later())
+    assert isinstance(later, AffineLoop)
+    if len(later.rows) > MAX_PROVED_STATES:
+        return LawVerdict(ranges, None, f"more than {MAX_PROVED_STATES} states: eigenvalues alone")
+    both = _common([list(ranges), stable_ranges(later)])
+    if not both or runs_away_in_free_motion(later):
+        return LawVerdict(ranges, None, "unstable with one tick more of delay: nothing is proved")
+    low, high = both[0]
+    high *= 1.0 if high == SCANNED_STIFFNESS[1] else PROVED_FRACTION
+    wanted = high * PROVED_SPAN if soft is None else min(soft, high * PROVED_SPAN)
+    low = max(wanted, low if low == SCANNED_STIFFNESS[0] else low / PROVED_FRACTION)
+    proved = prove([loop, later], low, high) if low < high else None
+    return LawVerdict(ranges, proved, "" if proved else "no proof was found")
+
+
+def _unstable(law: OneAxisLaw, timing: Timing) -> str:
+    """Why a law is stable on no surface."""
+    if isinstance(law, Admittance):
+        decay = law.decay(timing.rate)
+        if decay >= 2.0:
+            return f"in free motion it runs away: (D/M + joint_damping)/update_rate must be below 2 and is {decay:.3g}"
+        if decay <= 0.0:
+            return "nothing damps it: D/M + joint_damping is not above 0"
+        return "unstable in free motion or on every surface that was scanned: the delay is too long for its damping"
+    if (
+        isinstance(law, ForwardDynamics)
+        and timing.interface == "position"
+        and timing.delay
+        and not timing.sensor
+    ):
+        return (
+            "unstable: behind a position interface the solver starts at the measured position, so that a motion which "
+            "is late by n ticks repeats every n ticks"
+        )
+    return "unstable in free motion or on every surface that was scanned"
+
+
+def _overshoot(law: Law | None, timing: Timing, surfaces: Range | None, *, stable: bool) -> float | None:
+    if law is None or surfaces is None or not stable:
+        return None
+    largest = float(overshoot(law.loop(timing), surfaces_between(*surfaces)).max())
+    return largest if largest < float("inf") else None
+
+
+def _common(families: Iterable[list[Range]]) -> list[Range]:
+    """Intervals that lie in an interval of every family, the softest first."""
+    result = [SCANNED_STIFFNESS]
+    for ranges in families:
+        pairs = [(max(a, c), min(b, d)) for a, b in result for c, d in ranges]
+        result = [(low, high) for low, high in pairs if low < high]
+    return result
+
+
+def _covers(ranges: list[Range], surfaces: Range | None) -> bool:
+    if surfaces is None:
+        return bool(ranges)
+    return any(low <= surfaces[0] and surfaces[1] <= high for low, high in ranges)
+
+
+def _first_unstable(headline: Range | None) -> float | None:
+    low, high = SCANNED_STIFFNESS
+    if headline is None or headline[0] > low:
+        return low
+    return headline[1] if headline[1] < high else None
+
+
+def _correct(file: ControllerFile, request: ControllerRequest, path: Path) -> tuple[dict[str, Any], str]:
+    """Changed entries by their names, and the text of the file with them, which is read back and judged.
+
+    Raises:
+        CorrectionError: there is none; its text says why.
+    """
+    assert request.surfaces is not None
+    changes: dict[tuple[str, ...], Any] = {}
+    for node in file.nodes:
+        laws, timing = node_laws(node, file, request)
+        for entry, value in correct_node(node, laws, timing, request.surfaces).items():
+            changes[*node.place, *entry.split(".")] = value
+    text = dump(with_changes(file, changes))
+    again, _ = _with_force(
+        files.find_controllers(parse_yaml(text, str(path)), str(path), request.controller), request
+    )
+    for node in again.nodes:
+        laws, timing = node_laws(node, again, request)
+        for _, law, _ in laws:
+            if law is None:
+                continue
+            verdict = judge_law(law, timing, request.surfaces[0])
+            proved = [verdict.proved] if verdict.proved else []
+            if isinstance(law, CartesianImpedance):
+                proved = list(verdict.ranges)
+            if not _covers(proved, request.surfaces):
+                raise CorrectionError("the corrected numbers could not be proved when they were read back")
+    return {".".join(name): value for name, value in changes.items()}, text
