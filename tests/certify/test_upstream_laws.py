@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.certify.discrete_loop import growth, runs_away_in_free_motion, stable_ranges
-from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, CartesianImpedance, Timing
+from palpate.certify.upstream_laws import SOURCES, Admittance, CartesianImpedance, ForwardDynamics, Timing
 
 TEST_PARAMS = Admittance(5.5, 214.1, 2.828427, 5.0, 0.005)
 """The x axis of test_params.yaml of ros2_controllers."""

@@ -24,13 +24,13 @@ from palpate.certify.discrete_loop import (
     PROVED_FRACTION,
     SCANNED_STIFFNESS,
     AffineLoop,
-    SpringLoop,
+    LoopOnSpring,
     overshoot,
     prove,
     runs_away_in_free_motion,
     stable_ranges,
 )
-from palpate.certify.upstream_laws import SOURCES, Admittance, ForwardDynamics, CartesianImpedance, Timing
+from palpate.certify.upstream_laws import SOURCES, Admittance, CartesianImpedance, ForwardDynamics, Timing
 from palpate.errors import InputError
 from palpate.files import parse_yaml
 
@@ -59,7 +59,7 @@ Range = tuple[float, float]
 class OneAxisLaw(Protocol):
     """A law that closes a loop of one axis; it can be hashed."""
 
-    def loop(self, timing: Timing) -> SpringLoop:
+    def loop(self, timing: Timing) -> LoopOnSpring:
         """One tick of the loop."""
         ...
 

@@ -37,7 +37,7 @@ MAX_STEP_TICKS = 60_000
 """Ticks of a step response: a minute at 1 kHz."""
 
 
-class SpringLoop(Protocol):
+class LoopOnSpring(Protocol):
     """One axis in contact with a spring, as a linear system of one tick."""
 
     def matrices(self, stiffness: Array) -> Array:
@@ -153,23 +153,23 @@ def split_delay(delay: float, rate: float) -> tuple[int, Fraction]:
     return whole, Fraction(max(0.0, ticks - whole)) if ticks - whole > 1e-9 else Fraction(0)
 
 
-def growth(loop: SpringLoop, stiffness: Array) -> Array:
+def growth(loop: LoopOnSpring, stiffness: Array) -> Array:
     """Largest magnitude of the eigenvalues of A(K), for each stiffness [N/m]."""
     parts = np.array_split(stiffness, max(1, len(stiffness) // 64))
     return np.concatenate([abs(np.linalg.eigvals(loop.matrices(part))).max(axis=1) for part in parts])
 
 
-def is_stable(loop: SpringLoop, stiffness: float) -> bool:
+def is_stable(loop: LoopOnSpring, stiffness: float) -> bool:
     """True if all eigenvalues of A(K) lie within the unit circle by the margin."""
     return bool(growth(loop, np.array([stiffness]))[0] < 1.0 - STABILITY_MARGIN)
 
 
-def runs_away_in_free_motion(loop: SpringLoop) -> bool:
+def runs_away_in_free_motion(loop: LoopOnSpring) -> bool:
     """True if some eigenvalue without a surface lies outside the unit circle; on the circle is a tip that drifts."""
     return bool(growth(loop, np.zeros(1))[0] > 1.0 + 1e-6)
 
 
-def stable_ranges(loop: SpringLoop) -> list[tuple[float, float]]:
+def stable_ranges(loop: LoopOnSpring) -> list[tuple[float, float]]:
     """Intervals of stiffness on which the eigenvalues are stable [N/m]: the whole range is scanned, edges bisected."""
     low, high = SCANNED_STIFFNESS
     count = round(np.log10(high / low) * POINTS_PER_DECADE) + 1
@@ -188,7 +188,7 @@ def stable_ranges(loop: SpringLoop) -> list[tuple[float, float]]:
     return ranges if begin is None else [*ranges, (begin, high)]
 
 
-def _edge(loop: SpringLoop, low: float, high: float, *, rising: bool) -> float:
+def _edge(loop: LoopOnSpring, low: float, high: float, *, rising: bool) -> float:
     """Stiffness at which stability changes, on its stable side."""
     for _ in range(30):
         middle = float(np.sqrt(low * high))
@@ -279,7 +279,7 @@ def _norm(A: Array, column: Array, position: int) -> Array | None:
     return P / abs(P).max() if np.isfinite(P).all() else None
 
 
-def overshoot(loop: SpringLoop, stiffness: Iterable[float]) -> Array:
+def overshoot(loop: LoopOnSpring, stiffness: Iterable[float]) -> Array:
     """Overshoot of the contact force after a step of the commanded force, relative to its final value; shape (m,).
 
     Infinite where the loop is unstable, or not settled after `MAX_STEP_TICKS`.
