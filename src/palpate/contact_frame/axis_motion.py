@@ -48,6 +48,7 @@ class SlidingBlocks:
         transients: means of what remains of a change at the last reversal, for each length, shape (n, 2).
         rows: speed of each row, and the block that it is of: a function's mean is that of its rows.
         limits: slowest, median and fastest speed without sign.
+        noise: standard deviation of the speed of a row.
     """
 
     time: Array
@@ -59,6 +60,7 @@ class SlidingBlocks:
     transients: Array
     rows: tuple[Array, Indices]
     limits: tuple[float, float, float]
+    noise: float
 
     def mean(self, values: Array) -> Array:
         """Mean over each block of values of each row."""
@@ -251,7 +253,7 @@ def _average(axis: _Samples, motion: _Motion) -> SlidingBlocks | None:
     transients = np.column_stack([mean(np.sign(speed) * decay) for decay in decays])
     return SlidingBlocks(
         axis.dt * (begins + ends) / 2, count, mean(motion.force), mean(position), mean(speed),
-        mean(motion.acceleration), transients, (speed[index], block), limits,
+        mean(motion.acceleration), transients, (speed[index], block), limits, motion.noise,
     )  # fmt: skip
 
 
