@@ -116,12 +116,13 @@ class AxisFriction(Result):
         }  # fmt: skip
 
 
-def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
+def identify_friction(record: Record, tolerance: float = 0.25, lag: float = 0.0) -> AxisFriction:
     """Identify the friction of a joint or an axis from its force or torque and its motion.
 
     Args:
         record: columns time, force (or torque), and position or velocity or both, in SI units.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a fraction of its value.
+        lag: of the force behind the motion [s], if it is known; one of 20 ms and more biases Fc and B.
 
     Returns:
         The friction along the motion. The sign of the force is that by which the motion loses power.
@@ -129,7 +130,7 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
     Raises:
         InputError: a column is missing, or there are too few rows.
     """
-    blocks, units = sliding_blocks(record)
+    blocks, units = sliding_blocks(record, lag)
     notes = [dict(note) for note in record.meta.get("notes", ())]
     if blocks is None:
         reason = "the log shows too little motion above the noise of its speed; move the axis back and forth"
