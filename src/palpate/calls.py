@@ -109,7 +109,9 @@ def identify_log(path: str | Path, **options: Any) -> Identification:
         return identify_log_file(path, **options)
 
 
-def identify_friction(source: Record | Any, *, tolerance: float = 0.25, **options: Any) -> AxisFriction:
+def identify_friction(
+    source: Record | Any, *, tolerance: float = 0.25, lag: float = 0.0, **options: Any
+) -> AxisFriction:
     """Identify the friction of a joint or an axis: Coulomb, viscous, offset, and Stribeck where it shows.
 
     `palpate.identify_friction("sweep.csv", time="t", velocity="qd:rad/s", force="tau:Nm")`
@@ -117,6 +119,7 @@ def identify_friction(source: Record | Any, *, tolerance: float = 0.25, **option
     Args:
         source: a `Record` with time, force (or torque), and position or velocity or both; or a log.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a fraction of its value.
+        lag: of the force behind the motion [s].
         options: of a log those of `palpate.read_log`, its columns among them.
 
     Raises:
@@ -124,10 +127,11 @@ def identify_friction(source: Record | Any, *, tolerance: float = 0.25, **option
     """
     from palpate.contact_frame.axis_friction import identify_friction as identify_axis
 
-    _check("tolerance", tolerance, pair=False)
+    for name, value in (("tolerance", tolerance), ("lag", lag)):
+        _check(name, value, pair=False)
     record = source if isinstance(source, Record) else read_log(source, **options)
     with _in_python():
-        return identify_axis(record, tolerance)
+        return identify_axis(record, tolerance, lag)
 
 
 def read_log(path: Any, **options: Any) -> Record:

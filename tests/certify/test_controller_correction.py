@@ -13,7 +13,7 @@ from palpate.certify.controller_correction import (
 )
 from palpate.certify.controller_file import AxisLaw, find_controllers
 from palpate.certify.discrete_loop import overshoot
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance, Timing
+from palpate.certify.upstream_laws import Admittance, CartesianImpedance, ForwardDynamics, Timing
 from palpate.files import parse_yaml
 
 NESTED = """\

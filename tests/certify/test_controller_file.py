@@ -17,7 +17,7 @@ from palpate.certify.controller_file import (
     node_rate,
     read_controllers,
 )
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance
+from palpate.certify.upstream_laws import Admittance, CartesianImpedance, ForwardDynamics
 from palpate.errors import InputError
 
 ADMITTANCE = """\

@@ -4,13 +4,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import expm
 
 from palpate.certify.discrete_loop import (
     AffineLoop,
-    TorqueSpringLoop,
     growth,
     is_stable,
     overshoot,
@@ -19,6 +17,7 @@ from palpate.certify.discrete_loop import (
     split_delay,
     stable_ranges,
 )
+from palpate.certify.torque_loop import TorqueSpringLoop
 
 
 def integrator(gain, rate):
@@ -77,26 +76,6 @@ def test_every_island_of_stability_is_found():
     edges = [edge for ends in ranges for edge in ends if 1.0 < edge < 1e7]
     assert [is_stable(loop, edge * 1.001) for edge in edges] == [False, True, False, True, False, True]
     assert [is_stable(loop, edge * 0.999) for edge in edges] == [True, False, True, False, True, False]
-
-
-@given(
-    st.floats(10.0, 1e6), st.floats(0.5, 20.0), st.integers(0, 3), st.floats(0.0, 0.99), st.integers(0, 99)
-)
-@settings(max_examples=30)
-def test_a_torque_arm_moves_as_its_differential_equation(stiffness, mass, whole, part, seed):
-    h = 1e-3
-    loop = TorqueSpringLoop((500.0, 30.0), mass, h, whole, part)
-    state = np.random.default_rng(seed).normal(size=whole + 3)
-    (A,) = loop.matrices(np.array([stiffness]))
-    forces = [-500.0 * state[0] - 30.0 * state[1], *state[2:]]
-    swing = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, 0.0, 1.0 / mass], [0.0, 0.0, 0.0]])
-    x = np.array([*state[:2], forces[whole + 1]])
-    x = expm(swing * h * part) @ x
-    x[2] = forces[whole]
-    x = expm(swing * h * (1.0 - part)) @ x
-    scale = np.abs(A[:2] @ np.diag(np.abs(state))).sum(axis=1) + 1e-12
-    assert A[:2] @ state == pytest.approx(x[:2], abs=1e-9 * scale.max())
-    assert (A[2:] @ state).tolist() == pytest.approx(forces[:-1])
 
 
 def test_the_overshoot_of_a_second_order_loop_is_that_of_the_textbook():

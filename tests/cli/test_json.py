@@ -37,6 +37,9 @@ CASES = {
     ],
     "tune": ["tune --stiffness 1e3:1e5 --arm ur5e --force 20"],
     "certify": ["certify gains.toml --held-only --out certificate.json"],
+    "certify, another controller": [
+        "certify law.yaml --controller crisp --delay 2:ms --mass 3:kg --rate 1000"
+    ],
     "export": ["export found.json --to drake --geom foam"],
     "press": ["press --arm fr3 --force 20 --surface K=5000,B=50 --seconds 1 --out pressed"],
     "slide": ["slide --arm ur5e --seconds 1 --out slid"],
@@ -58,6 +61,7 @@ def place(tmp_path_factory, root):
     (folder / "my_parts.py").write_text((root / "tests" / "own_parts.py").read_text(encoding="utf-8"))
     (folder / "found.json").write_text(json.dumps(scenes.found()))
     (folder / "gains.toml").write_text(gains_of().to_toml())
+    (folder / "law.yaml").write_text("task.k_pos_x: 300.0\n")
     (folder / "small.toml").write_text(SMALL, encoding="utf-8")
     (folder / "mine.toml").write_text(text_of(), encoding="utf-8")
     write(log_of(Tool(), six(), np.random.default_rng(0)), folder / "turning.parquet")

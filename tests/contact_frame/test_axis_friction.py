@@ -77,6 +77,16 @@ def test_the_sign_of_the_force_is_irrelevant(sign):
     assert [note["code"] for note in friction.notes] == ["force-sign-turned"] * (sign < 0)
 
 
+def test_a_known_lag_of_the_force_is_taken_out():
+    log, late = record(), 0.06
+    columns = {**log.columns, "force": np.interp(TIME - late, TIME, log["force"])}
+    log = Record(columns, log.units, {})
+    unknown, known = identify_friction(log), identify_friction(log, lag=late)
+    assert holds(known, "Fc", 2.0)
+    assert holds(known, "B", 3.0)
+    assert known.parameters["Fc"].std < 0.5 * unknown.parameters["Fc"].std
+
+
 @pytest.mark.parametrize("extra", [0.3 * np.gradient(SWING, TIME), 5.0 * np.cumsum(SWING) * 4e-3])
 def test_inertia_and_a_spring_are_no_friction(extra):
     friction = identify_friction(record(extra=extra))
@@ -198,6 +208,7 @@ def test_the_command_answers_as_text_and_as_json(capsys, joint_csv):
         (("--friction",), "with --force-column and --position or --velocity and --time or --rate"),
         (("--friction", "--wrench", "a,b,c"), "--friction is of one axis"),
         ((*NAMED, "--indenter", "sphere:5:mm"), "--indenter is for a press; leave out --friction"),
+        ((*NAMED, "--lag", "8"), "is 8 ms meant?"),
         ((*NAMED, "--budget"), "--budget is for a press"),
         (("--velocity", "qd"), "--velocity is for the friction of an axis; add --friction"),
         (("other.csv", *NAMED), "--friction takes one log, got 2"),

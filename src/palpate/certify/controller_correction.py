@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from palpate.certify.discrete_loop import overshoot, runs_away_in_free_motion
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance, Timing
+from palpate.certify.upstream_laws import Admittance, CartesianImpedance, ForwardDynamics, Timing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

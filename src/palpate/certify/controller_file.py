@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from palpate.certify.upstream_laws import Admittance, ForwardDynamics, CartesianImpedance
+from palpate.certify.upstream_laws import Admittance, CartesianImpedance, ForwardDynamics
 from palpate.errors import InputError, unknown
 from palpate.files import read_yaml
 from palpate.text import printable

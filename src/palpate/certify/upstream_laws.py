@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.certify.discrete_loop import AffineLoop, TorqueSpringLoop, split_delay
+from palpate.certify.discrete_loop import AffineLoop, split_delay
+from palpate.certify.torque_loop import TorqueSpringLoop
 
 FZI_STEP = Fraction(1, 50)
 """Simulated time of a solver's step [s], whatever the rate of the controller."""

@@ -385,7 +385,12 @@ def _friction(
     if len(logs) != 1:
         raise InputError(f"--friction takes one log, got {len(logs)}")
     fitted, press = log_options.fitted, "a press; leave out --friction"
-    for part in (replace(fitted, tolerance=0.25), log_options.frame, log_options.arm, log_options.pressed_by):
+    for part in (
+        replace(fitted, tolerance=0.25, lag=None),
+        log_options.frame,
+        log_options.arm,
+        log_options.pressed_by,
+    ):
         only(part, press)
     only(replace(IdentifyOutput(), table=output.table, budget=output.budget, verbose=output.verbose), press)
     only(beside, press)
@@ -395,7 +400,8 @@ def _friction(
     from palpate.report import friction as view
     from palpate.report.style import save
 
-    result = identify_friction(source.read_axis(log, axis.velocity), fitted.tolerance)
+    lag = fitted.keywords().get("lag", 0.0)
+    result = identify_friction(source.read_axis(log, axis.velocity), fitted.tolerance, lag)
     files = []
     if figure is not None and len(result.points):
         files.append(OutputFile("figure:", figure, lambda: save(view.draw(result), figure, dpi=output.dpi)))

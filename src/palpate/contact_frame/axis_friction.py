@@ -116,12 +116,13 @@ class AxisFriction(Result):
         }  # fmt: skip
 
 
-def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
+def identify_friction(record: Record, tolerance: float = 0.25, lag: float = 0.0) -> AxisFriction:
     """Identify the friction of a joint or an axis from its force or torque and its motion.
 
     Args:
         record: columns time, force (or torque), and position or velocity or both, in SI units.
         tolerance: largest half-width of an identified parameter's 95 % interval, as a fraction of its value.
+        lag: of the force behind the motion [s], if it is known; one of 20 ms and more biases Fc and B.
 
     Returns:
         The friction along the motion. The sign of the force is that by which the motion loses power.
@@ -129,7 +130,7 @@ def identify_friction(record: Record, tolerance: float = 0.25) -> AxisFriction:
     Raises:
         InputError: a column is missing, or there are too few rows.
     """
-    blocks, units = sliding_blocks(record)
+    blocks, units = sliding_blocks(record, lag)
     notes = [dict(note) for note in record.meta.get("notes", ())]
     if blocks is None:
         reason = "the log shows too little motion above the noise of its speed; move the axis back and forth"
@@ -186,7 +187,12 @@ def _terms(blocks: SlidingBlocks, grid: Array) -> _Terms:
     else:
         grid = np.empty(0)
     rows = blocks.rows[0]
-    effects = [blocks.mean(np.sign(rows) * np.exp(-((rows / vs) ** 2))) for vs in grid]
+    # Noise of the speed flattens exp(-(v / vs)^2): a narrower and higher one has that mean.
+    narrow = np.maximum(grid**2 - 2.0 * blocks.noise**2, 0.25 * grid**2)
+    high = np.sqrt(1.0 + 2.0 * blocks.noise**2 / narrow)
+    effects = [
+        blocks.mean(h * np.sign(rows) * np.exp(-(rows**2) / n)) for h, n in zip(high, narrow, strict=True)
+    ]
     nuisances = [blocks.acceleration, blocks.position, blocks.position**2, *blocks.transients.T]
     design = np.column_stack([*columns, *nuisances, *effects, blocks.mean(np.sign(rows) * rows**2)])
     scale = np.maximum(np.sqrt(np.mean(design**2, axis=0)), 1e-300)
@@ -541,17 +547,19 @@ class _Judge(NamedTuple):
         return parameters
 
     def _stribeck(self, draws: dict[str, Array], terms: _Terms, shows: bool) -> dict[str, Parameter]:
+        slowest = f"{self.limits[0]:.3g} {self.units[1]}"
         if not shows:
-            slowest = f"{self.limits[0]:.3g} {self.units[1]}"
             reason = f"no Stribeck effect shows at {slowest} and above; move more slowly, too"
             return {name: self._unknown(name, reason) for name in ("Fs", "vs")}
         step = np.log(terms.grid[1] / terms.grid[0])
         draws = {name: values[np.isfinite(draws["vs"])] for name, values in draws.items()}
         within = np.random.default_rng(2).uniform(-0.5, 0.5, len(draws["vs"]))
-        return {
-            "Fs": self._judge("Fs", draws["Fc"] + draws["rise"], positive=True),
-            "vs": self._judge("vs", draws["vs"] * np.exp(step * within), positive=True),
-        }
+        speed = self._judge("vs", draws["vs"] * np.exp(step * within), positive=True)
+        reason = f"the slowest speed, {slowest}, is above half of vs: Fs would be extrapolated; move more slowly, too"
+        reaches = self.limits[0] < 0.5 * float(np.median(draws["vs"]))
+        level = draws["Fc"] + draws["rise"]
+        static = self._judge("Fs", level, positive=True) if reaches else self._unknown("Fs", reason)
+        return {"Fs": static, "vs": speed}
 
     def _of_one_speed(self, draws: dict[str, Array]) -> dict[str, Parameter]:
         """Bounds by a friction that is passive: neither Coulomb nor viscous friction is below zero."""

@@ -48,6 +48,7 @@ class SlidingBlocks:
         transients: means of what remains of a change at the last reversal, for each length, shape (n, 2).
         rows: speed of each row, and the block that it is of: a function's mean is that of its rows.
         limits: slowest, median and fastest speed without sign.
+        noise: standard deviation of the speed of a row.
     """
 
     time: Array
@@ -59,6 +60,7 @@ class SlidingBlocks:
     transients: Array
     rows: tuple[Array, Indices]
     limits: tuple[float, float, float]
+    noise: float
 
     def mean(self, values: Array) -> Array:
         """Mean over each block of values of each row."""
@@ -72,16 +74,17 @@ def several_speeds(speed: Array) -> bool:
     return any(fast > ONE_SPEED * slow for slow, fast in ends)
 
 
-def sliding_blocks(record: Record) -> tuple[SlidingBlocks | None, tuple[str, str]]:
+def sliding_blocks(record: Record, lag: float = 0.0) -> tuple[SlidingBlocks | None, tuple[str, str]]:
     """Means over blocks of rows that slide, None where too few do; and the units of force and speed.
 
     Args:
         record: columns time, force (or torque), and position or velocity or both, in SI units.
+        lag: of the force behind the motion [s].
 
     Raises:
         InputError: a column is missing, or there are too few rows.
     """
-    axis = _axis(record)
+    axis = _axis(record, lag)
     blocks = _average(axis, _differentiate(axis))
     if blocks is not None and not several_speeds(blocks.speed):
         blocks = _without_ramps(blocks)
@@ -121,7 +124,7 @@ class _Motion(NamedTuple):
     half_window: int
 
 
-def _axis(record: Record) -> _Samples:
+def _axis(record: Record, lag: float) -> _Samples:
     missing = [name for name in ("time", "force") if name not in record.columns]
     moved = [name for name in ("position", "velocity") if name in record.columns]
     if missing or not moved:
@@ -144,7 +147,10 @@ def _axis(record: Record) -> _Samples:
     grid = time[0] + dt * np.arange(int(np.ptp(time) / dt + 0.5) + 1)
     nearest = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
     distance = np.minimum(abs(grid - time[nearest - 1]), abs(time[nearest] - grid))
-    sampled = {name: np.interp(grid, time, values[first]) for name, values in columns.items()}
+    late = {"force": lag}
+    sampled = {
+        name: np.interp(grid + late.get(name, 0.0), time, values[first]) for name, values in columns.items()
+    }
     units = record.units
     speed_unit = units["velocity"] if "velocity" in moved else _per_second(units["position"])
     return _Samples(
@@ -251,7 +257,7 @@ def _average(axis: _Samples, motion: _Motion) -> SlidingBlocks | None:
     transients = np.column_stack([mean(np.sign(speed) * decay) for decay in decays])
     return SlidingBlocks(
         axis.dt * (begins + ends) / 2, count, mean(motion.force), mean(position), mean(speed),
-        mean(motion.acceleration), transients, (speed[index], block), limits,
+        mean(motion.acceleration), transients, (speed[index], block), limits, motion.noise,
     )  # fmt: skip
 
 
