@@ -22,7 +22,7 @@ _WORDS = {
     "other": (
         r"vel|veloc|speed|twist|qd+|dq|ddq|acc|accel|acceleration|gyro|mag|imu|jerk|freq|strain|stress|modul|energy|work|"
         r"power|pwm|curr|volt|temp(?!s$)|humid|pressure|druck|gain|bias|offset|std|var$|cov|error|err$|residual|rate|"
-        r"stiff|damp|slope|battery|ekg|ecg|emg"
+        r"stiff|damp|slope|battery|e[kcm]g|omega|[vwag][xyz]$"
     ),
     "torque": r"torq|moment(?!um)|drehm|tau$|t[xyz]$|m[xyz]$|tq$",
     "orientation": r"quat|orient|rot|roll$|pitch$|yaw$|euler|angle|winkel|rpy$|r[xyz]$|q[xyzw]$|theta$|phi$|psi$",
