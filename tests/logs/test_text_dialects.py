@@ -122,6 +122,7 @@ HOSTILE = {
     "cells without end": ["," * 100_000, *WHOLE],
     "dates without end": [",".join(["2020-01-01T00:00:0x"] * 8000)] * 20,
     "quotes": ['"' * 100_000, *WHOLE],
+    "lists without end": ["t,x,f", "[(" * 50_000, "[1" + " " * 100_000, "a:1 " * 30_000, *ROWS],
     "a name without end": ["t,x,f" + "_" * 100_000, *ROWS],
 }
 
