@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from contextlib import suppress
@@ -121,6 +122,7 @@ HOSTILE = {
     "cells without end": ["," * 100_000, *WHOLE],
     "dates without end": [",".join(["2020-01-01T00:00:0x"] * 8000)] * 20,
     "quotes": ['"' * 100_000, *WHOLE],
+    "lists without end": ["t,x,f", "[(" * 50_000, "[1" + " " * 100_000, "a:1 " * 30_000, *ROWS],
     "a name without end": ["t,x,f" + "_" * 100_000, *ROWS],
 }
 
@@ -164,3 +166,106 @@ def test_names_longer_than_any_are_shown_by_their_ends(tmp_path):
     record = read(tmp_path / "log.csv", ["t,x," + "f" * 70_000, *ROWS], time="t", position="x", force="2")
     assert len(record) == len(T)
     assert all(len(entry.name) <= 200 for entry in list_log(tmp_path / "log.csv").entries)
+
+
+def written_as(form):
+    """The press in a form of text that is no lines of cells."""
+    rows = list(zip(T.tolist(), X.tolist(), F.tolist(), strict=True))
+    listed = [f'{t},"[0.5, {x:.6f}]",{f:.2f}' for t, x, f in rows]
+    return {
+        "JSON lines": [json.dumps({"t": t, "tip": {"x": x}, "ft": [0.0, f]}) for t, x, f in rows],
+        "a list of objects": [json.dumps([{"t": t, "tip": {"x": x}, "ft": [0.0, f]} for t, x, f in rows])],
+        "an object of lists": [
+            json.dumps({"who": "me", "t": list(T), "tip": {"x": list(X)}, "ft": {"1": list(F)}})
+        ],
+        "labels": ["ready", *(f"t:{t} x: {x:.6f}\tf:{f:.2f}" for t, x, f in rows)],
+        "labels and units": [f"t={t} s, x={1e3 * x:.3f} mm, f={f:.2f} N" for t, x, f in rows],
+        "stamps": [f"00:00:{t:06.3f} -> x:{x:.6f},f:{f:.2f}" for t, x, f in rows],
+        "lists in cells": ["t,tip,f", *listed],
+        "quoted line breaks": ["t,note,x,f", *(f'{t},"a ""b""\nc",{x:.6f},{f:.2f}' for t, x, f in rows)],
+        "names on the first row": ["# t\tx\tf0.00\t0.0\t900.0", *(f"{t}\t{x:.6f}\t{f:.2f}" for t, x, f in rows[1:])],
+        "names behind a percent sign": [
+            "%time,field.header.seq,field.x,field.f",
+            *(f"{round(1e9 * t) + 1_700_000_000_000_000_000},{k},{x:.6f},{f:.2f}" for k, (t, x, f) in enumerate(rows)),
+        ],
+    }[form]  # fmt: skip
+
+
+FORMS = {
+    "JSON lines": {"position": "tip.x", "force": "ft.1"},
+    "a list of objects": {"position": "tip.x", "force": "ft.1"},
+    "an object of lists": {"position": "tip.x", "force": "ft.1"},
+    "labels": {},
+    "labels and units": {"time": "t (s)", "position": "x (mm)", "force": "f (N)"},
+    "stamps": {"time": "time"},
+    "lists in cells": {"position": "tip.1"},
+    "quoted line breaks": {},
+    "names on the first row": {},
+    "names behind a percent sign": {"time": "time:ns", "position": "field.x", "force": "field.f"},
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_of_text(tmp_path, form):
+    record = read(tmp_path / "log.txt", written_as(form), **{**COLUMNS, **FORMS[form]})
+    skipped = int(form == "names on the first row")  # that row is lost, and named
+    assert len(record) == len(T) - skipped
+    assert ("hangs on the names" in str(record.meta["notes"])) == bool(skipped)
+    np.testing.assert_allclose(record["force"], F[skipped:], atol=0.01)
+    np.testing.assert_allclose(record["position"], X[skipped:], atol=1e-6)
+    np.testing.assert_allclose(record["time"], T[skipped:] - T[skipped], atol=1e-6)
+
+
+def test_a_list_of_another_length_is_named_by_its_line(tmp_path):
+    lines = written_as("lists in cells")
+    lines[41] = lines[41].replace("0.5, ", "")
+    with pytest.raises(InputError, match=r"column 'tip', row 41 \(line 42\) holds a list of 1 numbers"):
+        read(tmp_path / "log.csv", lines, **{**COLUMNS, "position": "tip.1"})
+
+
+def test_a_line_that_is_no_json_is_left_out_and_named(tmp_path):
+    lines = written_as("JSON lines")
+    lines[30] = lines[30][:12]
+    record = read(tmp_path / "log.jsonl", lines, **{**COLUMNS, **FORMS["JSON lines"]})
+    assert len(record) == len(T) - 1
+    assert "the first is line 31" in record.meta["notes"][0]["text"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{" * 5000, '{"t": ' + "[" * 100_000, '[{"t": 1}', "{}\n{}\n", '[{"a":1}' + ',{"a":"' + "x" * 9999],
+)
+def test_hostile_json_is_refused_in_one_line(tmp_path, text):
+    with pytest.raises(InputError) as refused:
+        read(tmp_path / "log.json", [text])
+    assert "\n" not in str(refused.value)
+
+
+def test_counts_are_divided_by_the_factor_in_the_header(tmp_path):
+    lines = [
+        "Counts per Force: 1000",
+        "Force Units: N",
+        "t,x,Fz",
+        *(f"{t},{x},{round(1000 * f)}" for t, x, f in zip(T, X, F, strict=True)),
+    ]
+    record = read(tmp_path / "log.csv", lines, time="t", position="x", force="Fz")
+    np.testing.assert_allclose(record["force"], F, atol=1e-3)
+    assert "0.001 N a count" in record.meta["facts"][0]
+
+
+def test_two_files_are_joined_by_their_times(tmp_path):
+    slow = np.arange(0.013, 1.9, 0.031)
+    forces = tmp_path / "forces.csv"
+    forces.write_text("\n".join(["time_s,force_N", *(f"{t:.3f},{f:.2f}" for t, f in zip(T, F, strict=True))]))
+    places = tmp_path / "places.csv"
+    lines = [f"{1e3 * t:.2f};{1.0 * t:.5f}" for t in slow]
+    places.write_text("\n".join(["t (ms);x (mm)", *lines]))
+    record = read_log(forces, join=places, time="time_s", position="x (mm)", force="force_N")
+    known = np.isfinite(record["position"])
+    assert 0 <= len(slow) - known.sum() <= 2
+    begin = record.meta["start_s"]
+    np.testing.assert_allclose(record["position"][known], 1e-3 * (record["time"][known] + begin), atol=1e-8)
+    np.testing.assert_allclose(record["force"], 900 + 100 * (record["time"] + begin), atol=0.02)
+    places.write_text("\n".join(["t (ms);x (mm)", *(f"{1e3 * (t + 9):.2f};{t:.5f}" for t in slow)]))
+    with pytest.raises(InputError, match=r"do not overlap: 0 to 1\.99 s"):
+        read_log(forces, join=places, time="time_s", position="x (mm)", force="force_N")

@@ -22,7 +22,7 @@ _WORDS = {
     "other": (
         r"vel|veloc|speed|twist|qd+|dq|ddq|acc|accel|acceleration|gyro|mag|imu|jerk|freq|strain|stress|modul|energy|work|"
         r"power|pwm|curr|volt|temp(?!s$)|humid|pressure|druck|gain|bias|offset|std|var$|cov|error|err$|residual|rate|"
-        r"stiff|damp|slope|battery|ekg|ecg|emg"
+        r"stiff|damp|slope|battery|e[kcm]g|peak|max$|min$|omega|[vwag][xyz]$"
     ),
     "torque": r"torq|moment(?!um)|drehm|tau$|t[xyz]$|m[xyz]$|tq$",
     "orientation": r"quat|orient|rot|roll$|pitch$|yaw$|euler|angle|winkel|rpy$|r[xyz]$|q[xyzw]$|theta$|phi$|psi$",
@@ -106,14 +106,15 @@ def read_name(name: str, stated: str = "") -> ColumnName:
         return _component((vector[1] or vector[2]).lower(), int(vector[3]), plain[: vector.start()])
     tokens = [token for token in _TOKEN.findall(plain) if token not in {"header", "field", "actual"}]
     lower = [token.lower() for token in tokens]
+    ending = re.search(r"_([A-Za-z\u00b5\u03bc]{1,4})$", plain)
+    suffix = ending[1] if ending and known_unit(ending[1]) else ""
+    if "current" in lower and (_now(lower) or _quantity(suffix) in {"position", "force"}):
+        lower.remove("current")
     kind = _kind(lower)
     worded = kind is not None
     quantity = _quantity(stated or symbol)
-    ending = re.search(r"_([A-Za-z\u00b5\u03bc]{1,4})$", plain)
-    if (
-        not quantity and kind in {None, "time"} and ending and known_unit(ending[1])
-    ):  # AI0_mm; force_mN has a word
-        quantity = _quantity(ending[1])
+    if not quantity and kind in {None, "time"} and suffix:  # AI0_mm; force_mN has a word
+        quantity = _quantity(suffix)
     if kind is None or (quantity and quantity != "other" and kind != "other"):
         kind = quantity or kind
     axis, stem = _axis(lower)
@@ -124,6 +125,12 @@ def read_name(name: str, stated: str = "") -> ColumnName:
     if kind is None and not all(_OPAQUE.fullmatch(token) for token in lower):
         kind = "other"
     return ColumnName(kind, axis, stem, any(_COMMAND.match(token) for token in lower), worded)
+
+
+def _now(tokens: list[str]) -> bool:
+    """True if a current value is the present one of a quantity, and no electric current."""
+    kinds = ("force", "position", "orientation")
+    return any(_PATTERNS[kind].match(token) for token in tokens for kind in kinds)
 
 
 def _component(vector: str, place: int, device: str) -> ColumnName:

@@ -213,8 +213,9 @@ def side_by_side(columns: Sequence[ColumnStatistics]) -> dict[str, list[ColumnSt
     for column in columns:
         kind, stem = column.named.kind, column.named.stem
         for i, token in enumerate(stem):
-            if column.named.worded and kind in {"time", "position", "force"} and token not in _NO_LABEL:
-                rest = (*stem[:i], "", *stem[i + 1 :], column.named.axis)
+            rest = (*stem[:i], "", *stem[i + 1 :], column.named.axis)
+            named = any(part.isalpha() for part in rest)
+            if named and kind in {"time", "position", "force"} and token not in _NO_LABEL:
                 families.setdefault(kind, {}).setdefault(rest, {}).setdefault(token, column)
     for places in families.get("position", {}).values():
         for forces in families.get("force", {}).values():

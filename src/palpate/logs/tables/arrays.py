@@ -209,6 +209,11 @@ def _afm(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]:
                 columns[name] = np.asarray(curve[title], float)
                 size = _take(size, columns[name].nbytes)
                 units[name] = {"time": "s", "force": "N"}.get(title, "m")
+    length = max(map(len, columns.values()), default=0)
+    columns = {
+        name: np.pad(column, (0, length - len(column)), constant_values=np.nan)
+        for name, column in columns.items()
+    }
     about = curves[0].metadata
     timed = any(name.endswith("time") for name in columns)
     more = {f"curves {_MAX_CURVES + 1} to {len(curves)}": "left out"} if len(curves) > _MAX_CURVES else {}

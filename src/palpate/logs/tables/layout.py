@@ -42,6 +42,7 @@ class Layout:
         header: the text of the header's line; empty without one.
         above: the lines before the header.
         quoted: cells may stand in quotes.
+        glued: line of the names that the first row hangs on; 0 of other texts.
     """
 
     dialect: Dialect
@@ -51,6 +52,7 @@ class Layout:
     header: str
     above: tuple[str, ...]
     quoted: bool
+    glued: int = 0
 
     @property
     def delimiter_name(self) -> str:
@@ -184,7 +186,9 @@ def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
     if len(above) > 1 and _is_units(titles := block.dialect.header(above[-1].text), block):
         symbols = titles
         above = above[:-1]
-    titles = (_unglue(above[-1], block) or _header(above[-1], block)) if above else []
+    unglued = _unglue(above[-1], block) if above else []
+    glued = above[-1].number if unglued else 0
+    titles = unglued or (_header(above[-1], block) if above else [])
     header = above.pop().text if titles else ""
     if titles and len(titles) < block.filled:
         raise InputError(
@@ -202,6 +206,7 @@ def _layout(path: Path, lines: Sequence[TextLine], block: _Block) -> Layout:
         header,
         tuple(line.text for line in above),
         block.quoted,
+        glued,
     )
 
 

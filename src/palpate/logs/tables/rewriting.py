@@ -31,7 +31,8 @@ _PAIR = re.compile(
 )
 _STAMP = re.compile(r"\s*(\d{1,2}:\d{2}:\d{2}(?:\.\d+)?|\d+(?:\.\d+)?)\s*(?:->|[,;\t:>])\s*")
 _LIST = re.compile(
-    rf'"?(?:array|tensor|Vector\d?|Quaternion)?\(?[\[(]+\s*(?:({_NUMBER})(?:[\s,;]+(?:{_NUMBER}))*)?\s*,?\s*[\])]+"?'
+    rf'"?(?:array|tensor)?\(?[\[(]{{1,4}}\s{{0,24}}(?:({_NUMBER})(?:[\s,;]{{1,24}}(?:{_NUMBER}))*)?\s{{0,24}},?\s{{0,24}}'
+    r'[\])]{1,6}"?'
 )
 _HOLE = "\x02"
 """Stands in a line for a list of it."""
@@ -176,8 +177,9 @@ def _pairs(line: str) -> list[tuple[str, str]]:
     """Labels and values of a line that holds nothing else; a stamp before them is a time."""
     stamp = _STAMP.match(line)
     place = stamp.end() if stamp else 0
+    end = len(line.rstrip())
     pairs = [("time", stamp[1])] if stamp else []
-    while place < len(line.rstrip()):
+    while place < end:
         match = _PAIR.match(line, place)
         if match is None:
             return []

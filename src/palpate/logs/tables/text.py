@@ -156,14 +156,16 @@ class _TextRows:
         lost = frame.filter(~frame["whole"]).get_column("line")
         if len(lost) == len(frame):
             raise InputError(f"{self.path} holds a header and no rows; give a log with a row for each sample")
+        glued = f"the first row hangs on the names in line {self.layout.glued} and is left out"
+        notes = [{"code": "lines-skipped", "text": glued}] if self.layout.glued else []
         if not len(lost):
-            return []
+            return notes
         first = lost[0] - self.above
         cells = len(self.layout.names)
         text = f"{len(lost)} lines are no rows of {cells} cells and are left out (the first is line {first})"
         if len(lost) == 1 and lost[0] == frame["line"][-1]:
             text = f"the last line ({first}) is cut short and is left out"
-        return [{"code": "lines-skipped", "text": text}]
+        return [*notes, {"code": "lines-skipped", "text": text}]
 
     def _frame(self, places: Sequence[int]) -> polars.DataFrame:
         """Line, whether it is whole, and the numbers at some places, by place."""
