@@ -125,7 +125,7 @@ def test_every_part_holds_of_an_answer_as_the_thesis_has_it():
 def test_a_part_differs_alone_when_its_own_number_does(suffix, change):
     bad = GOOD._replace(**change)
     found = claims.claims(grounds([bad] * 100), claims.FOAM)
-    assert [c.id for c in found if c.verdict == "contradicted"] == [f"network-foam.{suffix}"]
+    assert [c.id for c in found if c.verdict != "reproduced"] == [f"network-foam.{suffix}"]
 
 
 def test_nine_of_ten_runs_are_enough_and_fewer_are_not():

@@ -72,9 +72,10 @@ def thesis(
     from palpate_thesis.runs import Runs
 
     if list_:
-        width = 2 + max(len(study.NUMBER) for study in studies())
-        for study in studies():
-            print_lines(f"{study.NUMBER:<{width}}{texts(study.NUMBER)[0]}")
+        numbers = [entry.NUMBER for entry in studies()]
+        width = 2 + max(map(len, numbers))
+        for number in numbers:
+            print_lines(f"{number:<{width}}{texts(number)[0]}")
         return 0
     drawn = drawn or FigureOptions()
     drawn.check()

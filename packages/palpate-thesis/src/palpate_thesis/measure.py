@@ -109,10 +109,10 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
     runs = runs_for(study.NUMBER, runs)
     data = study.run(runs)
     claims = [note_for(claim, runs.laboratory) for claim in study.check(data)]
-    beside, tables = getattr(study, "beside", None), getattr(study, "tables", None)
+    beside, further = getattr(study, "beside", None), getattr(study, "tables", None)
     with apply_look():
-        for name, draw in (("", study.plot), (BESIDE, beside)):
-            for ending in dict.fromkeys((".png", *written.endings)) if draw else ():
+        for name, draw in (("", study.plot), *([(BESIDE, beside)] if beside else [])):
+            for ending in dict.fromkeys((".png", *written.endings)):
                 style.save(draw(data), folder / f"{study.NUMBER}{name}{ending}", written.dpi)
     return Done(
         study.NUMBER,
@@ -120,7 +120,7 @@ def _measure_study(study: FigureModule, runs: Runs, folder: Path, written: Measu
         claims,
         time.perf_counter() - start,
         inspect.getdoc(beside) or "" if beside else "",
-        tables(data) if tables else [],
+        further(data) if further else [],
     )
 
 

@@ -46,6 +46,8 @@ STEP = 0.1
 """Standard deviation of a small change of an unknown, as a fraction of its prior; half of the changes are small."""
 CANDIDATES = 8
 """Best laboratories of the search that are judged over all seeds."""
+PLAUSIBLE = 0.5
+"""Least fraction of the sentences that hold in a plausible laboratory: less shows one sentence against all others."""
 ATTEMPTS = 4
 """Tried laboratories that are judged for a sentence that does not hold in the inferred one."""
 VALUES = (0.05, 0.275, 0.5, 0.725, 0.95)
@@ -226,10 +228,14 @@ class LaboratorySearch:
     ) -> tuple[tuple[Laboratory, tuple[str, ...]], ...]:
         """For each sentence that does not hold in the inferred laboratory, a tried one where it does.
 
-        Of the laboratories in which it held once, those with most true sentences are judged over all seeds.
+        Of the plausible laboratories in which it held once, those with most true sentences are judged over all seeds.
         """
         missing = {s.id: s for s in self.sentences if not inferred.count_true([s])}
-        ranked = sorted(state.tried, key=lambda laboratory: -len(laboratory.true))
+        enough = PLAUSIBLE * len(self.sentences)
+        ranked = sorted(
+            (laboratory for laboratory in state.tried if len(laboratory.true) >= enough),
+            key=lambda laboratory: -len(laboratory.true),
+        )
         plausible: list[tuple[Laboratory, tuple[str, ...]]] = []
         for name in tuple(missing):
             if name not in missing:
@@ -326,7 +332,7 @@ class LaboratorySearch:
                 f"and {kept_out} of the {second} that were kept out of it."
             )
         true, total = counts["all"]
-        return f"{true} of {total} sentences hold, in-sample: all took part in its search."
+        return f"In its search {true} of {total} sentences held; all took part, so the count is in-sample."
 
 
 def find_best(tried: Sequence[TriedLaboratory]) -> list[Fractions]:

@@ -20,6 +20,11 @@ FOAM_BAND, RUBBER_BAND = 0.06, 0.15
 values are 10 % apart."""
 
 
+RATIO_BAND = 0.10
+"""Maximum relative difference of f/x from the printed one: a network that gives one K on every surface would otherwise
+agree on the surface that has it."""
+
+
 class Grounds(NamedTuple):
     """Data of a claim's verdict and note.
 
@@ -58,14 +63,17 @@ MASS = ClaimPart("M", lambda a: a.M, "kg", lambda a: 0.0 < a.M < SMALL)
 ERROR = _time("error", lambda a: a.error_gone)
 
 
-def _parts(band: float, similar: Callable[[NetworkAnswer], bool]) -> tuple[ClaimPart, ...]:
-    stiffness = ClaimPart("K", lambda a: a.over, "times f/x", lambda a: abs(a.over - 1.0) <= band)
+def _parts(band: float, ratio: float, similar: Callable[[NetworkAnswer], bool]) -> tuple[ClaimPart, ...]:
+    def near(a: NetworkAnswer) -> bool:
+        return abs(a.over - 1.0) <= band and abs(a.ratio / ratio - 1.0) <= RATIO_BAND
+
+    stiffness = ClaimPart("K", lambda a: a.over, "times f/x", near)
     damping = ClaimPart("B", lambda a: a.B / a.squares_B, "times that of least squares", similar)
     return (*TIMES, stiffness, damping, MASS)
 
 
-FOAM = _parts(FOAM_BAND, lambda a: 2 / 3 <= a.B / a.squares_B <= 1.5)
-RUBBER = _parts(RUBBER_BAND, lambda a: 0.0 < a.B < a.squares_B)
+FOAM = _parts(FOAM_BAND, 6700.0, lambda a: 2 / 3 <= a.B / a.squares_B <= 1.5)
+RUBBER = _parts(RUBBER_BAND, 62000.0, lambda a: 0.0 < a.B < a.squares_B)
 
 
 def claims(grounds: Grounds, parts: Sequence[ClaimPart]) -> list[ThesisClaim]:

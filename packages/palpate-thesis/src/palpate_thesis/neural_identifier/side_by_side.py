@@ -47,7 +47,7 @@ class Identified(NamedTuple):
     M: float  # [kg]
     settled_K: float  # time from which it stays within 10 % of its last value [s]
     settled_B: float
-    settled_M: float
+    settled_M: float  # within 10 % of its largest value: see `mass_settled_after`
     ripple: float  # standard deviation of K in the last half second, relative to K
     ratio: float  # f/x of the press [N/m]
     truth: Array  # K, B, M of the surface, shape (3,)
@@ -86,8 +86,8 @@ class Pair(NamedTuple):
     @property
     def faster(self) -> tuple[bool, bool, bool]:
         """True for each of K, B and M that least squares settles first."""
-        names = ("settled_K", "settled_B", "settled_M")
-        return tuple(getattr(self.squares, n) < getattr(self.network, n) for n in names)  # type: ignore[return-value]
+        a, b = self.squares, self.network
+        return a.settled_K < b.settled_K, a.settled_B < b.settled_B, a.settled_M < b.settled_M
 
     @property
     def nearer(self) -> tuple[bool, bool]:
@@ -164,9 +164,11 @@ def identified(shared: SharedPress, curve: Array) -> Identified:
     """Answer of a method from its K, B, M along a press, shape (n, 3)."""
     late = curve[-round(network.LATE / network.TICK) :]
     K, B, M = map(float, late.mean(axis=0))
-    settled = (press_runs.settled_after(values, end=len(curve) * network.TICK) for values in curve.T)
+    end = len(curve) * network.TICK
+    k, b = (press_runs.settled_after(values, end) for values in curve.T[:2])
+    m = press_runs.mass_settled_after(curve[:, 2], end)
     ripple = float(late[:, 0].std() / abs(K))
-    return Identified(K, B, M, *settled, ripple, shared.press.ratio, shared.truth)
+    return Identified(K, B, M, k, b, m, ripple, shared.press.ratio, shared.truth)
 
 
 def fraction(flags: Sequence[bool]) -> str:
