@@ -5,8 +5,8 @@
 
 The judge shares no law, no constant and no file with palpate. It imports `palpate.force.ForceLoop` alone and makes
 gains by `palpate tune` from its own arm file, unless --gains names some. `--law stop` judges in its place the simplest
-law with an F_max: at the ceiling (F_max - F_d - 4 N)/(K_eff theta + sqrt(K m)) to F_d, then back only. Without F_max, in
-the gains or by --force-max, five times the force takes its place in the columns, and no run of palpate's is condemned.
+law with an F_max: at the ceiling (F_max - F_d - 4 N)/(K_eff theta + sqrt(K m)) to F_d, then back only. Without F_max,
+in the gains or by --force-max, five times the force takes its place in the columns, and no run is condemned.
 
 Columns: the largest true force [N] (p50, p95, most); runs above F_max; runs in which the tip was faster than the
 approach before any touch; runs that settle, and the time from the touch until the force stays within 5 % [s] (p50, p95;
