@@ -4,8 +4,9 @@
     python benchmarks/judge/press_judge.py --arm fr3 --simulator mujoco --gains gains.toml --force-max 100
 
 The judge shares no law, no constant and no file with palpate. It imports `palpate.force.ForceLoop` alone and makes
-gains by `palpate tune` from its own arm file, unless --gains names some. Without F_max, in the gains or by --force-max,
-five times the force takes its place in the columns, and no run is condemned.
+gains by `palpate tune` from its own arm file, unless --gains names some. `--law stop` judges in its place the simplest
+law with an F_max: at the ceiling (F_max - F_d - 4 N)/(K_eff theta + sqrt(K m)) to F_d, then back only. Without F_max,
+in the gains or by --force-max, five times the force takes its place in the columns, and no run is condemned.
 
 Columns: the largest true force [N] (p50, p95, most); runs above F_max; runs in which the tip was faster than the
 approach before any touch; runs that settle, and the time from the touch until the force stays within 5 % [s] (p50, p95;
@@ -22,12 +23,12 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from press_draws import ARMS, JITTER, MAX_TOOL, MISSED, Arm, Draw, arm_file, draw_press
+from press_draws import ACCURACY, ARMS, JITTER, MAX_TOOL, MISSED, Arm, Draw, arm_file, draw_press
 from press_simulators import SIMULATORS, Axis, Engine
 
 CASES = ("clean", "layers", "cable", "pose", "drift")
@@ -36,6 +37,7 @@ AFTER_TOUCH, BEFORE_TOUCH = 5.0, 20.0  # s, longest parts of a run
 REST = 0.75  # s in the band, after which a run ends early
 WINDOW = 0.02  # s, over which the tip's speed in free motion is averaged
 FAST = 1.25  # of the approach: an inner loop overshoots by less
+BACKWARDS = 1e-4  # m/s per newton, at which the simplest law withdraws
 SIMILAR = 0.15  # relative difference of the gains' arm from the judge's, up to which nothing is said
 
 
@@ -44,6 +46,23 @@ class Law(Protocol):
 
     def update(self, force: float, position: float, missed: float = 0.0) -> float:
         """Speed of the commanded position [m/s]."""
+
+
+class StopLaw:
+    """Constant speed up to the first reading at the desired force; from then on backwards only."""
+
+    def __init__(self, speed: float, force: float) -> None:
+        self._speed, self._force, self._reached = speed, force, False
+
+    def update(self, force: float, position: float, missed: float = 0.0) -> float:
+        """Speed of the commanded position [m/s]."""
+        self._reached |= force >= self._force
+        return min(0.0, BACKWARDS * (self._force - force)) if self._reached else self._speed
+
+
+def ceiling(arm: Arm, force: float, force_max: float, cap: float) -> float:
+    """Largest speed that keeps F_max with readings within ACCURACY [m/s]."""
+    return (force_max - force - ACCURACY) / (arm.pushed(cap) + arm.swung(cap))
 
 
 class Run(NamedTuple):
@@ -152,6 +171,26 @@ def show(rows: dict[str, dict[str, float]], args: argparse.Namespace) -> None:
         print(f"{case:8}" + "".join(f"{number:>8}" for number in numbers))
 
 
+def judge_stop_law(args: argparse.Namespace, cases: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Rows of the simplest law with an F_max."""
+    args.force_max = args.force_max or 5 * args.force
+    speed = ceiling(ARMS[args.arm], args.force, args.force_max, args.cap)
+    return {case: judge(lambda: StopLaw(speed, args.force), case, args, speed) for case in cases}
+
+
+def judge_palpate(args: argparse.Namespace, cases: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Rows of palpate's law with the given gains, or with its own for the judge's arm."""
+    from palpate.force import ForceLoop
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = args.gains or tune(args, Path(folder))
+        gains = tomllib.loads(path.read_text(encoding="utf-8"))
+        for text in differences(gains["arm"]["inner"], ARMS[args.arm]):
+            print(f"the gains' arm has {text}", file=sys.stderr)
+        args.force_max = args.force_max or gains.get("force_max")
+        return {case: judge(lambda: ForceLoop.load(path), case, args, gains["approach"]) for case in cases}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -167,18 +206,11 @@ def main() -> None:
     parser.add_argument(
         "--gains", type=Path, help="file of `palpate tune`, for an arm within the judge's intervals"
     )
+    parser.add_argument("--law", choices=("palpate", "stop"), default="palpate")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     args = parser.parse_args()
-    from palpate.force import ForceLoop
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = args.gains or tune(args, Path(folder))
-        gains = tomllib.loads(path.read_text(encoding="utf-8"))
-        for text in differences(gains["arm"]["inner"], ARMS[args.arm]):
-            print(f"the gains' arm has {text}", file=sys.stderr)
-        args.force_max = args.force_max or gains.get("force_max")
-        chosen = CASES if args.case == "all" else (args.case,)
-        rows = {case: judge(lambda: ForceLoop.load(path), case, args, gains["approach"]) for case in chosen}
+    chosen = CASES if args.case == "all" else (args.case,)
+    rows = (judge_stop_law if args.law == "stop" else judge_palpate)(args, chosen)
     if args.json:
         finite = {c: {k: v if np.isfinite(v) else None for k, v in row.items()} for c, row in rows.items()}
         answer = {"arm": args.arm, "theta_s": ARMS[args.arm].theta, "force_max": args.force_max}

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks" / "judge"))
 import press_judge
 from press_draws import ACCURACY, ARMS, FULL_SPEED, Errors, draw_press
+from press_judge import StopLaw, ceiling
 from press_simulators import Axis, Engine, Sample
 
 FORCE, FORCE_MAX, CAP = 20.0, 100.0, 1e5
@@ -27,27 +28,12 @@ class Proportional:
         return min(self._limit, max(-self._limit, self._gain * (FORCE - force)))
 
 
-class Ceiling:
-    """A constant speed up to the first reading at the desired force; from then on backwards only."""
-
-    def __init__(self, speed):
-        self._speed, self._reached = speed, False
-
-    def update(self, force, position, missed=0.0):
-        self._reached |= force >= FORCE
-        return min(0.0, 1e-4 * (FORCE - force)) if self._reached else self._speed
-
-
-class Eager(Ceiling):
+class Eager(StopLaw):
     """Slow in free motion, at full speed as soon as a reading looks like a touch."""
 
     def update(self, force, position, missed=0.0):
         speed = super().update(force, position, missed)
         return FULL_SPEED if speed > 0 and force > 1.0 else speed
-
-
-def ceiling(arm):
-    return (FORCE_MAX - FORCE - ACCURACY) / (arm.pushed(CAP) + arm.swung(CAP))
 
 
 def judge(make, name, case, approach, runs=4, simulator="axis"):
@@ -74,21 +60,22 @@ def test_a_proportional_law_at_full_speed_is_condemned_on_layers(name):
 )
 @pytest.mark.parametrize("name", ARMS)
 def test_a_law_that_keeps_the_ceiling_is_never_above(name, simulator, runs):
-    speed = ceiling(ARMS[name])
+    speed = ceiling(ARMS[name], FORCE, FORCE_MAX, CAP)
     for case in press_judge.CASES:
-        row = judge(lambda: Ceiling(speed), name, case, speed, runs, simulator)
+        row = judge(lambda: StopLaw(speed, FORCE), name, case, speed, runs, simulator)
         assert row["above"] == 0, case
         assert row["fast"] == 0, case
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_a_ceiling_with_a_third_of_the_lag_is_condemned(name):
-    assert judge(lambda: Ceiling(3 * ceiling(ARMS[name])), name, "layers", 1.0)["above"] > 0
+    speed = 3 * ceiling(ARMS[name], FORCE, FORCE_MAX, CAP)
+    assert judge(lambda: StopLaw(speed, FORCE), name, "layers", 1.0)["above"] > 0
 
 
 @pytest.mark.parametrize("case", ["cable", "pose", "drift"])
 def test_a_law_that_takes_an_error_for_a_touch_is_too_fast(case):
-    assert judge(lambda: Eager(0.02), "ur5e", case, 0.02, runs=12)["fast"] > 0
+    assert judge(lambda: Eager(0.02, FORCE), "ur5e", case, 0.02, runs=12)["fast"] > 0
 
 
 @pytest.mark.parametrize("name", ARMS)
