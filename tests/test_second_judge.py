@@ -10,8 +10,9 @@ import pytest
 FOLDER = Path(__file__).resolve().parent.parent / "benchmarks" / "second_judge"
 sys.path.insert(0, str(FOLDER))
 
-import judge  # noqa: E402 -- beside the scripts
 import laboratory  # noqa: E402
+
+import judge  # noqa: E402 -- beside the scripts
 
 IDENTIFIED, FORCE = "identified", 1.0
 
