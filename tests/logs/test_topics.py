@@ -390,7 +390,7 @@ def test_logs_side_by_side_are_proposed_each_with_its_own_pair(tmp_path, names, 
     rows[300:] = [",".join([*row.split(",")[:3], "", "", ""]) for row in rows[300:]]
     path.write_text("\n".join([names, *rows]) + "\n")
     proposals = list_log(path).proposals
-    assert [(one.options["position"], one.options["force"]) for one in proposals] == pairs
+    assert [(p.options["position"], p.options["force"]) for p in proposals] == pairs
     second = {name: proposals[1].options[name] for name in ("time", "position", "force")}
     assert len(read_log(path, **second)) == 300
     with pytest.raises(InputError, match="holds 2 logs side by side; identify one"):

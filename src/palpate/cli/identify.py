@@ -353,8 +353,9 @@ def identify(
     Parameters
     ----------
     logs
-        Text in columns, Parquet, a spreadsheet, MATLAB v4 to v7, a ROS 1 bag, a ROS 2 bag or MCAP; the folder
-        of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book are logs of their own.
+        Text in columns, JSON, Parquet, a spreadsheet, MATLAB, HDF5, npz, TDMS, an AFM curve, a ROS 1 bag, a ROS 2
+        bag or MCAP; the folder of a run or a press, or its record.parquet; a folder of logs. Equal sheets of a book
+        are logs of their own.
     """
     output, cell = output or IdentifyOutput(), cell or CellOptions()
     log_options = OneLog(

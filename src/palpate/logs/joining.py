@@ -42,27 +42,27 @@ def join_sheets(first: Sheet, second: Sheet) -> Sheet:
         InputError: a file has no column of the time, or the times do not overlap.
     """
     pair = (_timed(first), _timed(second))
-    begin = max(float(one.time[0]) for one in pair)
-    end = min(float(one.time[-1]) for one in pair)
+    begin = max(float(log.time[0]) for log in pair)
+    end = min(float(log.time[-1]) for log in pair)
     if not begin < end:
         spans = " and ".join(
-            f"{one.time[0]:.10g} to {one.time[-1]:.10g} s ({one.sheet.path})" for one in pair
+            f"{log.time[0]:.10g} to {log.time[-1]:.10g} s ({log.sheet.path})" for log in pair
         )
         raise InputError(f"the times of the two logs do not overlap: {spans}; give logs of one clock")
-    inside = [one.time[(one.time >= begin) & (one.time <= end)] for one in pair]
+    inside = [log.time[(log.time >= begin) & (log.time <= end)] for log in pair]
     time = max(inside, key=len)
     names = [pair[0].clock.name]
     arrays = [time / time_factor(pair[0].clock)]
     stated: dict[str, Stated] = {}
     if pair[0].clock.name in first.stated and not pair[0].clock.clock:
         stated[names[0]] = first.stated[names[0]]
-    for one in pair:
-        for column in one.columns:
-            name = f"{one.sheet.path.stem}.{column.name}" if column.name in names else column.name
+    for log in pair:
+        for column in log.columns:
+            name = f"{log.sheet.path.stem}.{column.name}" if column.name in names else column.name
             names.append(name)
-            arrays.append(_at(time, one, column.values))
+            arrays.append(_at(time, log, column.values))
             if column.unit:
-                where = one.sheet.stated[column.name].where
+                where = log.sheet.stated[column.name].where
                 stated[name] = Stated(column.unit, where)
 
     def read(places: Sequence[int], _: Sequence[str]) -> tuple[list[Cells], list[dict[str, Any]]]:
@@ -86,16 +86,16 @@ def _timed(sheet: Sheet) -> _Timed:
     return _Timed(sheet, others, clock, time[fresh], with_time[fresh])
 
 
-def _at(time: Array, one: _Timed, column: Array) -> Array:
+def _at(time: Array, log: _Timed, column: Array) -> Array:
     """A column in the rows of a time; NaN in rows between its readings."""
-    values = column[one.rows]
+    values = column[log.rows]
     finite = np.isfinite(values)
     at = np.full(len(time), np.nan)
     if not finite.any():
         return at
-    own = one.time[finite]
-    near = np.clip(np.searchsorted(time, own), 1, len(time) - 1)
-    near -= (own - time[near - 1]) < (time[near] - own)
-    near = np.unique(near[(own >= time[0]) & (own <= time[-1])])
-    at[near] = np.interp(time[near], own, values[finite])
+    instants = log.time[finite]
+    near = np.clip(np.searchsorted(time, instants), 1, len(time) - 1)
+    near -= (instants - time[near - 1]) < (time[near] - instants)
+    near = np.unique(near[(instants >= time[0]) & (instants <= time[-1])])
+    at[near] = np.interp(time[near], instants, values[finite])
     return at

@@ -157,24 +157,20 @@ def _one_log(table: Sheet, rows: Sequence[ColumnStatistics], given: Mapping[str,
 
 def _lacking(columns: Sequence[ColumnStatistics]) -> str:
     """The signal that a log lacks, and what the log is good for."""
-    forces = [column.name for column in columns if column.named.kind == "force" and column.changes]
-    places = [
-        column.name
-        for column in columns
-        if column.may_be("position") and column.counts >= _MIN_POSITION_STEPS
-    ]
-    if forces and not places:
+    forces = [column.name for column in columns if column.named.kind == "force"]
+    places = [column.name for column in columns if column.named.kind == "position"]
+    moving = [column for column in columns if column.counts >= _MIN_POSITION_STEPS]
+    joints = [column.name for column in columns if column.named.kind == "joint"]
+    if forces and not places and not any(column.may_be("position") for column in moving):
         listed = shorten(", ".join(forces), _LISTED)
         return (
             f"a force ({listed}) and no position that moves: join the log of the positions with --join FILE; with the"
             " orientation of the sensor in free motion, palpate payload weighs its tool"
         )
-    joints = [column.name for column in columns if column.named.kind == "joint"]
-    places = [column.name for column in columns if column.named.kind == "position" and column.changes]
     if joints and not places and not forces:
         listed = shorten(", ".join(joints), _LISTED)
         return f"joints ({listed}) and no position and force of the tip: record these, or join them with --join FILE"
-    if places and not any(column.may_be("force") and column.changes for column in columns):
+    if places and not forces and not any(column.may_be("force") for column in moving):
         listed = shorten(", ".join(places), _LISTED)
         return f"a position ({listed}) and no force: join the log of the force with --join FILE"
     return _NO_PAIR

@@ -42,10 +42,10 @@ def read_log(
     force="/wrench.wrench.force.z")`, aligned on the rows of the topic that has most messages.
 
     Args:
-        path: text in columns (CSV, LabVIEW's .lvm, Aurora's .ddf, ...), Parquet, a spreadsheet, a MATLAB file (v4 to
-            v7), a ROS 1 bag, or a ROS 2 bag (its folder, or an MCAP or SQLite file of it); time may be dates and times
-            (ISO 8601). Or a table in memory: a DataFrame of polars or pandas, an Arrow table or stream, a mapping of
-            arrays.
+        path: text in columns (CSV, LabVIEW's .lvm, Aurora's .ddf, JSON, ...), Parquet, a spreadsheet, a MATLAB file,
+            HDF5, npz, TDMS, an AFM curve, a ROS 1 bag, or a ROS 2 bag (its folder, or an MCAP or SQLite file of it);
+            time may be dates and times (ISO 8601). Or a table in memory: a DataFrame of polars or pandas, an Arrow
+            table or stream, a mapping of arrays.
         rate: rows per second [1/s], for a log without a column of time that does not state its rate either.
         start: leave out the rows before it, in seconds from the first row [s].
         end: leave out the rows from it on, likewise [s].

@@ -145,8 +145,8 @@ class Signals:
             return read_run(path, **cut)
         if kind_of(path).is_bag:
             return self._of_bag(path, cut, samples)
-        own = {"delimiter": self.delimiter, "rate": self.rate, "join": self.join}
-        return self._of_table(path, cut | own)
+        reading = {"delimiter": self.delimiter, "rate": self.rate, "join": self.join}
+        return self._of_table(path, cut | reading)
 
     def _names(self, path: Path) -> list[str]:
         return list(open_table(path, kind_of(path), self.delimiter, self.limits, self.join).names)

@@ -186,7 +186,7 @@ def _tdms(path: Path, size: float) -> tuple[dict[str, AnyArray], dict[str, Any]]
             units[name] = str(channel.properties.get("unit_string", ""))
             steps.append((len(channel), channel.properties.get("wf_increment")))
     usual = [step for length, step in steps if length == max(steps)[0]] if steps else []
-    step = usual[0] if usual and all(own == usual[0] for own in usual) else None
+    step = usual[0] if usual and len({*usual}) == 1 else None
     rate = 1 / step if isinstance(step, float) and step > 0 else None
     return columns, {"units": {name: u for name, u in units.items() if known_unit(u)}, "rate": rate}
 
