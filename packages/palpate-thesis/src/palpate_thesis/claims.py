@@ -23,7 +23,7 @@ KINDS: Mapping[str, str] = {
     "cited": "about the set-up and the schemes that it cites",
     "ours": "that we add, checks and explanations",
 }
-"""What the sentences are about that are counted together, in the order of the counts, which are never summed."""
+"""Subjects of the sentences that are counted together, in the order of the counts, which are never summed."""
 ENOUGH = 0.9
 """Fraction of the runs in which a claim has to hold."""
 

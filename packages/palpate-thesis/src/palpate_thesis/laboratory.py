@@ -273,7 +273,7 @@ def load_laboratory(name: str) -> Laboratory:
 
 
 def describe_laboratory(name: str) -> str:
-    """What a laboratory is, in a sentence or two, from its file."""
+    """Description of a laboratory in a sentence or two, from its file."""
     if name == "bench":
         return "Laboratory: the bench, chosen by hand."
     about = str(read_toml(FILES.source(name), name).get("about", ""))
