@@ -6,10 +6,18 @@ import pytest
 from analysis.worlds import surface
 from palpate.bench.tables import with_values
 from palpate.errors import InputError
-from palpate.studies.analysis import linearise, stable_intervals, stable_stiffness
+from palpate.studies.analysis import linearise, sign_changes, stable_intervals, stable_stiffness
 
 # Of a tip alone, y and phi left out, as a feasibility study had them [N/m].
 ONE_DIRECTION = [(60.0, 1.0, 0.003, 12e3), (480.0, 0.25, 0.0015, 410e3)]
+
+
+def test_sign_changes_are_found_between_the_steps():
+    found = list(sign_changes(np.cos, 0.0, 10.0, log=False))
+    assert found == pytest.approx([0.5 * np.pi, 1.5 * np.pi, 2.5 * np.pi], abs=1e-3)
+    (root,) = sign_changes(lambda x: np.log(x / 300.0), 1.0, 1e4, steps=3, log=True)
+    assert root == pytest.approx(300.0, rel=1e-4)
+    assert not list(sign_changes(lambda x: np.nan if 4.0 < x < 6.0 else x - 5.0, 0.0, 10.0, log=False))
 
 
 @pytest.mark.long

@@ -40,6 +40,11 @@ def test_errors_go_through_the_inverse_and_the_transpose():
     assert still(law, q, Vec3(0.5, 0.001, 0.01), 12.0, ticks=n) == pytest.approx(expected)
 
 
+def test_the_bench_posture_is_stable():
+    q = ARM.inverse(START, 1.0)
+    assert growth_rate(LAW, ARM.model(q, ZERO3), INTO) < 1e-3
+
+
 @pytest.mark.parametrize("q", [(-0.30, -0.43, 0.75), (0.17, -0.15, 0.51)])
 @pytest.mark.parametrize("gain", [0.1, 1.0, 10.0])
 def test_in_some_postures_no_gain_makes_it_stable(q, gain):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.bench import build, load, with_values
-from palpate.excitation import HybridLoop, LinearSurface
+from palpate.excitation import HybridLoop, KnownBandwidth, LinearSurface
 from palpate.excitation.force_loops import contact_force
 from palpate.excitation.multisine import low_peak
 
@@ -47,6 +47,13 @@ def test_friction_holds_a_weak_force_back_more_than_a_strong_one():
     strong = np.abs(contact_force(HybridLoop(), OMEGA, Z, 5 * amplitudes)) / 5
     free = np.abs(contact_force(HybridLoop(friction=0.0), OMEGA, Z, amplitudes))
     assert weak[0, 1] < strong[0, 1] < free[0, 1]
+
+
+def test_the_bandwidth_of_a_robot_is_where_071_is_left():
+    at = 2 * np.pi * np.array([12.0])
+    found = KnownBandwidth(12.0).transfer(at, RUBBER.impedance(at)[None], SLOW)
+    assert np.abs(found).item() == pytest.approx(np.sqrt(0.5))
+    assert KnownBandwidth(12.0).stable(RUBBER)
 
 
 @pytest.mark.parametrize(
