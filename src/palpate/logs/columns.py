@@ -69,7 +69,7 @@ class ColumnStatistics:
 
     @cached_property
     def named(self) -> ColumnName:
-        """What the name and the stated unit say."""
+        """Quantity, axis and device by the name and the stated unit."""
         reading = read_name(self.name, self.unit or "")
         return replace(reading, kind="time") if self.clock else reading
 

@@ -68,7 +68,7 @@ _LENGTH_LIMIT = 60
 
 @dataclass(frozen=True)
 class ColumnName:
-    """What a column's name says.
+    """Statements of a column's name.
 
     Args:
         kind: `time`, `position`, `force`, `torque`, `orientation`, `joint`; `other` for any other quantity, a counter
