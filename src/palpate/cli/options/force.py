@@ -65,7 +65,7 @@ class PressOptions:
     if not given, and at most what the sensor reads; none for a slide."""
 
     def highest_force(self, arm: Arm, *, slides: bool) -> float | None:
-        """F_max [N]."""
+        """F_max, as given or as usual, in newtons; None for a slide."""
         from palpate.force.gains import usual_force_max
 
         if self.force_max is not None:
