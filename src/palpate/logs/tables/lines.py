@@ -114,6 +114,12 @@ class Dialect:
         return 1 if seconds_of_text(cell) is not None else -1
 
 
+def is_json(begin: bytes) -> bool:
+    """True if a text begins as JSON does: an object, or a list of objects."""
+    text = begin.removeprefix(b"\xef\xbb\xbf").lstrip()
+    return text.startswith(b"{") or (text.startswith(b"[") and text[1:].lstrip().startswith(b"{"))
+
+
 def first_lines(path: Path) -> tuple[list[TextLine], bool]:
     """The lines at a file's beginning that hold something, and whether they end with CR alone.
 

@@ -38,12 +38,6 @@ _HOLE = "\x02"
 """Stands in a line for a list of it."""
 
 
-def is_json(begin: bytes) -> bool:
-    """True if a text begins as JSON does: an object, or a list of objects."""
-    text = begin.removeprefix(b"\xef\xbb\xbf").lstrip()
-    return text.startswith(b"{") or (text.startswith(b"[") and text[1:].lstrip().startswith(b"{"))
-
-
 def rewrite_json(path: Path, budget: ReadingBudget) -> str:
     """A JSON log as a table: an object a line, a list of objects, or an object of lists; nested names have points.
 

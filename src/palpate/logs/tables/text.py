@@ -16,7 +16,6 @@ from palpate.errors import InputError
 from palpate.files.reading import ReadingBudget
 from palpate.logs.tables import lines
 from palpate.logs.tables.layout import LABVIEW_HEADER_END, Layout, find_layout, read_preamble
-from palpate.logs.tables.rewriting import is_json, rewrite_json, rewriter
 from palpate.logs.tables.sheet import Cells, Sheet, Stated, is_finite
 
 _NO_DELIMITER = "\x1f"
@@ -51,13 +50,16 @@ def read_text_sheet(
     if content is None:
         budget.take(path.stat().st_size)
         with path.open("rb") as file:
-            json = is_json(file.read(_FIRST_BYTES))
-        if json:
-            return read_text_sheet(path, budget, ",", rewrite_json(path, budget), above=1)
-        head, bare_returns = lines.first_lines(path)
-        rewrite = None if bare_returns else rewriter(head)
-        if rewrite is not None:
-            return read_text_sheet(path, budget, delimiter, *rewrite(path, budget))
+            json = lines.is_json(file.read(_FIRST_BYTES))
+        head, bare_returns = ([], False) if json else lines.first_lines(path)
+        if json or (not bare_returns and any(mark in line.text for line in head for mark in ":=[(")):
+            from palpate.logs.tables.rewriting import rewrite_json, rewriter
+
+            if json:
+                return read_text_sheet(path, budget, ",", rewrite_json(path, budget), above=1)
+            rewrite = rewriter(head)
+            if rewrite is not None:
+                return read_text_sheet(path, budget, delimiter, *rewrite(path, budget))
     else:
         head = lines.lines_of(path, content)
         bare_returns = False
