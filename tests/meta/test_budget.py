@@ -14,15 +14,15 @@ ROOM = 1.005
 """Factor by which a figure may exceed its budget, so that two people can add a line on the same day."""
 BUDGET = {
     "distributions": 2,
-    "files": 426,
-    "tokens": 556373,
-    "tokens in a line of code": 10.32,
-    "lines of tests": 51015,
-    "lines of benchmarks": 11188,
-    "words in documents": 63929,
+    "files": 444,
+    "tokens": 591406,
+    "tokens in a line of code": 10.34,
+    "lines of tests": 49860,
+    "lines of benchmarks": 12778,
+    "words in documents": 66150,
     "private imports from another distribution": 0,
     "classes of one name": 4,
-    "modules without a test of their name": 205,
+    "modules without a test of their name": 209,
     "functions in _of": 89,
     "short docstrings": 0,
 }
