@@ -24,6 +24,7 @@ SEEDED = {"run", "press", "slide"}
 WITHOUT = {
     "live": "shows a page",
     "completion": "prints a script",
+    "demo": "runs identify, which prints one",
     "thesis": "writes claims.json",
 }
 """Commands that print no object, and what they do instead."""
