@@ -306,7 +306,8 @@ def check_force_max(arm: Arm, force: float, force_max: float | None) -> None:
         return
     if force >= arm.sensor.full_scale:
         raise InputError(
-            f"the force of {force:g} N is not below the sensor's full scale of {arm.sensor.full_scale:g} N; ask for less"
+            f"the force of {force:g} N is not below the sensor's full scale of {arm.sensor.full_scale:g} N; ask for "
+            "less"
         )
     least = force + reading_error(arm, force)
     if not force_max > least:
