@@ -1,6 +1,7 @@
 """The second judge of identification can tell: answers that are wrong, too wide, or died are counted as such."""
 
 import ast
+import json
 import sys
 from pathlib import Path
 
@@ -28,7 +29,9 @@ def answer(value, half, **others):
 
 
 def counts(log, *answers, codes=(0, 0)):
-    return judge.tally([judge.judge(log, given, codes) for given in answers])
+    """Counts of some answers to a log, by way of the file that a run is resumed from."""
+    rows = [json.dumps(judge.judge(log, given, codes)) for given in answers]
+    return judge.tally([json.loads(row) for row in rows])
 
 
 @pytest.fixture(scope="module")

@@ -63,8 +63,10 @@ def misses(low: float, high: float, truth: tuple[float, float], covers: bool) ->
     """Whether an interval holds, and the distance of its middle from the truth in half-widths."""
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
     if covers:
-        return low <= truth[0] and truth[1] <= high, max(abs(end - middle) for end in truth) / half
-    away = max(truth[0] - middle, middle - truth[1], 0.0)
+        return bool(low <= truth[0] and truth[1] <= high), float(
+            max(abs(end - middle) for end in truth) / half
+        )
+    away = float(max(truth[0] - middle, middle - truth[1], 0.0))
     return away <= half, away / half
 
 
@@ -99,8 +101,8 @@ def judge(log: laboratory.Log, answer: dict, codes: tuple[int, int]) -> dict:
             results.append({"name": name, "said": (low, high), "true": truth, "holds": holds, "away": away})
     doubtful = DOUBTFUL & {warning["code"] for warning in answer.get("warnings", ())}
     known, expected = log.known <= KNOWN, 0 if identified and not doubtful else 1
-    row = {"world": log.name, "model": answer.get("model"), "results": results, "known": known}
-    row |= {"sharp": known and bool(width <= max(SHARP, SHARP_TIMES * log.known)), "crash": 70 in codes}
+    row = {"world": log.name, "model": answer.get("model"), "results": results, "known": bool(known)}
+    row |= {"sharp": bool(known and width <= max(SHARP, SHARP_TIMES * log.known)), "crash": 70 in codes}
     wrong_code = codes[0] != codes[1] or (codes[0] < 2 and codes[0] != expected)
     return row | {"exit": wrong_code, "refused": codes[0] == 2}
 
