@@ -147,7 +147,6 @@ def test_a_lag_with_its_std(log, capsys, words):
     ("words", "doubt"),
     [
         (("--position", "position_mm:m"), "'position_mm' is taken in m as given, but its name says mm"),
-        pytest.param(("--position", "1:m"), "is the position in mm?", marks=pytest.mark.long),
         pytest.param(
             ("--time", "time_s:min"), "is taken in min as given, but its name says s", marks=pytest.mark.long
         ),

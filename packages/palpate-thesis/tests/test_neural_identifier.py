@@ -183,5 +183,5 @@ def test_a_study_runs_and_says_why(study):
     with apply_look():
         drawing = study.plot(data)
     lettered = [axis for axis in drawing.axes if axis.get_title(loc="left").startswith("(")]
-    assert lettered == drawing.axes
+    assert lettered == (drawing.axes if len(drawing.axes) > 1 else [])
     drawing.canvas.draw()

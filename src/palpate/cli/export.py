@@ -142,6 +142,7 @@ def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -
         InputError: no arm or no force.
     """
     from palpate.force import Known, known_from, load_arm, tune
+    from palpate.force.gains import usual_force_max
 
     if parameters.arm is None or law.force is None:
         raise InputError(
@@ -152,9 +153,9 @@ def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -
         known = known_from(read_found(identified), str(identified))
     else:
         known = Known.of_range((parameters.stiffness.si,) * 2)
-    return tune(
-        load_arm(parameters.arm), law.force.si, known.with_damping_up_to(values.si(parameters.damping))
-    ).gains
+    arm, force = load_arm(parameters.arm), law.force.si
+    known = known.with_damping_up_to(values.si(parameters.damping))
+    return tune(arm, force, known, force_max=usual_force_max(force, arm.sensor)).gains
 
 
 def export_scene(
