@@ -215,7 +215,7 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
             f"note: a force is as true as its sensor, ± {gains.arm.sensor.accuracy:g} N by its maker"
         )
     dies = f"if this process dies: {arm.watchdog}"
-    return [arms, does, behind, stops, dies, _describe_lying_sensor(gains, limits), record_line, *notes]
+    return [arms, does, stops, dies, behind, _describe_lying_sensor(gains, limits), record_line, *notes]
 
 
 def _describe_lying_sensor(gains: Gains, limits: PressLimits) -> str:
