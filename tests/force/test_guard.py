@@ -116,6 +116,15 @@ def test_a_bias_that_does_not_follow_the_tip_is_taken_out_and_a_drift_is_said():
     assert loop.phase == "free motion"
 
 
+def test_white_noise_is_no_drift_however_short_the_free_motion():
+    gains = gains_of("ur5e")
+    for seed in range(200):
+        loop, rng, x = ForceLoop(gains), np.random.default_rng(seed), 0.0
+        for _ in range(400):
+            x += gains.arm.tick * loop.update(0.1 * rng.standard_normal(), x)
+            assert loop.trouble != TROUBLES[DRIFTS]
+
+
 def test_an_offset_beyond_the_bias_holds_the_tip():
     gains = gains_of("ur5e")
     loop, rng, x = ForceLoop(gains), np.random.default_rng(0), 0.0

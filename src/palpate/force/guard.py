@@ -8,7 +8,7 @@ from palpate._jit import law, part, reader, writer
 from palpate._jit.overloads import leaves, places
 from palpate.arrays import Array
 from palpate.force.contact_estimate import ContactEstimate
-from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch
+from palpate.force.contact_evidence import FREE_MOTION, MEMORY, Watch, behind
 from palpate.force.law import Cautious, CautiousState
 from palpate.force.stage import LEARNING, LOCKED, MOST, follows_no_tip
 from palpate.force.stiffness_bound import STIFFER
@@ -48,7 +48,7 @@ NEAR = 0.05
 SCALES, FAR = 10.0, 1e3
 """Full scales, and metres, above which a reading is none."""
 SEEN = 8.0
-"""Standard deviations of the drift's estimate from which it is said."""
+"""Standard deviations of a mean over the free motion behind from which a drift is said: early on they are large."""
 
 
 @part
@@ -146,7 +146,7 @@ def allowed_speed(law, guard, after, desired, force, speed):
         return speed, BEYOND
     if guard.losses >= MOST and after.stage.phase == LEARNING and guard.trouble == FINE:
         return speed, SWINGS
-    drifts = abs(after.watch.drift) > SEEN * (after.watch.variance * law.period) ** 0.5
+    drifts = MEMORY * abs(after.watch.drift) > SEEN * (after.watch.variance / behind(law, after)) ** 0.5
     return (
         speed,
         DRIFTS if drifts and guard.trouble == FINE and after.stage.phase == FREE_MOTION else guard.trouble,
