@@ -9,7 +9,7 @@ what it starts from to half as much again, changing from tick to tick.
 
 A cell of stiffnesses has one norm in which the ticks of its corners contract. A tick is affine in the integral gain,
 and in the matrix exponential of the plant; the distance of that from the hull of its corners is bounded by its second
-derivative, element by element, as docs/force.md derives it.
+derivative, element by element, as docs/proofs.md derives it.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ old as the sensor's samples, by at most epsilon. Then
     F <= F_d + epsilon + (K_eff Theta + D + M) v
 
 Theta [s] is the largest residual travel per unit of speed: what the tip still moves after the command has become zero,
-seen from the last reading below F_d (`residual_travel`); D v is a damper's part, M v a mass's. Proof: docs/force.md.
+seen from the last reading below F_d (`residual_travel`); D v is a damper's part, M v a mass's. Proof: docs/proofs.md.
 M = sqrt(K m) is the momentum of one impact, and a margin: repeated impacts in step with the loop are not in it.
 """
 

@@ -23,7 +23,7 @@ class AskOptions:
     force: values.Force | None = None
     "Desired force, N, or with a unit as 20:N."
     force_max: values.Force | None = None
-    """F_max: the force never exceeds it, on layers and after a false touch, N (docs/force.md states the assumptions).
+    """F_max: the force never exceeds it, on layers and after a false touch, N (docs/proofs.md states the assumptions).
     That of the gains; without gains five times the force, and at most what the sensor reads."""
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from where the force is reached on."
