@@ -65,7 +65,7 @@ bench: .venv/dev.stamp ## measure what a tick and a cold start cost here
 live: .venv/dev.stamp ## measure the live page in headless Chromium: frames a second, and slider to picture
 	$(BIN)/python benchmarks/live/measure.py
 
-attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an hour of each experiment, faults in mid-press; into docs/reliability.md, docs/wires.md
+attack: .venv/dev.stamp ## 10,000 hostile inputs, faults of the disk, kills, an hour of each experiment, faults in mid-press; into docs/reliability.md, docs/rehearsal.md
 	$(BIN)/python benchmarks/attack/run.py --write
 	$(BIN)/python benchmarks/figures.py --only wires-faults
 

@@ -27,7 +27,7 @@ from palpate.force.simulated_press import surface
 from palpate.robots import SerialArm
 from wires.slow_cell import ADDRESSES, PATIENCE, REHEARSAL
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "wires.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "rehearsal.md"
 
 
 @contextmanager
