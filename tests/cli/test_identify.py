@@ -218,6 +218,6 @@ def test_wrong_input_is_one_line_and_code_2(log, capsys, kind):
 
 
 def test_every_warning_is_in_the_guide(root):
-    guide = (root / "docs/identify.md").read_text()
+    guide = (root / "docs/answer.md").read_text()
     missing = [code.word for code in Code if f"`{code.word}`" not in guide]
     assert not missing
