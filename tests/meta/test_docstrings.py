@@ -2,7 +2,7 @@
 
 import ast
 
-# The methods of every part, told once in CONTRIBUTING.md; and what a part remembers, told by its fields.
+# The methods of every part, told once in docs/architecture.md; and what a part remembers, told by its fields.
 METHODS_OF_A_PART = {"start", "start_at", "step"}
 
 

@@ -1,4 +1,4 @@
-"""The rooms, as the contract of `make lint` and CONTRIBUTING have them."""
+"""The rooms, as the contract of `make lint` and docs/architecture.md have them."""
 
 import ast
 import re
@@ -6,11 +6,11 @@ import tomllib
 
 
 def test_the_house_is_drawn_as_it_stands(root):
-    """CONTRIBUTING's drawing, the contract of the imports and the folders name the same rooms, in the same order."""
+    """The drawing of the house, the contract of the imports and the folders name the same rooms, in the same order."""
     config = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
     contract = config["tool"]["importlinter"]["contracts"][0]["layers"]
     layers = [set(re.findall(r"\w+", layer)) for layer in contract]
-    text = (root / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## The house")[1]
+    text = (root / "docs" / "architecture.md").read_text(encoding="utf-8").split("## The house")[1]
     drawn = re.findall(r"(?m)^    ([\w|  ]*?\w)(?=  +|$)", text.split("Where does a file go?")[0])
     assert [set(re.findall(r"\w+", line)) for line in drawn] == layers
     package = root / "src" / "palpate"
