@@ -185,32 +185,22 @@ def markdown(scores: list[Score]) -> str:
     """
     every = tables(scores)
     told = [line for line in summary(scores) if not line.startswith("seconds")]  # no second run has the same
-    parts = ["```\n" + "\n".join(told) + "\n```"]
-    parts += [_markdown(name, every[name]) for name in ("nuisance", "surface", "motion")]
     low = flagged(every["surface x nuisance"])
-    parts.append(
-        f"Cells of surface and nuisance with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: "
-        f"{', '.join(low) or 'none'}."
+    told.append(
+        f"cells with {ENOUGH} answers or more of which fewer than {LEAST:.0%} hold: {', '.join(low) or 'none'}"
     )
-    return "\n\n".join(parts)
+    return "```\n" + "\n".join(told) + "\n```\n" + _markdown([*every["nuisance"], *every["surface"]])
 
 
-def _markdown(name: str, rows: list[dict[str, Any]]) -> str:
-    columns = ("K", "B", "M", "all", "apparent", WORKING_POINT)
-    lines = [
-        f"| {name} | logs | {' | '.join(columns)} | K known and given | K sharp | K width | lags invented |",
-        "|---" * 12 + "|",
-    ]
+def _markdown(rows: list[dict[str, Any]]) -> str:
+    columns = ("K", "B", "M", "apparent", WORKING_POINT)
+    lines = [f"| nuisance, surface | logs | {' | '.join(columns)} | K width |", "|---" * 8 + "|"]
     for figures in rows:
-        known = figures["K known"]
-        given = f"{figures['K known and given']} of {known}" if known else "-"
         cells = [
+            figures["name"],
             str(figures["logs"]),
             *(_three(figures[c]) for c in columns),
-            given,
-            f"{figures['K sharp']} of {known}" if known else "-",
             _short(figures["K"]["width"]),
-            str(figures["lag invented"]),
         ]
-        lines.append(f"| {figures['name']} | {' | '.join(cells)} |")
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
