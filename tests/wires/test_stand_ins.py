@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import queue
-import re
 import select
 import socket
 import struct
@@ -14,20 +13,17 @@ import threading
 import time
 from contextlib import contextmanager
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
 from rtde_arm import RTDE, SCRIPT, Server
-from rtde_controller import SIMULATED, Controller
+from rtde_controller import Controller
 from tool_axis_arm import ToolAxisArm
 
 from palpate.force import load_arm
 from palpate.force.simulated_press import surface
 from palpate.robots import SerialArm
 from wires.slow_cell import ADDRESSES, PATIENCE, REHEARSAL
-
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "rehearsal.md"
 
 
 @contextmanager
@@ -364,16 +360,3 @@ def test_the_motions_of_franky_move_or_are_refused():
     still, way = map(float, said[4:])
     assert abs(still) < 1e-6
     assert -0.011 < way < -0.002
-
-
-def test_the_page_names_what_is_simulated():
-    """Each command of the tables above stands in the page's row of refusals, and each simulated one in the other."""
-    page = DOCS.read_text(encoding="utf-8")
-    rows = {m[1]: (m[2], m[3]) for m in re.finditer(r"(?m)^\| ([^|]+) \| ([^|]*) \| ([^|]*) \|$", page)}
-    simulated, refused = rows["commands of ur-rtde"]
-    for name in {**REFUSED, **SENT}:
-        assert f"`{name}`" in refused or " that turns" in name, name
-    for name in ("speedL", "servoL", "zeroFtSensor", "setWatchdog", "getStepTime", "isSteady"):
-        assert f"`{name}`" in simulated, name
-    variables = set(re.findall(r"`(\w+)`", rows["variables of RTDE"][0]))
-    assert variables == {name for name in SIMULATED if "register" not in name}

@@ -2,9 +2,58 @@
 
     python -m palpate.certify.force_certificate certificate.json
 
-It is written from the page on force alone, and shares no line with what makes certificates. Numbers are integers over
-2^160; a matrix has a bound of its elements' error. Each tick contracts if P - Phi^T P Phi is positive definite for
-P = L L^T: proved by a root whose square differs from it by less than is left over.
+It is written from the specification below alone, and shares no line with what makes certificates. Numbers are
+integers over 2^160; a matrix has a bound of its elements' error. Each tick contracts if P - Phi^T P Phi is positive
+definite for P = L L^T: proved by a root whose square differs from it by less than is left over.
+
+The file is JSON: `form`, `gains` (as `gains.toml`, SI), `claims`, and `measured`, an inner loop from a log that takes
+the place of `gains.arm.inner`. Let T = 1/rate, K_s the arm's `stiffness`, and for a position arm K_s' = infinity,
+cap' = cap/(1 + cap/K_s), for a torque arm and a servo K_s' = K_s, cap' = cap. With K_eff(k) = 1/(1/K_s' + 1/k), f =
+k/K_s' and theta' = theta (1 - relief (f + 1/2)/(f + 1)), g(k) = alpha/(theta' K_eff(k)); the gain at the cap is
+g(cap').
+
+*State.* `state` names its numbers in order, `units` has w0, k0, wf. x is the tip's position, v = xdot/w0; f1, f2, ...
+are the sensor's low-pass in units of k0, f(i+1) the derivative of f(i) divided by wf; r1 ... rn are the readings of
+age 1 to n, in k0; u the speed that the law commands [m/s]; c0 the commanded position [m], c1 ... (position arm) those
+of earlier ticks; t1 ... (torque arm) torques in k0 of this tick (t1) and earlier ones. At each tick:
+
+- r1 takes the sensor's reading at the tick's beginning: f1, or (K x + B xdot)/k0 without a low-pass; r(i+1) takes
+  r(i).
+- u = -g k0 r(a) for a reading of age a; a = 0 is the reading at this tick's beginning. c0 grows by T u. c(i+1) takes
+  c(i). Servo: u = (1 - s) u' - s g k0 r(a) and c0 grows by T (u + n (u - u')), u' the u of before, s = T/(T + l/10),
+  n = n(k) = (l/(2 q) (1 + sqrt(max(1 - 4 m K_s q/D^2, 0))) + l/10)/T, l = D/K_s, q = 1 + k/K_s, at k = cap for a
+  constant gain.
+- During the tick an input is held. Position arm or servo of d ticks of delay: c(d - 1) as it was, and the new c0 for
+  d = 0. Torque arm: K_s/k0 (new c0 - x) - D w0/k0 v, with x, v of the tick's beginning, late by d ticks by way of t1
+  ... td.
+- Within the tick, position arm: xddot = w^2 (input - x) - 2 z w xdot; torque arm: m xddot = k0 input - K x - B xdot;
+  servo: m xddot = K_s (input - x) - D xdot - K x - B xdot; low-pass: a_0 (K x + B xdot)/k0 = f + ... with the
+  Butterworth polynomials, several sections multiplied.
+
+d = ceil(delay x rate - 1e-9). A `delay_interval` gives d by its upper end and e = d - floor(lower end x rate + 1e-9):
+then d - e commands and e more readings are kept, and the cells' `loss` (0 ... e) is by how much the reading is
+younger.
+
+*Claims.* A surface is given by K + B/theta in `low` ... `high` and B/K in `least` ... `most`. `held` and `one-sided`:
+g is 1 to `shares`[1] times the gain at the cap, `shares`[0] is 1, `ages` are equal. `adapting`: g is `shares` times
+alpha/(theta K_eff(K + B/theta)), the age any of `ages` (with e, up to e more). Servo: g and n are g(k) and n(k) of
+any k from (K + B/theta)/`shares`[1] to (K + B/theta)/`shares`[0]; the corners of a cell are both ends of g with both
+ends of n. `ages`[1] is at least ceil(rate/sampling - 1e-9), and `ages`[0] is above 0 without a low-pass. Where
+`shares`[0] is below 0.01 (position arm), K is fixed at `high`: only g K counts, and g runs from `shares`[0]
+alpha/(theta high (1 + most/theta)) to `shares`[1] alpha/(theta high (1 + least/theta)). The cells, as rectangles in
+these two numbers, have to cover the claim, each by the corners of its rectangle, for each `loss` and `part`; a cell
+of a `one-sided` claim spans all of `low` ... `high`. Parts: the ranges of w^2 and of 2 z w are cut into `parts` each;
+part = i parts + j.
+
+*Cells.* With P = L L^T (`norm` is L by rows), P - Phi^T P Phi has to be positive definite at all corners: of K +
+B/theta, B/K, g, the part, and for all ages. For a position arm with a known inner loop that is all, since Phi is
+affine in each. For the others E = exp(T A) is not: each element of E is within b of the multilinear function through
+the corners, b = sum over the parameters of 1/8 max |E''|, for which |E''| is at most twice the block at the upper
+right of exp(T [[M, D, 0], [0, M, D], [0, 0, M]]): M has the largest sizes of A's elements (largest values on the
+diagonal), D those of A's change along the parameter. The parameters are w^2 and 2 z w (with x counted from the held
+input), or K + B/theta and 1/(1 + B/(K theta)). With |b_j| the norm of column j of b, as P bounds it, m the number of
+columns that are not zero, and F the map from the state to (x, v, f..., input), P - (1 + h) Phi^T P Phi - (1 + 1/h)
+F^T diag(m |b_j|^2) F has to be positive definite for some h > 0 at each corner.
 """
 
 from __future__ import annotations
