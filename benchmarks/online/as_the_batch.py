@@ -5,8 +5,7 @@
 
 Streams are those of `streams.py`: each surface with each kind of position and of sensor; then surfaces that become
 another. A parameter that is called identified holds if its 95 % interval has a right value in it; it is confidently
-wrong if it is more than a quarter off, or more than three half-widths and 2 %. A verdict flips when that of K is
-another than a tenth of a second before, from one second on.
+wrong if it is more than a quarter off, or more than three half-widths and 2 %.
 """
 
 from __future__ import annotations
@@ -29,18 +28,15 @@ LOOK = 100
 """Ticks from one look at the verdict to the next."""
 
 
-def on_line(made: Stream) -> tuple[Any, int, int]:
-    """The estimate at the end, how many times K's verdict changed, and at how many looks all were refused."""
+def on_line(made: Stream) -> tuple[Any, int]:
+    """The estimate at the end, and at how many looks all were refused."""
     one = ContactIdentifier(made.low_pass, RATE, made.lag, lag_std=made.lag_std, sampling=made.sampling)
     one.update_many(made.position[:1000], made.force[:1000])
-    last, flips, refused = "", 0, 0
+    refused = 0
     for k in range(1000, len(made.force), LOOK):
         one.update_many(made.position[k : k + LOOK], made.force[k : k + LOOK])
-        now = one.estimate().verdicts()["K"]
-        flips += last not in ("", now)
-        refused += now == "rejected"
-        last = now
-    return one.estimate(), flips, refused
+        refused += one.estimate().verdicts()["K"] == "rejected"
+    return one.estimate(), refused
 
 
 def batch(made: Stream) -> Any:
@@ -68,20 +64,17 @@ class Tally:
 
     def add(self, made: Stream) -> None:
         """Judges a stream both ways."""
-        found, flips, looks = on_line(made)
+        found, looks = on_line(made)
         log = batch(made)
         verdicts, n = found.verdicts(), self.n
         n["streams"] += 1
         n["refused"] += bool(found.rejected)
         n["looks"] += looks
-        n["another"] += "surface" in found.rejected
-        n["flips"] += flips
         for i, name in enumerate(found.names[:3]):
             both = log[name].verdict == "identified" if name in log else False
             own = verdicts[name] == "identified"
             n[f"batch {name}"] += both
             n[f"both {name}"] += own and both
-            n[f"own {name}"] += own
             if own:
                 half = 1.96 * float(found.std[i])
                 holds, wrong = judged(made.truth[name], float(found.theta[i]), half)
@@ -93,20 +86,15 @@ class Tally:
         """As a row of the table."""
         n = self.n
         cells = [str(n["streams"])]
-        cells += [f"{n[f'both {p}']} of {n[f'batch {p}']}" for p in ("K", "B", "M")]
-        cells += [f"{n[f'own {p}']}" for p in ("K", "B", "M")]
-        cells += [
-            f"{n['refused']}, {n['looks']}",
-            str(n["another"]),
-            f"{n['flips'] / max(n['streams'], 1):.2f}",
-        ]
+        cells += [f"{n[f'both {p}']} of {n[f'batch {p}']}" for p in ("K", "B")]
+        cells += [f"{n['refused']}, {n['looks']}"]
         cells += [f"{100 * n['holds'] / max(n['known'], 1):.1f} % of {n['known']}", str(n["wrong"])]
         return f"| {name} | " + " | ".join(cells) + " |"
 
 
 HEAD = (
-    "| | streams | K of the batch's | B of the batch's | M of the batch's | K | B | M | refused at the end, at looks |"
-    " another surface | changes of K's verdict | 95 % intervals hold | confidently wrong |"
+    "| | streams | K of the batch's | B of the batch's | refused at the end, at looks | 95 % intervals hold |"
+    " confidently wrong |"
 )
 
 

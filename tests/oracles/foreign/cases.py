@@ -499,15 +499,18 @@ def told_of(case: Case, data: Path | None) -> Iterator[tuple[str, str, list[str]
 
 
 def print_table(cases: list[Case], data: Path | None) -> None:
-    """Print a row a case: how many of its logs are answered rightly, and each wrong answer."""
+    """Print a row for each case with a wrong answer, and the count of the others."""
     print("| case | logs | right | wrong |", "|---|---|---|---|", sep="\n")
+    right, logs = 0, 0
     for case in cases:
         answers = list(told_of(case, data))
         wrong = [f"{label}: {', '.join(faults)}" for label, _, faults in answers if faults]
-        row = (
-            f"{case.number} {case.title} | {len(answers)} | {len(answers) - len(wrong)} | {'; '.join(wrong)}"
-        )
-        print(f"| {row} |", flush=True)
+        if wrong:
+            row = f"{case.number} {case.title} | {len(answers)} | {len(answers) - len(wrong)} | {'; '.join(wrong)}"
+            print(f"| {row} |", flush=True)
+        else:
+            right, logs = right + 1, logs + len(answers)
+    print(f"| the {right} others | {logs} | {logs} | |")
 
 
 def main() -> None:
