@@ -31,17 +31,17 @@ class ForceOptions:
     Parameters
     ----------
     arm
-        Of palpate's own law: ur5e, fr3, iiwa14, panda, or a TOML file; an entry names its own.
+        Arm of palpate's law: ur5e, fr3, iiwa14, panda, or a TOML file; an entry names its own.
     force
         Desired force, N.
     stiffness
         Range of the surfaces, LOW:HIGH in N/m.
     surfaces
-        Stiffnesses in it, even in their logarithms.
+        Number of surfaces, evenly spaced in the logarithm of the stiffness.
     repeats
-        Presses on each, with a damping and noise of their own.
+        Presses on each surface, with a damping and noise of their own.
     seed
-        Of those.
+        Seed of damping and noise.
     """
 
     arm: str = "ur5e"

@@ -71,8 +71,8 @@ class OthersOptions:
     """A controller of others, by its parameter file."""
 
     controller: str | None = None
-    """ros2-admittance, fzi, crisp, franka or ur: the file is its YAML file, with --stiffness of the surfaces that it
-    has to be stable on, and --rate where the file has no update_rate. With --out, a corrected file is written."""
+    """ros2-admittance, fzi, crisp, franka or ur: the kind of controller whose YAML file is given. --stiffness names the
+    surfaces on which it has to be stable, --rate its rate where the file has none. --out writes a corrected file."""
     delay: Time | None = None
     """Everything that is late between a command and the force that it causes, such as 24:ms."""
     mass: Mass | None = None
@@ -105,8 +105,8 @@ def certify(
 
     palpate certify FILE.yaml --controller ros2-admittance --delay 24:ms --stiffness 500:20000
 
-    A check needs no solver: it takes norms of matrices, and then a second, independent program in exact arithmetic
-    has to find the same. With gains given, it also refuses a certificate of another arm, rate or law. Exit code 1: a
+    A check computes norms of matrices, without a solver. A second, independent program then repeats it in exact
+    arithmetic. With gains given, the check also refuses a certificate of another arm, rate or law. Exit code 1: a
     part could not be proved, or the certificate does not hold.
 
     Parameters

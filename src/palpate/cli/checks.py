@@ -17,7 +17,7 @@ def checks(
 ) -> int:
     """Check a controller, surface, identifier or wire of your own.
 
-    The laws are those that every part of palpate keeps.
+    The checks are those that every part of palpate passes.
 
     palpate checks student:Damped
 

@@ -27,11 +27,11 @@ class SurfaceRangeOptions:
     """Range of the surfaces."""
 
     stiffness: values.StiffnessRange
-    "Of the surfaces, N/m; one value if it is known."
+    "Stiffness of the surfaces, N/m: a range, or one value if it is known."
     damping: values.DampingRange
-    "Of the surfaces, N s/m."
+    "Damping of the surfaces, N s/m, likewise."
     mass: values.MassRange | None = None
-    "Of the surfaces, kg; without it they have none."
+    "Mass of the surfaces, kg, likewise; without it they have none."
 
     def range(self) -> SurfaceRange:
         """Range of stiffness, damping and mass."""
@@ -86,7 +86,7 @@ class GoalOptions:
     precision: Annotated[str, SIGNED] = "10%"
     "Largest 95 % half-width of every parameter, 10% or 0.1, or of some, K=2%,M=25%."
     duration: values.Time | None = None
-    "Of the excitation, s; the shortest sufficient one if not given."
+    "Duration of the excitation, s; the shortest sufficient one if not given."
     longest: values.Time = values.quantity_default("60", "time")
     "Longest duration, s."
     settle: values.Time = values.quantity_default("1", "time")
@@ -135,15 +135,15 @@ class LoopOptions:
     """Force control of the arm."""
 
     loop_bandwidth: values.Frequency | None = None
-    "Of the robot's force control, Hz, if nothing else is known of it."
+    "Bandwidth of the robot's force control, Hz, if nothing else is known of it."
     tip_mass: values.Mass | None = None
     "Effective mass of the robot at its tip, kg; this and the following default to the bench's arm."
     tip_friction: values.Force | None = None
     "Dry friction as felt at the tip, N."
     gain: Annotated[float | None, SIGNED] = None
-    "Of the force error."
+    "Proportional gain of the force error."
     integral: Annotated[float | None, SIGNED] = None
-    "Of the force error, 1/s."
+    "Integral gain of the force error, 1/s."
 
     def loop(self) -> ExcitedLoop:
         """Force loop that follows the desired force."""

@@ -31,7 +31,7 @@ class SceneOptions:
     geom: str | None = None
     "The surface: a geom of MJCF, a collision of SDF or URDF; without a scene, its name."
     probe: str | None = None
-    "The probe, likewise; every geom that can touch the surface if not given."
+    "The probe: a geom or a collision; every one that can touch the surface if not given."
 
 
 @options("Given parameters", 2)
@@ -39,7 +39,7 @@ class GivenOptions:
     """Numbers in place of identified ones."""
 
     stiffness: values.Stiffness | None = None
-    "K, if there is no log, if it was not identified, or to override it: N/m, or with a unit as 20:kN/m."
+    "K in N/m, or with a unit as 20:kN/m: without a log, where K is not identified, or to override it."
     damping: values.Damping | None = None
     "B in N s/m, likewise; 0 for a pure spring."
     mass: values.Mass | None = None
@@ -70,15 +70,15 @@ class LawOptions:
     """A law and its numbers."""
 
     law: str = "force-loop"
-    "force-loop, of a gains file; sliding-loop, of one of palpate tune --slide; or recursive-least-squares."
+    "force-loop, from a gains file; sliding-loop, from gains of palpate tune --slide; or recursive-least-squares."
     into: Annotated[str, SIGNED] = "0,0,-1"
-    "Of sliding-loop: direction into the surface, x,y,z in the base's axes."
+    "Direction into the surface for sliding-loop, x,y,z in the base's axes."
     parameters: Annotated[int, SIGNED] = 3
-    "Of recursive-least-squares, 3 or 4."
+    "Number of parameters of recursive-least-squares, 3 or 4."
     forgetting: Annotated[float, SIGNED] = 1.0
-    "Of recursive-least-squares: its forgetting factor."
+    "Forgetting factor of recursive-least-squares."
     force: values.Force | None = None
-    "Of force-loop, with FOUND.json or --stiffness, and --arm: the desired force, for which gains are tuned first."
+    "Desired force for force-loop: with FOUND.json or --stiffness, and --arm, gains are tuned for it first."
 
 
 @options(WRITTEN)
@@ -86,13 +86,13 @@ class ExportOutput(FileOptions):
     """Where the scene or the law is written."""
 
     out: Path | None = None
-    """The file; SCENE-GEOM beside the scene if not given. A comment in it, and FILE.json beside it, list
-    intervals and assumptions. Of C the folder."""
+    """File to write, or folder for C; SCENE-GEOM beside the scene if not given. A comment in the file, and FILE.json
+    beside it, list intervals and assumptions."""
     replace: Annotated[bool, FLAG] = False
     "Replace an earlier export."
     check: Annotated[bool, FLAG] = False
-    """Press the contact in the simulator, and state the error in K and B; exit code 1 if one is above 0.1 %.
-    Of C: compile it here, and repeat a million ticks of Python's; exit code 1 if one differs in a bit."""
+    """Press the contact in the simulator and print the errors of K and B; exit code 1 if one is above 0.1 %. For C:
+    compile it here and repeat a million ticks of Python's; exit code 1 if one differs in a bit."""
 
 
 def export(

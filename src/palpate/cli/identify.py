@@ -255,7 +255,7 @@ class IdentifyOutput(ReportOption, FigureFile):
     """Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if
     not given (of many logs, pooled.identify.png)."""
     dpi: int | None = None
-    "Of a PNG; 110 if not given."
+    "Resolution of a PNG; 110 if not given."
     table: Path | None = None
     """Where to write a table for a paper, a CSV file: value and 95 % of each log; of several, n, mean, next press
     and deviation, too."""
@@ -288,8 +288,8 @@ class CovariateOptions:
     """Conditions that several logs differ in, such as a temperature."""
 
     covariate: Annotated[tuple[str, ...], Parameter(negative=())] = ()
-    """A column of each log, such as temperature_C, whose mean is the log's; how the results depend on it is
-    pooled, too. May be repeated."""
+    """A column of each log, such as temperature_C: print how the results depend on its mean in each log. May be
+    repeated."""
 
     def of(self, logs: Sequence[Path], source: LogOptions) -> dict[str, Array]:
         """The mean of each covariate in each log, by the covariate's name."""
@@ -322,7 +322,7 @@ def identify(
 ) -> int:
     """Identify the touched surface from a log: stiffness, damping, mass.
 
-    A log whose names and units leave nothing to guess needs no options; the output says as what it was read:
+    A log with clear names and units needs no options; the output says which signals were read:
 
     palpate identify press.csv
 

@@ -32,7 +32,7 @@ class SimulationOptions:
     """An arm to simulate in 3D with the cautious law: ur5e, fr3, panda, iiwa14, or a file as for palpate
     press."""
     seed: Annotated[int, WHOLE] = 0
-    "Of the noise."
+    "Seed of the noise."
     whole_approach: Annotated[bool, FLAG] = False
     "Begin at the start of the approach, not shortly before the touch."
 

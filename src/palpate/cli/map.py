@@ -57,7 +57,7 @@ class MapOptions:
     """A stiffness, as 2000 or 2:kN/m: lumps above it, their areas, and the probability at each place; the next
     presses seek their edges."""
     until: float | None = None
-    "A half-width of the interval in per cent: how many more presses bring it under that."
+    "Target half-width of the interval, in per cent: print how many more presses reach it."
     common: float = 0.0
     "Standard deviation of an error that all presses share, such as the sensor's scale, in per cent."
 

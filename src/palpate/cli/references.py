@@ -28,7 +28,7 @@ def references(
 
     Args:
         action: `check` fits every log by palpate, SciPy and NumPy; `export` writes the logs.
-        out: folder that `export` makes.
+        out: folder for the logs of `export`.
         json: print one JSON object.
 
     Returns:

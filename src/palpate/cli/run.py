@@ -46,7 +46,7 @@ def run(
     name
         An experiment (see --list), or a TOML file of your own (see --print).
     seed
-        Of the noise; the same seed gives the same numbers.
+        Seed of the noise; the same seed gives the same numbers.
     """
     known, output, figure_options = (
         known or common.KnownOptions(),

@@ -64,21 +64,21 @@ class SlideOptions(SlideLimits):
     path: str = "circle"
     "line, back, raster or circle."
     length: values.Length = values.quantity_default("40:mm", "length")
-    "Of a line or a pass, radius of a circle, as 60:mm."
+    "Length of a line or a pass, or radius of the circle, as 60:mm."
     seconds: Annotated[float, SIGNED] = 8.0
     "Duration of the slide; a line ends at its --length, if that is earlier."
     normal: values.Direction | None = None
     """Direction into the surface that is given to the law, x,y,z; the true one of a simulated surface is
     0,0,-1."""
     end: Annotated[Literal["retreat", "hold"], _REAL] = "retreat"
-    "Of a real arm: whether the tip then retreats to free motion, or rests in contact."
+    "For a real arm. retreat: after the slide the tip goes back to free motion; hold: it rests in contact."
     turn: values.Length | None = None
-    """Keeps the tool perpendicular to the surface, about the centre of its spherical tip: how far that is behind the
-    tool's point, as 20:mm or 0:mm. A flat tool's moment is not covered."""
+    """Keep the tool perpendicular to the surface, in simulation: the distance from the tool's point back to the centre
+    of its spherical tip, as 20:mm or 0:mm. A flat tool's moment is not covered."""
     payload: Path | None = None
     "File of palpate payload, whose weight is taken off in every orientation of the tool; for --turn."
     dither: Annotated[float, SIGNED, _SIMULATED] = 0.0
-    """Share of the force by which it changes in the slide, as 0.1: the stiffness along the path goes to places.csv,
+    """Fraction by which the force swings during the slide, as 0.1: the stiffness along the path goes to places.csv,
     which palpate map --table reads; 0 for none."""
     gains: Path | None = None
     "Gains from palpate tune --slide; made for the arm if left out."
@@ -86,7 +86,7 @@ class SlideOptions(SlideLimits):
     """own: a tip with the arm's lags in each axis, or with --turn the arm's joints; mujoco: the arm's joints
     (extra: arms)."""
     seed: Annotated[int, WHOLE, _SIMULATED] = 0
-    "Of the sensor's noise."
+    "Seed of the sensor's noise."
 
     def ground(self) -> Ground:
         """Shape and material of the simulated surface."""
@@ -243,7 +243,7 @@ def slide(
     The arm looks for the surface along --normal, presses, and slides. It estimates normal, friction and stiffness, each
     with an interval. Exit code 1: the force was not held within 3 % rms and 10 %.
 
-    A real arm slides with the gains of palpate tune --slide, after a confirmation, and with --dry-run not at all. The
+    A real arm needs the gains of palpate tune --slide, and moves after a confirmation; --dry-run moves nothing. The
     path's first direction is the base's x along the surface. Every end unloads, as in palpate press --wire:
 
     palpate slide --wire rtde:192.168.0.10 --gains gains.toml --force 15:N --normal 0,0,-1 --path line --length 40:mm

@@ -48,7 +48,7 @@ def topics(
     join
         A second log with further columns, joined by time.
     delimiter
-        Between two cells of a text log; detected if not given.
+        Character between two cells of a text log; detected if not given.
     max_size
         Largest unpacked size, in GB; a larger log is refused.
     max_seconds

@@ -45,7 +45,7 @@ def tune(
 
     palpate tune found.json --arm ur5e --force 20 --loop-from sweep.csv --time t --command target_x --position actual_x
 
-    The same of a servo that gives way and whose encoders show it, from a log with one push of a hand at rest:
+    A servo that yields, from such a log in which the tip is also pushed once by hand while the command rests:
 
     palpate tune found.json --arm ur5e --force 15 --loop-from log.csv --time t --command u --position x --push force
 

@@ -52,9 +52,9 @@ class Signals:
     rotation-vector (rx,ry,rz as UR does), rpy (roll,pitch,yaw about fixed axes), matrix (by rows) or
     matrix-by-columns."""
     start: float | None = None
-    "Leave out the rows before, in seconds from the first row."
+    "Leave out the rows before this time, in seconds from the first row."
     end: float | None = None
-    "Leave out the rows after, in seconds from the first row."
+    "Leave out the rows after this time, in seconds from the first row."
     missing: tuple[str, ...] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
     join: Path | None = None

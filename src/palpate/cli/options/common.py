@@ -188,7 +188,7 @@ class FigureOptions:
     ] = ("png",)
     "Formats: png, svg, pdf, one or more."
     dpi: int | None = None
-    "Of a PNG; 110 if not given."
+    "Resolution of a PNG; 110 if not given."
 
     @property
     def endings(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ class LogOptions(Signals):
     force: Annotated[str | None, Parameter(name=["--force-column", "--force"])] = None
     "Column of the force, in N if no unit is given; g is the reading of a scale. TOPIC.FIELD of a bag."
     start: Annotated[float | None, values.SIGNED] = None
-    "Leave out the rows before, in seconds from the first row."
+    "Leave out the rows before this time, in seconds from the first row."
     missing: Annotated[tuple[str, ...], Parameter(allow_leading_hyphen=True, negative=())] = ()
     'A value that means "no reading", as -1; may be repeated. Common ones are detected.'
 
@@ -76,13 +76,13 @@ class FrameOptions:
     tcp: values.Point | None = None
     "The contact point, in the tool's axes from the pose's origin: x,y,z in m, or with :mm."
     wrench_at: values.Point | None = None
-    "The reference point of the torque, likewise; the pose's origin if not given."
+    "The reference point of the torque, as for --tcp; the pose's origin if not given."
     force_sign: Annotated[Literal["action", "reaction", "+1", "1", "-1"] | None, values.SIGNED] = None
     """+1 or action: the force acts from the tool on the surface, and grows with penetration; -1 or reaction:
     from the surface on the tool. Detected if not given."""
     normal: Annotated[str | None, values.SIGNED] = None
-    """Into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if not
-    given."""
+    """Direction into the surface, x,y,z in the base's axes, or tool:x,y,z in the tool's. Estimated from the force if
+    not given."""
     gravity_compensated: Annotated[bool, values.FLAG] = False
     "The tool's weight is already subtracted from the wrench."
     free: values.Interval | None = None
@@ -134,7 +134,7 @@ class ArmOptions:
     """Stiffness between position sensor and surface, N/m or N/m:STD; its compliance is subtracted from that of
     K."""
     robot_mass: str | None = None
-    "The arm's mass at the tip, before the force sensor, which swings on its own stiffness, in kg or kg:STD."
+    "Mass of the arm at its tip, before the force sensor, in kg or kg:STD; it swings on the arm's stiffness."
     robot_stiffness_from: Path | None = None
     "A log of a press on a rigid wall, with the same columns or topics: only the arm deflects in it."
     position_from: Literal["joints", "tip"] | None = None

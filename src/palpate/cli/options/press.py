@@ -23,13 +23,13 @@ class AskOptions:
     force: values.Force | None = None
     "Desired force, N, or with a unit as 20:N."
     force_max: values.Force | None = None
-    """F_max: the force never exceeds it, on layers and after a false touch, N (docs/proofs.md states the assumptions).
-    That of the gains; without gains five times the force, and at most what the sensor reads."""
+    """F_max, N: the largest force, on layers and after a false touch, too (docs/proofs.md states the assumptions).
+    If left out, that of the gains; without gains five times the force, and at most what the sensor reads."""
     seconds: Annotated[float, SIGNED] = 6.0
     "Duration of the press from where the force is reached on."
     end: Literal["retreat", "hold"] = "retreat"
-    """True if the tip then retreats to free motion, or rests in contact. It retreats after every other end:
-    a limit, a fault, a signal."""
+    """retreat: after the press the tip goes back to free motion; hold: it rests in contact. After every other end
+    (a limit, a fault, a signal) it retreats."""
     gains: Path | None = None
     """Gains from palpate tune, a TOML file. Over a wire they are needed; for a simulated arm they are tuned if
     left out."""
@@ -37,8 +37,8 @@ class AskOptions:
     """Direction into the surface, x,y,z in the base's axes, as 0,0,-1. Over a wire it is needed; a simulated
     arm presses where its tip points at home if left out."""
     probe: Annotated[float | None, SIGNED] = None
-    """Share of the force by which it is lowered three times, to identify the surface: a constant force
-    contains little information for palpate identify. If left out, 0.2 for a simulated arm, 0 for a real
+    """Fraction by which the force is lowered three times, to identify the surface: palpate identify learns little
+    from a constant force. If left out, 0.2 for a simulated arm, 0 for a real
     one."""
     payload: Path | None = None
     """File of palpate payload; the tool's mass is subtracted from M. A simulated arm carries that tool with
@@ -90,7 +90,7 @@ class SimulatedOptions:
     at: values.Point | None = None
     "Point of the surface in the base's axes, x,y,z or x,y,z:mm; in front of the tip at home when left out."
     seed: Annotated[int, WHOLE] = 0
-    "Of the noise; the same seed gives the same numbers."
+    "Seed of the noise; the same seed gives the same numbers."
     out: Path | None = None
     """Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left
     out."""
@@ -180,7 +180,7 @@ class PhantomOptions:
     stiffer_than: values.Stiffness | None = None
     "A stiffness, as 2000 or 2:kN/m: presses are chosen for the edges of lumps above it."
     page: Path | None = None
-    "Where to write the page after each map; it loads itself again until the last."
+    "Page to write after each map; the browser loads it again until the last."
 
 
 @options("A real arm, over its wire", 3)
@@ -217,6 +217,6 @@ class LimitOptions:
     "Largest commanded speed, as 20:mm/s; at twice this speed the arm stops."
     travel_limit: values.Length | None = None
     """Distance from the start, as 10:mm. If left out, the force limit divided by the stiffness of the gains'
-    stiffest surface: so far a sensor that lies does no harm. Start that close to the surface."""
+    stiffest surface: a sensor that lies then stays below the force limit. Start that close to the surface."""
     time_limit: values.Time | None = None
     "Total duration, as 20:s."
