@@ -225,8 +225,13 @@ def put(figure: Figure, text: str) -> None:
     """Write a figure between its marks, with the command, the version, the digest and the day."""
     made = [f"`python {figure.command}`", f"palpate {version('palpate')}"]
     made += [f"sources {digest(figure)}"] if figure.sources else []
-    shown = f"```text\n{text}\n```" if figure.fenced else text
+    shown = f"```text\n{text}\n```" if figure.fenced else apart(text)
     write(figure, f"\n\n{shown}\n\n{', '.join(made)}, {datetime.now(UTC):%Y-%m-%d}.\n\n")
+
+
+def apart(text: str) -> str:
+    """Markdown with a blank line before and after each table, without which a page shows it as a paragraph."""
+    return re.sub(r"(?m)^(\|.*)\n(?=[^|\n])|^([^|\n].*)\n(?=\|)", lambda line: f"{line[0]}\n", text)
 
 
 def write(figure: Figure, body: str) -> None:

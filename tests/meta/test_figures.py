@@ -76,6 +76,13 @@ def test_a_sentence_with_a_number_that_its_figure_has_not_is_found():
 
 
 @pytest.mark.parametrize("page", PAGES)
+def test_blank_lines_surround_a_table(page):
+    """Without them a page of the site shows it as a paragraph."""
+    text = re.sub(r"(?ms)^```.*?^```$", "```", (ROOT / page).read_text(encoding="utf-8"))
+    assert not re.findall(r"(?m)^(?!\||$).+\n\|.*|^\|.*\n(?!\||$).+", text)
+
+
+@pytest.mark.parametrize("page", PAGES)
 def test_no_table_more_is_copied_by_hand(page):
     found = len(copied(ROOT / page))
     assert found <= UNMARKED.get(page, 0), f"{page}: put it between marks (benchmarks/figures.toml)"
