@@ -98,7 +98,7 @@ def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told
     surface = ("--stiffness", "3000", "--damping", "50", "--force", "15", "--peak", "20", "--duration", "4")
     drawn = "HOME" in variables
     ran = subprocess.run(
-        [sys.executable, "-m", "palpate", "excite", *surface, *([] if drawn else ["--no-figure"])],
+        [sys.executable, "-m", "palpate", "excite", *surface, *(["--figure", "excite.png"] if drawn else [])],
         env={"PATH": os.environ["PATH"], **variables},
         cwd=tmp_path,
         capture_output=True,

@@ -88,5 +88,5 @@ def test_another_ending_is_refused_before_any_work(root, tmp_path, monkeypatch, 
     assert main(["identify", str(log), "--table", "t.docx"]) == 2
     assert "name it t.csv" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-    assert main(["identify", str(log), "--no-figure", "--table", "t.csv"]) == 0
+    assert main(["identify", str(log), "--table", "t.csv"]) == 0
     assert "table: t.csv" in capsys.readouterr().out
