@@ -5,9 +5,11 @@ Seconds of the processor stand beside those of the clock: they are what is left 
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import palpate.bench
@@ -16,6 +18,11 @@ COLD, WARM, RUN = 10.0, 0.6, 2.0
 """Budgets [s]: to compile the whole tick, to load it from the cache, and for `palpate run` of ten seconds."""
 FIRST_PRESS, NEXT_PRESS = 12.0, 1.0
 """Budgets of a press [s]."""
+COMMANDS = {
+    "identify press.csv": 0.9, "identify press.csv --figure press.png": 1.6, "topics press.csv": 0.9,
+    "tune --stiffness 5000:5500 --arm ur5e --force 20:N --out {run}.toml": 1.0, "certify 0.toml --out {run}.json": 1.0,
+}  # fmt: skip
+"""Budgets of a command [s]."""
 PRESS = """
 import time
 from palpate.press.prepare import PressSpec, prepare_press, surface_of
@@ -64,6 +71,19 @@ def child(code: str, *arguments: str, **environment: str) -> tuple[float, float]
     return float(wall), float(cpu)
 
 
+def command(words: str, folder: str, repeats: int) -> tuple[float, float]:
+    """Wall and processor seconds of a command as it is typed, the shortest of some runs."""
+    seconds = []
+    for run in range(repeats):
+        typed = [sys.executable, "-m", "palpate", *words.format(run=run).split()]
+        wall, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(typed, cwd=folder, capture_output=True, check=True)  # noqa: S603 - our own interpreter
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        processor = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        seconds.append((time.perf_counter() - wall, processor))
+    return min(seconds, key=lambda pair: pair[1])
+
+
 def row(title: str, seconds: tuple[float, float], budget: float) -> str:
     wall, cpu = seconds
     return f"| {title} | {wall:.2f} s | {cpu:.2f} s | {budget:g} s |"
@@ -85,6 +105,17 @@ def main() -> None:
         for title, budget, repeats in (("first", FIRST_PRESS, 1), ("next", NEXT_PRESS, given.repeats)):
             seconds = min(child(PRESS, **cache) for _ in range(repeats))
             print(row(f"`palpate press`, the {title}", seconds, budget))
+        (Path(folder) / "press.csv").write_bytes(
+            (Path(palpate.bench.__file__).parents[1] / "logs/press.csv").read_bytes()
+        )
+        for words, budget in COMMANDS.items():
+            print(
+                row(
+                    f"`palpate {words.split()[0]}`" + ", with a figure" * ("--figure" in words),
+                    command(words, folder, given.repeats),
+                    budget,
+                )
+            )
         experiment = Path(palpate.bench.__file__).parent / "experiments" / "foam-hybrid.toml"
         ten = min(child(TEN_SECONDS, str(experiment), folder, **cache) for _ in range(given.repeats))
         print(row("`palpate run`, ten seconds on the bench, with figures and report", ten, RUN))

@@ -56,7 +56,7 @@ with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PI
         # What it touched, and gains for that. The tip of the simulated arm has no mass: for a real one add what is its
         # cell.toml's, as --robot-mass 3.7:0.4.
         known = "--robot-stiffness 50000:2000"
-        palpate(f"identify first/record.parquet {known} --no-figure")
+        palpate(f"identify first/record.parquet {known}")
         palpate(f"identify first/record.parquet {known} --json", "found.json")
         if palpate("tune found.json --arm cell.toml --force 20 --out gains.toml --json", "tuned.json") == 0:
             palpate(f"{moved} --gains gains.toml --record second")

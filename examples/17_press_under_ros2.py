@@ -55,6 +55,6 @@ with subprocess.Popen(node, stdout=subprocess.PIPE, text=True) as arm:  # noqa: 
             sys.exit(
                 "the press ended before it was done, as said above: a busy machine is late; run this again"
             )
-        palpate("identify first/record.parquet --robot-stiffness 50000:2000 --no-figure")
+        palpate("identify first/record.parquet --robot-stiffness 50000:2000")
     finally:
         arm.kill()

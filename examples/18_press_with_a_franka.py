@@ -46,6 +46,6 @@ with subprocess.Popen([*controller, "--stiffness", "6000"], stdout=subprocess.PI
                 "the press ended before it was done, as said above: a busy machine is late; run this again"
             )
         elif Path("first/record.parquet").exists():
-            palpate("identify first/record.parquet --no-figure")
+            palpate("identify first/record.parquet")
     finally:
         arm.kill()

@@ -30,4 +30,4 @@ limits = "--force-limit 40:N --speed-limit 50:mm/s --travel-limit 15:mm --time-l
 words = f"--force 10:N --gains gains.toml --normal 0,0,-1 {limits} --seconds 3 --probe 0.2"
 if palpate(f"press --wire 'our_robot:OurWire?cell.toml' {words} --yes --record first"):
     sys.exit("the press ended before it was done, as said above: a busy machine is late; run this again")
-palpate("identify first/record.parquet --robot-stiffness 50000:2000 --no-figure")
+palpate("identify first/record.parquet --robot-stiffness 50000:2000")

@@ -142,7 +142,7 @@ def test_a_log_alone_is_what_the_command_reads(root, capsys):
     record = palpate.read_log(path)
     assert set(record.columns) == {"time", "position", "force"}
     assert record.meta["facts"] == ["read as --time time_s --position position_mm:mm --force force_N:N"]
-    assert main(["identify", str(path), "--no-figure"]) == 0
+    assert main(["identify", str(path)]) == 0
     assert record.meta["facts"][0].capitalize()[:20] in capsys.readouterr().out
 
 

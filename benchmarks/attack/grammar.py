@@ -152,7 +152,7 @@ COMMANDS: dict[str, tuple[int, tuple[str, ...]]] = {
     "payload": (2, ("whole.csv", *COLUMNS)),
     "excite": (
         3,
-        ("--stiffness=5000", "--damping=100", "--force=15", "--peak=20", "--duration=2", "--no-figure"),
+        ("--stiffness=5000", "--damping=100", "--force=15", "--peak=20", "--duration=2"),
     ),
     "tune": (3, ("--arm=ur5e", "--force=10", "--stiffness=500:20000")),
     "certify": (3, ("gains.toml", "--held-only")),

@@ -59,8 +59,8 @@ def how_to_install(distribution: str) -> str:
     return f"{shlex.join(['pip', 'install', folder + bracket + extra])} in palpate's sources"
 
 
-_LISTED = 60
-"""Names that an error lists at most."""
+_LISTED = 240
+"""Letters of the names that an error lists at most."""
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
@@ -68,5 +68,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> InputError:
     names = sorted(known)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    listed = ", ".join(names[:_LISTED]) + (f", ... ({len(names)} in all)" if len(names) > _LISTED else "")
+    listed = ", ".join(names)
+    if len(listed) > _LISTED:
+        listed = f"{listed[:_LISTED].rpartition(',')[0]}, ... ({len(names)} in all)"
     return InputError(f"unknown {kind} {name!r}; {hint}there are: {listed}")

@@ -150,7 +150,7 @@ def test_a_wrench_of_a_log_of_one_axis(tmp_path, capsys):
         ["identify", "log.csv", "--wrench", "force", "--pose", "position"],
         "--wrench needs fx,fy,fz",
     )
-    assert main(["identify", "log.csv", "--no-figure"]) == 0
+    assert main(["identify", "log.csv"]) == 0
     capsys.readouterr()
 
 
@@ -176,5 +176,5 @@ def test_a_name_that_is_not_utf_8_in_every_output(tmp_path, monkeypatch, capsys,
     printed = json.loads(capsys.readouterr().out)
     assert "sse.csv" in printed["files"][0]["file"]
     if columns:
-        assert main([command, str(log), *columns, "--report", "r.html", "--no-figure"]) in {0, 1}
+        assert main([command, str(log), *columns, "--report", "r.html"]) in {0, 1}
         assert "sse.csv" in Path("r.html").read_text()

@@ -52,7 +52,7 @@ def wanted_code(answer):
 
 def check(capfd, log, *words):
     """Run the command with and without --json, and hold code, verdicts, text and picture against each other."""
-    code, text, said = identify(capfd, log, *words)
+    code, text, said = identify(capfd, log, *words, "--figure", "picture.png")
     code_of_json, out, error = identify(capfd, log, *words, "--json")
     assert code == code_of_json
     if code == 2:
@@ -63,8 +63,7 @@ def check(capfd, log, *words):
     assert said == error == ""
     assert code == wanted_code(json.loads(out))
     assert ("✓ identified" in text) == (code == 0)
-    picture = Path(f"{Path(log).stem}.identify.png")
-    assert (f"figure: {picture}" in text) == picture.exists()
+    assert ("figure: picture.png" in text) == Path("picture.png").exists()
     return code
 
 
@@ -91,10 +90,10 @@ def test_exit_codes_of_hostile_logs(name, code, capfd, elsewhere):
 @pytest.mark.parametrize("make", [hostile_logs.only_unloading, hostile_logs.only_unloading_in_contact])
 def test_an_unloading_is_drawn_where_there_is_no_loading(make, capfd, elsewhere):
     log = hostile_logs.write_log(elsewhere, make())
-    code, text, said = identify(capfd, log, *NAMED, "--report", "page.html")
+    code, text, said = identify(capfd, log, *NAMED, "--figure", "log.png", "--report", "page.html")
     assert (code, said) == (0, "")
-    assert text.endswith("figure: log.identify.png\nreport: page.html\n")
-    assert (elsewhere / "log.identify.png").exists()
+    assert text.endswith("figure: log.png\nreport: page.html\n")
+    assert (elsewhere / "log.png").exists()
     found = palpate.identify_log(log)
     (press,) = (chart for chart in charts.evidence_charts(found, found.traces) if chart.title == "Press")
     labels = [series.label for series in press.series]
@@ -108,20 +107,19 @@ def fail(*_, **__):
 
 @pytest.mark.parametrize(
     "words",
-    [(), pytest.param(("--json", "--figure", "log.identify.png"), marks=pytest.mark.long)],
+    [(), pytest.param(("--json",), marks=pytest.mark.long)],
     ids=["text", "json"],
 )
 @pytest.mark.parametrize(("name", "code"), [("only_unloading", 0), ("fluid", 1)])
 def test_a_picture_that_fails_is_one_line_after_the_answer(name, code, words, capfd, elsewhere, monkeypatch):
     log = hostile_logs.write_log(elsewhere, getattr(hostile_logs, name)())
     answer = identify(capfd, log, *NAMED, *words)[1]
-    (elsewhere / "log.identify.png").unlink()
     monkeypatch.setattr(charts, "_window", fail)
-    ended, text, said = identify(capfd, log, *NAMED, *words)
+    ended, text, said = identify(capfd, log, *NAMED, *words, "--figure", "log.png")
     assert ended == code
-    assert text == answer.replace("figure: log.identify.png\n", "")
+    assert text.replace(" --figure log.png", "") == answer
     assert said.count("\n") == 1
-    assert said.startswith("palpate: log.identify.png is not drawn: ValueError in charts.py, line ")
+    assert said.startswith("palpate: log.png is not drawn: ValueError in charts.py, line ")
     assert "a defect of a drawing" in said
     assert [*elsewhere.iterdir()] == [log]
 
@@ -129,9 +127,11 @@ def test_a_picture_that_fails_is_one_line_after_the_answer(name, code, words, ca
 def test_a_page_that_fails_leaves_figure_and_table(capfd, elsewhere, monkeypatch):
     log = hostile_logs.write_log(elsewhere, hostile_logs.only_unloading())
     monkeypatch.setattr(page, "_figures", fail)
-    code, text, said = identify(capfd, log, *NAMED, "--report", "page.html", "--table", "t.csv")
+    code, text, said = identify(
+        capfd, log, *NAMED, "--figure", "log.png", "--report", "page.html", "--table", "t.csv"
+    )
     assert code == 0
-    assert text.endswith("figure: log.identify.png\ntable: t.csv\n")
+    assert text.endswith("figure: log.png\ntable: t.csv\n")
     assert said.count("\n") == 1
     assert said.startswith("palpate: page.html is not drawn: ValueError")
 
@@ -144,7 +144,7 @@ def test_a_folder_is_identified_if_one_of_its_logs_is(names, code, capfd, elsewh
     (elsewhere / "logs").mkdir()
     for name in names:
         hostile_logs.write_log(elsewhere / "logs", getattr(hostile_logs, name)(), f"{name}.csv")
-    ended, _, said = identify(capfd, "logs", *NAMED, "--no-figure")
+    ended, _, said = identify(capfd, "logs", *NAMED)
     assert (ended, said) == (code, "")
     assert identify(capfd, "logs", *NAMED, "--json")[0] == code
 
@@ -155,7 +155,7 @@ def test_a_unit_that_is_guessed_from_values_is_no_identification(capfd, elsewher
     rows[:, 0] = 1.7e12 + 1e3 * rows[:, 0]
     log = elsewhere / "log.csv"
     np.savetxt(log, rows, delimiter=",", header="t,position_mm,force_N", comments="", fmt="%.9f")
-    columns = ("--position", "position_mm", "--force", "force_N", "--no-figure")
+    columns = ("--position", "position_mm", "--force", "force_N")
     code, text, _ = identify(capfd, log, "--time", "t", *columns)
     assert code == 1
     assert text.startswith("! no unit was given for 't': ms is taken from its values")
@@ -173,7 +173,7 @@ def test_a_soft_surface_is_in_doubt_unless_its_units_are_stated(unit, code, capf
     rows = hostile_logs.only_unloading()
     rows[:, 2] *= 1e-6 if code else 1.0
     log = hostile_logs.write_log(elsewhere, rows, head="t,a,b")
-    words = ("--time", "t:s", "--position", "a:mm", "--force", f"b{unit}", "--no-figure")
+    words = ("--time", "t:s", "--position", "a:mm", "--force", f"b{unit}")
     assert check(capfd, log, *words) == code
     answer = json.loads(identify(capfd, log, *words, "--json")[1])
     verdicts = {p["verdict"] for p in (*answer["parameters"].values(), answer["working_point"]["stiffness"])}

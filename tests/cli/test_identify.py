@@ -97,10 +97,10 @@ def test_json_is_that_of_the_identification_and_says_where_it_is_from(log, capsy
 
 
 def test_the_uncertainty_budget_follows_the_answer(log, capsys):
-    assert main(["identify", str(log), *OWN, "--no-figure", "--budget"]) == 0
+    assert main(["identify", str(log), *OWN, "--budget"]) == 0
     text = capsys.readouterr().out
     assert text.index("all evidence") < text.index("u_c = ") < text.index("Follows the GUM")
-    assert main(["identify", str(log), str(log), *OWN, "--no-figure", "--budget"]) == 2
+    assert main(["identify", str(log), str(log), *OWN, "--budget"]) == 2
     assert "--budget prints the budget of one log" in capsys.readouterr().err
 
 
@@ -127,9 +127,9 @@ def test_an_indenter_adds_youngs_modulus(log, capsys, words):
 
 
 def test_a_figure_of_somebody_else_is_not_written_over(log, capsys):
-    other = log.parent / "press.identify.png"
+    other = log.parent / "holiday.png"
     other.write_bytes(b"a holiday")
-    assert main(["identify", str(log), *OWN]) == 2
+    assert main(["identify", str(log), *OWN, "--figure", str(other)]) == 2
     assert "palpate did not write it" in capsys.readouterr().err
     assert other.read_bytes() == b"a holiday"
 
@@ -158,7 +158,7 @@ def test_a_lag_with_its_std(log, capsys, words):
 def test_a_doubtful_unit_stands_before_the_answer_which_then_is_no(log, capsys, words, doubt):
     given = dict(zip(OWN[::2], OWN[1::2], strict=True)) | {words[0]: words[1]}
     line = [word for pair in given.items() for word in pair]
-    assert main(["identify", str(log), *line, "--no-figure"]) == 1
+    assert main(["identify", str(log), *line]) == 1
     printed = capsys.readouterr().out.splitlines()
     assert printed[0].startswith("! ")
     head = next(i for i, text in enumerate(printed) if "stiffness" in text)

@@ -18,7 +18,7 @@ from palpate.cli._program import COMMANDS, COMPANIONS
 from studies.small import SMALL
 
 HEAD = {"command", "version", "options", "files"}
-PRESS = "press.csv --time time_s --position position_mm:mm --force force_N:N --no-figure"
+PRESS = "press.csv --time time_s --position position_mm:mm --force force_N:N"
 SEEDED = {"run", "press", "slide"}
 """Commands that draw random numbers."""
 WITHOUT = {

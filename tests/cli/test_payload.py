@@ -65,7 +65,7 @@ def test_a_press_is_identified_with_the_payload(elsewhere, capsys):
     assert code == 0
     K = found["parameters"]["K"]
     assert K["ci95"][0] < 5000 < K["ci95"][1]
-    words = ["--wrench-frame", "tool", "--payload", "tool.toml", "--no-figure", "--verbose"]
+    words = ["--wrench-frame", "tool", "--payload", "tool.toml", "--verbose"]
     assert main(["identify", "press.parquet", *words]) == 0
     assert "by the payload file" in capsys.readouterr().out
 

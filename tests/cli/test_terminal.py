@@ -3,14 +3,17 @@
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import palpate
 from palpate.cli import _terminal, main
 from palpate.report import style
 from palpate.report.page import Table
@@ -83,6 +86,26 @@ def test_a_log_with_a_hostile_name(capsys):
 
 
 @pytest.mark.parametrize(
+    ("words", "name", "value", "code"),
+    [
+        ("topics press.csv", "POLARS_MAX_THREADS", "0", 0),
+        ("press --arm fr3 --force 20:N --surface K=5000,B=50 --out p", "NUMBA_DISABLE_JIT", "1", 2),
+    ],
+)
+def test_a_library_is_not_asked_for_what_it_cannot_do(tmp_path, words, name, value, code):
+    shutil.copy(Path(palpate.__file__).parent / "logs" / "press.csv", tmp_path)
+    ran = subprocess.run(
+        [sys.executable, "-m", "palpate", *words.split()],
+        env={**os.environ, name: value},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr.count("\n")) == (code, code // 2)
+
+
+@pytest.mark.parametrize(
     ("variables", "encoding", "told"),
     [
         pytest.param({"LANG": "C", "LC_ALL": "C"}, "utf-8", "± 2.1 %", marks=pytest.mark.long),
@@ -98,7 +121,7 @@ def test_little_is_needed_of_the_environment(tmp_path, variables, encoding, told
     surface = ("--stiffness", "3000", "--damping", "50", "--force", "15", "--peak", "20", "--duration", "4")
     drawn = "HOME" in variables
     ran = subprocess.run(
-        [sys.executable, "-m", "palpate", "excite", *surface, *([] if drawn else ["--no-figure"])],
+        [sys.executable, "-m", "palpate", "excite", *surface, *(["--figure", "excite.png"] if drawn else [])],
         env={"PATH": os.environ["PATH"], **variables},
         cwd=tmp_path,
         capture_output=True,

@@ -45,7 +45,7 @@ def test_the_contract_of_json(capsys, elsewhere):
 
 
 def test_what_is_printed_and_drawn(capsys, elsewhere):
-    assert main(["excite", *ASKED, "--duration", "4"]) == 0
+    assert main(["excite", *ASKED, "--duration", "4", "--figure", "excite.png"]) == 0
     printed = capsys.readouterr().out
     assert "multisine of" in printed
     assert "predicted K" in printed
@@ -56,7 +56,7 @@ def test_what_is_printed_and_drawn(capsys, elsewhere):
 @pytest.mark.long
 def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
     words = (*ONE, "--lag-std", "1:ms", "--precision", "1%", "--out", "excite.csv", "--duration", "4")
-    assert main(["excite", *words, "--no-figure"]) == 1
+    assert main(["excite", *words]) == 1
     printed = capsys.readouterr().out
     assert "at best K" in printed
     assert "all of these" in printed
@@ -71,7 +71,7 @@ def test_what_cannot_be_had_is_refused_with_what_would_help(capsys, elsewhere):
 
 @pytest.mark.long
 def test_the_force_over_time(capsys, elsewhere):
-    words = (*ASKED, "--no-figure", "--duration", "4")
+    words = (*ASKED, "--duration", "4")
     assert main(["excite", *words, "--out", "excite.csv"]) == 0
     table = np.genfromtxt("excite.csv", delimiter=",", names=True)
     assert table.dtype.names == ("time_s", "force_desired_N")
@@ -85,7 +85,7 @@ def test_the_force_over_time(capsys, elsewhere):
 
 
 def test_the_experiment_is_one_that_palpate_run_takes(elsewhere):
-    words = ("--gain", "0.5", "--duration", "4", "--experiment", "own.toml", "--no-figure")
+    words = ("--gain", "0.5", "--duration", "4", "--experiment", "own.toml")
     assert main(["excite", *ASKED, *words]) == 0
     made = parse((elsewhere / "own.toml").read_text("utf-8"), "own.toml")
     assert made.force.first == 15.0
@@ -96,7 +96,7 @@ def test_the_experiment_is_one_that_palpate_run_takes(elsewhere):
 
 
 def test_nothing_is_overwritten_unasked(capsys, elsewhere):
-    words = (*ASKED, "--no-figure", "--duration", "4", "--out", "excite.csv")
+    words = (*ASKED, "--duration", "4", "--out", "excite.csv")
     assert main(["excite", *words]) == 0
     assert main(["excite", *words]) == 2
     assert "exists" in capsys.readouterr().err

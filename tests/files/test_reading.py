@@ -34,7 +34,7 @@ def test_toml_that_no_person_writes_is_refused_at_once(form):
 
 def readers(path: Path) -> dict[str, list[str]]:
     """A command for each reader of TOML; `path` is the file."""
-    log = ["press.csv", "--time", "t", "--position", "x", "--force", "f", "--no-figure"]
+    log = ["press.csv", "--time", "t", "--position", "x", "--force", "f"]
     surface = ["--stiffness", "1000:9000"]
     return {
         "options": ["identify", *log, "--options", str(path)],

@@ -37,7 +37,7 @@ def test_equal_sheets_are_proposed_as_a_pool_and_identified_as_one(book, capsys)
     assert "5 sheets have the same columns and are pooled" in proposal.guesses[-1]
     words = shlex.split(proposal.command(book))
     assert words[:3] == ["palpate", "identify", str(book)]
-    assert main([*words[1:], "--json", "--no-figure"]) == 0
+    assert main([*words[1:], "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert [one["file"] for one in found["files"]] == [f"{book}/Specimen {k}" for k in range(1, 6)]
     assert {one["sha256"] for one in found["files"]} == {file_digest(book)}
@@ -56,7 +56,7 @@ def test_one_sheet_of_a_book_is_a_log(book):
 def test_a_named_sheet_is_not_pooled(book, capsys):
     words = [f"--{role}=Specimen 3.{name}" for role, name in
              (("time", "t (s)"), ("position", "Extension (mm)"), ("force", "Load (N)"))]  # fmt: skip
-    assert main(["identify", str(book), *words, "--json", "--no-figure"]) in {0, 1}
+    assert main(["identify", str(book), *words, "--json"]) in {0, 1}
     assert [one["file"] for one in json.loads(capsys.readouterr().out)["files"]] == [str(book)]
 
 

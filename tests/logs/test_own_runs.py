@@ -72,7 +72,7 @@ def test_what_is_said_counts_more(path, capsys):
 
 @pytest.mark.long
 def test_it_is_shown(path, capsys):
-    assert main(["identify", str(path), "--no-figure", "--verbose"]) == 0
+    assert main(["identify", str(path), "--verbose"]) == 0
     assert "a run's record: x_measured and force_sampled" in capsys.readouterr().out
 
 

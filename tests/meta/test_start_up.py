@@ -1,6 +1,7 @@
 """The program answers at once: nothing heavy is imported before it is needed."""
 
 import json
+import re
 import resource
 import subprocess
 import sys
@@ -55,6 +56,22 @@ def test_importing_laws_does_not_import_numba():
     )
     assert "numpy" in loaded
     assert not loaded & HEAVY
+
+
+def test_scipy_signal_and_stats_are_imported_by_no_short_command(root):
+    """Their import costs as much as an identification; what else is left of them is slow by itself."""
+    sources = (root / "src/palpate").rglob("*.py")
+    users = {
+        path.relative_to(root / "src/palpate").as_posix()
+        for path in sources
+        if re.search(
+            r"from scipy\.(signal|stats) import|from scipy import (signal|stats)",
+            path.read_text(encoding="utf-8"),
+        )
+    }
+    assert users <= {
+        "contact_frame/slide_log.py", "contact_frame/tool_payload.py", "maps/gaussian_process.py", "maps/stiffness_map.py", "studies/plan.py",
+    }  # fmt: skip
 
 
 def test_help_of_each_command_compiles_nothing():

@@ -10,7 +10,7 @@ from palpate.cli import main
 
 pytestmark = pytest.mark.long
 
-COLUMNS = "--time time_s --position position_mm:mm --force force_N:N --no-figure"
+COLUMNS = "--time time_s --position position_mm:mm --force force_N:N"
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,10 @@ def pooled(rows):
 
 def test_the_summary_is_the_pooled_answer(rows, pooled):
     head, body = cells(rows, pooled)
-    assert head[:3] == ("log", "stiffness [N/m]", "± 95 %")
+    assert head[:3] == ("log", "stiffness [N/m]", "stiffness ± 95 % [N/m]")
+    assert head[-1] == "verdict"
+    assert body[0][-1] == "identified"
+    assert len(set(head)) == len(head)
     by_name = {row[0]: dict(zip(head, row, strict=True)) for row in body}
     assert [*by_name][3:] == ["n", "mean", "next press", "deviation"]
     column = head.index("K [N/m]")
@@ -88,5 +91,5 @@ def test_another_ending_is_refused_before_any_work(root, tmp_path, monkeypatch, 
     assert main(["identify", str(log), "--table", "t.docx"]) == 2
     assert "name it t.csv" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-    assert main(["identify", str(log), "--no-figure", "--table", "t.csv"]) == 0
+    assert main(["identify", str(log), "--table", "t.csv"]) == 0
     assert "table: t.csv" in capsys.readouterr().out

@@ -115,6 +115,10 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 def _dispatcher(function: Callable[..., Any], wait: Callable[[], None]) -> Any:
     import numba
 
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        from palpate.errors import InputError
+
+        raise InputError("NUMBA_DISABLE_JIT is set, and palpate's laws run compiled alone; unset it")
     dispatcher, lock = numba.njit(**entry())(function), CompileLock(home_of(function))
     compiling = dispatcher._compiler.compile
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.records import Record
+from palpate.signals.samples import detrend
 
 APPROACH, CONTACT, LOST, RETREAT = 0.0, 1.0, 2.0, 4.0  # 3 is a slide over a wire
 PHASES = {APPROACH: "approach", CONTACT: "contact", LOST: "lost contact", RETREAT: "retreat"}
@@ -155,8 +156,6 @@ def ringing(t: Array, force: Array, desired: Array) -> dict[str, float] | None:
     n = len(t)
     if n < MIN_SPECTRUM_SAMPLES or np.any(desired != desired[-1]):
         return None
-    from scipy.signal import detrend
-
     swing = detrend(force)
     if not np.std(swing) > STEADY * abs(desired[-1]):
         return None

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ["MPLBACKEND"] = (
             "Agg"  # figures are files: a user's backend may need a screen, or not exist
         )
-    _streams.forget_impossible_size()
+    _streams.forget_impossible_numbers()
     import sys
 
     from palpate.cli._program import EXPANDED, TYPED, program

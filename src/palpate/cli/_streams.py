@@ -48,11 +48,11 @@ MIN_WIDTH = 20
 """Narrowest terminal that is believed [columns]: narrower, a table has no room for one number and its unit."""
 
 
-def forget_impossible_size() -> None:
-    """Remove COLUMNS and LINES from the environment where no terminal has such a size: the terminal is asked then."""
-    for name, least in (("COLUMNS", MIN_WIDTH), ("LINES", 1)):
-        size = os.environ.get(name, "")
-        if not (size.isdecimal() and int(size[:9]) >= least):
+def forget_impossible_numbers() -> None:
+    """Remove from the environment a size that no terminal has, and a number of threads that no library takes."""
+    for name, least in (("COLUMNS", MIN_WIDTH), ("LINES", 1), ("POLARS_MAX_THREADS", 1)):
+        number = os.environ.get(name, "")
+        if not (number.isdecimal() and int(number[:9]) >= least):
             os.environ.pop(name, None)
 
 

@@ -177,7 +177,7 @@ class ExcitationOutput(FigureFile, FileOptions):
     replace: Annotated[bool, FLAG] = False
     "Replace the files at --out and --experiment."
     figure: Path | None = None
-    "Where to write the figure, a PNG; excite.png in the current folder if not given."
+    "Where to write the figure, a PNG."
 
     def check_all(self) -> None:
         """Check every path before any work is done."""
@@ -211,7 +211,7 @@ def excite(
 
     goal, sensor = goal or GoalOptions(), sensor or SensorOptions()
     robot, output = robot or LoopOptions(), output or ExcitationOutput()
-    picture = output.picture("excite.png")
+    picture = output.picture()
     output.check_all()
     surfaces = surface.range()
     problem = DesignProblem(

@@ -252,8 +252,7 @@ class IdentifyOutput(ReportOption, FigureFile):
     """Files of an identification, and how much is printed."""
 
     figure: Path | None = None
-    """Where to write the figure, a PNG, SVG or PDF by its ending; LOG.identify.png in the current folder if
-    not given (of many logs, pooled.identify.png)."""
+    "Where to write the figure, a PNG, SVG or PDF by its ending."
     dpi: int | None = None
     "Resolution of a PNG; 110 if not given."
     table: Path | None = None
@@ -271,16 +270,16 @@ class IdentifyOutput(ReportOption, FigureFile):
             check_place(self.table, "--table", ending=".csv")
         return self.table
 
-    def png(self, name: str) -> Path | None:
+    def drawing(self) -> Path | None:
         """Path of the figure, checked before any work is done."""
         from palpate.report.style import FORMATS, check_dpi
 
         check_dpi(self.dpi)
-        return self.picture(f"{name}.identify.png", FORMATS)
+        return self.picture(FORMATS)
 
-    def files(self, name: str) -> _OutputFiles:
-        """Files of the log, or the logs, of a name; checked before any work is done."""
-        return _OutputFiles(self.png(name), self.page(), self.paper_table(), self.dpi)
+    def files(self) -> _OutputFiles:
+        """Files of the log, or the logs; checked before any work is done."""
+        return _OutputFiles(self.drawing(), self.page(), self.paper_table(), self.dpi)
 
 
 @options("Several logs", 5)
@@ -396,7 +395,7 @@ def _friction(
     only(replace(IdentifyOutput(), table=output.table, budget=output.budget, verbose=output.verbose), press)
     only(beside, press)
     log, source = logs[0], log_options.source
-    figure, report = output.png(log.stem), output.page()
+    figure, report = output.drawing(), output.page()
     from palpate.contact_frame.axis_friction import identify_friction
     from palpate.report import friction as view
     from palpate.report.style import save
@@ -428,17 +427,17 @@ def _identify(
         return _one(formats.log_of(logs[0]), log_options, output)
     if output.budget:
         raise InputError("--budget prints the budget of one log; --json has those of many")
-    files, logs = output.files("pooled"), formats.gather_logs(logs)
+    files, logs = output.files(), formats.gather_logs(logs)
     return many(logs, log_options, beside.of(logs, log_options.source), files, json=output.json)
 
 
 def _one(log: Path, log_options: OneLog, output: IdentifyOutput) -> int:
-    files = output.files(log.stem)
+    files = output.files()
     result, origin = log_options.identification(log)
     from palpate.report.identification.answer import build_answer
     from palpate.report.identification.words import unit_warnings
 
-    evidence_options = "--verbose" if output.report else "--verbose, or --report PAGE.html"
+    evidence_options = "--verbose" if output.report else "--verbose; with pictures: --report PAGE.html"
     if not result.identified and log_options.source.position is not None:
         evidence_options += "; if it is an axis that moves freely: --friction"
     answer = build_answer(result, origin, evidence_options, verbose=output.verbose, budget=output.budget)

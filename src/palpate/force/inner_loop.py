@@ -16,6 +16,7 @@ from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop
 from palpate.force.lag import worst_stiffness, yielding_lag
 from palpate.force.sampled_loop import zero_order_hold
+from palpate.signals.samples import recursive_filter
 from palpate.signals.types import NORMAL
 
 BLOCKS = 8
@@ -65,10 +66,10 @@ class FitErrors:
 
     def half(self, slope: Array) -> float:
         """Half of the 95 % interval of a number with this slope in them, shape (n,)."""
-        from scipy.stats import t as student
+        from scipy.special import stdtrit
 
         std = max(float(slope @ self.covariance @ slope) ** 0.5, 0.5 * abs(float(slope @ self.halves)))
-        return float(student.ppf(0.975, BLOCKS - 1)) * std
+        return float(stdtrit(BLOCKS - 1, 0.975)) * std
 
     def factor(self, value: float, *slope: float) -> LoopParameter:
         """A number whose logarithm has this slope in the first of them."""
@@ -332,8 +333,6 @@ def _columns(log_: _Log, p: Array) -> Array:
 
     Of a servo, also the answer to the force, and the rate of that, shape (n, 6).
     """
-    from scipy.signal import lfilter
-
     w = exp(p[0])
     z = exp(p[1])
     late = float(p[2])
@@ -353,13 +352,13 @@ def _columns(log_: _Log, p: Array) -> Array:
     end = len(known) - shift
     u = known[end - n : end]
     older = known[end - n - 1 : end - 1]
-    answer = lfilter(second, denominator, u) + lfilter(first, denominator, older)
+    answer = recursive_filter(second, denominator, u) + recursive_filter(first, denominator, older)
     kick = np.zeros(n)
     kick[0] = 1.0
-    free = lfilter([1.0], denominator, kick)
+    free = recursive_filter(np.ones(1), denominator, kick)
     columns = [answer, np.ones(n), free, np.concatenate([[0.0], free[:-1]])]
     if log_.force is not None:
-        pushed = lfilter(_numerator(E, early), denominator, log_.force)
+        pushed = recursive_filter(_numerator(E, early), denominator, log_.force)
         columns += [pushed, np.gradient(pushed, log_.tick)]
     return np.column_stack(columns)
 

@@ -95,7 +95,7 @@ class Known:
             return self
         in_series = self.stiffness[1]
         alone = min(arm.surface(in_series), max(arm.limits.stiffness, in_series))
-        why = f"surface and arm in series have up to {in_series:.4g} N/m, the arm alone {arm.series / 1e3:.3g} kN/m"
+        why = f"through the arm it is at most {in_series:.4g} N/m, the arm alone has {arm.series / 1e3:.3g} kN/m"
         return replace(
             self,
             stiffness=(self.stiffness[0], alone),

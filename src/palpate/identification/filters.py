@@ -16,7 +16,7 @@ import numpy as np
 from palpate.arrays import Array, Indices
 from palpate.signals.low_pass import LowPass, Taps, read, taps
 from palpate.signals.position_noise import PositionNoise
-from palpate.signals.samples import convolve
+from palpate.signals.samples import convolve, recursive_filter
 
 ORDER = 5
 _RESPONSE_LENGTH = 30.0  # time constants after which the impulse response has fallen below 1e-8 of its peak
@@ -164,13 +164,28 @@ def _erlang_cdf(order: int, tau: Array) -> Array:
 
 def low_passed(signal: Array, low_pass: LowPass, dt: float) -> Array:
     """A signal, shape (n,), behind Butterworth low-passes at rest, exact for straight lines between the samples."""
-    from scipy.signal import butter, cont2discrete, lfilter
-
     for order, cutoff in low_pass.sections:
-        analog = butter(order, 2 * np.pi * cutoff * dt, analog=True)
-        numerator, denominator, _ = cont2discrete(analog, 1.0, method="foh")
-        signal = lfilter(numerator.ravel(), denominator, signal - signal[0]) + signal[0]
+        numerator, denominator = _butterworth(order, 2 * pi * cutoff * dt)
+        signal = recursive_filter(numerator, denominator, signal - signal[0]) + signal[0]
     return signal
+
+
+@lru_cache(maxsize=64)
+def _butterworth(order: int, cutoff: float) -> tuple[Array, Array]:
+    """Numerator and denominator of a Butterworth low-pass between straight lines, cut-off in radians per sample."""
+    from scipy.linalg import expm
+
+    poles = np.exp(1j * pi * (2 * np.arange(order) + order + 1) / (2 * order))
+    A = cutoff * np.vstack([-np.poly(poles).real[1:], np.eye(order)[:-1]])
+    chain = np.zeros((order + 2, order + 2))  # the states, the input and its slope
+    chain[:order, :order], chain[0, order], chain[order, order + 1] = A, cutoff, 1.0
+    held = expm(chain)
+    E, step, ramp = held[:order, :order], held[:order, order], held[:order, order + 1]
+    drive, through = step - ramp + E @ ramp, ramp[-1]
+    denominator = np.asarray(np.poly(E), float)
+    last = np.zeros(order)
+    last[-1] = 1.0
+    return np.asarray(np.poly(E - np.outer(drive, last)) + (through - 1.0) * denominator), denominator
 
 
 _READ_DERIVATIVES = 5

@@ -10,6 +10,7 @@ from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.logs.naming import ColumnName, read_name
 from palpate.logs.tables.sheet import Sheet, Stated, find_sentinel
+from palpate.signals.samples import coherent_share, ranks
 from palpate.units import known_unit, unit, unit_in_name
 
 NAMES = {
@@ -155,15 +156,13 @@ def _of_unit_length(values: Array) -> Array:
 
 def rank_correlation(first: ColumnStatistics, second: ColumnStatistics) -> float:
     """Rank correlation of two columns (Spearman), without its sign, 0 to 1."""
-    from scipy.stats import spearmanr
-
     a = first.readings
     b = second.readings
     finite = np.isfinite(a) & np.isfinite(b)
     rows = np.flatnonzero(finite)[:: max(1, int(finite.sum()) // 5000)]
     if len(rows) < 4 or np.ptp(a[rows]) == 0 or np.ptp(b[rows]) == 0:
         return 0.0
-    return abs(float(spearmanr(a[rows], b[rows]).statistic))
+    return abs(float(np.corrcoef(ranks(a[rows]), ranks(b[rows]))[0, 1]))
 
 
 def explained_power(position: ColumnStatistics, force: ColumnStatistics) -> float:
@@ -196,16 +195,13 @@ def filtered_power(position: ColumnStatistics, force: ColumnStatistics) -> float
 
     At a resonance the force is a quarter of a period ahead, and beyond it on the other side: its ranks follow nothing.
     """
-    from scipy.signal import coherence, welch
-
     a = position.readings
     b = force.readings
     finite = np.isfinite(a) & np.isfinite(b)
     rows = max(int(finite.sum()) // _BLOCKS, 4)
     if finite.sum() < 4 * rows or np.ptp(a[finite]) == 0 or np.ptp(b[finite]) == 0:
         return 0.0
-    power = welch(b[finite], nperseg=rows)[1]
-    return float(coherence(a[finite], b[finite], nperseg=rows)[1] @ power / power.sum())
+    return coherent_share(a[finite], b[finite], rows)
 
 
 def is_one_reading(position: ColumnStatistics, force: ColumnStatistics) -> bool:

@@ -1,4 +1,4 @@
-"""The report of a press: tables, a film, figures, one page."""
+"""The report of a press: tables, a film, charts, one page."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +12,7 @@ from palpate.files import write_text
 from palpate.press.setting import Place
 from palpate.press.summary import PressRequest
 from palpate.records import Record
-from palpate.report import style
-from palpate.report.chart import KNOWN, Band, Chart, Series, build_figure, panels
+from palpate.report.chart import KNOWN, Band, Chart, Series, panels
 from palpate.report.film import animation, coordinates, film_svg, fit_view, frame_rows, text, trace_panel
 from palpate.report.page import Answer, Table, answer_page, data_address, warning_alerts
 from palpate.report.run.table import alert_line, alerts, settling, surface_table
@@ -103,16 +102,14 @@ def _patch(place: Place, half: float) -> Array:
 
 
 def write_report(record: Record, request: PressRequest, summary: dict[str, Any], folder: Path) -> None:
-    """Write figures, film.svg and report.html into a folder."""
+    """Write film.svg and report.html, with charts over time, into a folder."""
     moving = film(record, request.arm, request.place)
     write_text(folder / "film.svg", moving)
     source = data_address(moving.encode(), "image/svg+xml")
     figures: list[dict[str, Any]] = [
         {"source": source, "caption": "The press in real time; the motion of the tip is enlarged."}
     ]
-    charts = build_charts(record, request)
-    for name, (panel_charts, caption) in charts.items():
-        style.save(build_figure(panel_charts, 3 if name == "torque" else 1), folder / f"{name}.png")
+    for panel_charts, caption in build_charts(record, request):
         figures.append({"panels": panels(panel_charts), "caption": caption})
     contact, loop = summary["force"] is not None, summary["loop"]
     force_words = f" with {plain(summary['force']['desired_N'], 3)} N" if contact else ""
@@ -196,8 +193,8 @@ def _force_table(summary: dict[str, Any]) -> Table:
     )
 
 
-def build_charts(record: Record, request: PressRequest) -> dict[str, tuple[list[Chart], str]]:
-    """Charts of a press and their caption, by the name of their figure."""
+def build_charts(record: Record, request: PressRequest) -> list[tuple[list[Chart], str]]:
+    """Charts of a press, several in a figure, and their caption."""
     t, pressing = record["t"], record["phase"] == CONTACT
     touch = float(t[np.argmax(pressing)]) if pressing.any() else float(t[0])
     forces = [
@@ -211,17 +208,15 @@ def build_charts(record: Record, request: PressRequest) -> dict[str, tuple[list[
         Series(t, 1e3 * (record["x_measured"] - request.place.place), "measured", "by the encoders", 1.0),
     ]
     depth = Chart("depth [mm]", depths, [Band(0.0, 0.0, "quiet")], x="time [s]", height=2.1)
-    return {
-        "touch": (
+    caption = "Force and depth of the tip. Encoders before elastic joints measure their deflection, too."
+    return [
+        (
             [Chart("force [N]", forces, x="time [s]", xlim=near)],
             "The force in the first half second after the touch.",
         ),
-        "force": (
-            [Chart("force [N]", forces, height=2.1), depth],
-            "Force and depth of the tip. Encoders before elastic joints measure their deflection, too.",
-        ),
-        "torque": (_torques(record, request), "Torque of each joint, the arm's weight included."),
-    }
+        ([Chart("force [N]", forces, height=2.1), depth], caption),
+        (_torques(record, request), "Torque of each joint, the arm's weight included."),
+    ]
 
 
 def _torques(record: Record, request: PressRequest) -> list[Chart]:

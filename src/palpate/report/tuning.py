@@ -157,7 +157,7 @@ def lines(tuning: Tuning, written: Sequence[object] = ()) -> Iterator[Text]:
         yield Text(printable(f"! {reason}: {value} ({assumed.why})."), "yellow")
     codes = dict.fromkeys(code for code, _ in tuning.warnings)
     if codes:
-        yield Text(printable(f"Seen, too: {', '.join(codes)} (--verbose explains each)."), "yellow")
+        yield Text(printable(f"Also noted: {', '.join(codes)} (--verbose explains each)."), "yellow")
     yield Text(f"Not proved: {len(UNCOVERED)} cases, which --verbose lists.")
 
 

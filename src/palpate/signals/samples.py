@@ -3,7 +3,10 @@
 `scipy.signal` has the last ones too, but its import takes longer than the identification of a log; so `scipy.fft`.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from palpate._jit import law
 from palpate.arrays import Array, Indices, Mask
@@ -122,6 +125,46 @@ def convolve(signal: Array, taps: Array) -> Array:
     size = next_fast_len(count, real=True)
     filtered: Array = irfft(rfft(signal, size) * rfft(taps, size), size)[:count]
     return filtered
+
+
+def recursive_filter(numerator: Array, denominator: Array, values: Array) -> Array:
+    """y for which the convolution of the denominator with it is that of the numerator with values, from rest, (n,)."""
+    from scipy.linalg import solve_banded
+
+    n = len(values)
+    bands = np.repeat(denominator[:, None], n, axis=1)
+    filtered: Array = solve_banded((len(denominator) - 1, 0), bands, np.convolve(values, numerator)[:n])
+    return filtered
+
+
+def ranks(values: Array) -> Array:
+    """Rank of each value, 1 the least; equal ones share the mean of theirs, shape (n,)."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - 0.5 * (count - 1))[place]
+
+
+def coherent_share(source: Array, values: Array, rows: int) -> float:
+    """Share of the power of values that a filter of the source accounts for, by coherence (Welch, 1967), 0 to 1.
+
+    Args:
+        source: shape (n,).
+        values: shape (n,).
+        rows: of a window; windows overlap by half.
+    """
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(rows) / rows)
+
+    def lines(signal: Array) -> Any:
+        parts = sliding_window_view(signal, rows)[:: rows - rows // 2]
+        return np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window)
+
+    a, b = lines(source), lines(values)
+    sides = np.full(a.shape[1], 2.0)
+    sides[0] = 1.0
+    if rows % 2 == 0:
+        sides[-1] = 1.0
+    power = np.sum(np.abs(a) ** 2, axis=0)
+    shared = np.abs(np.sum(a.conj() * b, axis=0)) ** 2 / np.where(power > 0.0, power, np.inf)
+    return float(sides @ shared / (sides @ np.sum(np.abs(b) ** 2, axis=0)))
 
 
 def quadrature(values: Array) -> Array:

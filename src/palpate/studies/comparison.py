@@ -19,6 +19,7 @@ import numpy as np
 
 from palpate.arrays import Array, Mask
 from palpate.bench.summary import DONE
+from palpate.signals.samples import ranks
 from palpate.studies.metrics import metric_of
 from palpate.studies.parameters import Label
 from palpate.studies.plan import RunPlan
@@ -171,8 +172,6 @@ def compare(one: Entrant, other: Entrant, most: bool) -> PairedDifference:
 
     A failed run is worse than any completed one; surfaces on which both failed do not count.
     """
-    from scipy.stats import binomtest
-
     worse = -math.inf if most else math.inf
     either = ~(one.failed & other.failed)
     difference = np.where(one.failed, worse, np.where(other.failed, -worse, one.values - other.values))
@@ -182,11 +181,19 @@ def compare(one: Entrant, other: Entrant, most: bool) -> PairedDifference:
         return PairedDifference(None, None, None, 0.0, 0.0, 0.0, 1.0, n)
     better = difference > 0.0 if most else difference < 0.0
     won, lost = int(better.sum()), int((~better & (difference != 0.0)).sum())
-    fraction = binomtest(won, n).proportion_ci(LEVEL)
     low, high = median_interval(difference)
     return PairedDifference(
-        _median(difference), low, high, won / n, lost / n, float(fraction.low), float(fraction.high), n
+        _median(difference), low, high, won / n, lost / n, *_proportion_interval(won, n), n
     )
+
+
+def _proportion_interval(won: int, n: int) -> tuple[float, float]:
+    """The interval of a proportion by Clopper and Pearson."""
+    from scipy.special import betaincinv
+
+    tail = (1.0 - LEVEL) / 2.0
+    low = float(betaincinv(won, n - won + 1, tail)) if won > 0 else 0.0
+    return low, float(betaincinv(won + 1, n - won, 1.0 - tail)) if won < n else 1.0
 
 
 def _median(values: Array) -> float | None:
@@ -197,10 +204,13 @@ def _median(values: Array) -> float | None:
 
 def median_interval(values: Array) -> tuple[float | None, float | None]:
     """The 95 % interval of a median by order statistics; None for too few values."""
-    from scipy.stats import binom
+    from scipy.special import bdtr
 
     n = len(values)
-    k = int(binom.ppf((1.0 - LEVEL) / 2.0, n, 0.5))  # fewer than k values below the median: at most 2.5 %
+    below = bdtr(np.arange(n + 1.0), n, 0.5)
+    k = int(
+        np.searchsorted(below, (1.0 - LEVEL) / 2.0)
+    )  # fewer than k values below the median: at most 2.5 %
     if k == 0:
         return None, None
     ordered = np.sort(values)
@@ -209,10 +219,8 @@ def median_interval(values: Array) -> tuple[float | None, float | None]:
 
 def mean_ranks(entrants: Sequence[Entrant], most: bool) -> list[float]:
     """Mean rank of each entrant over the surfaces; ties share theirs (Friedman, 1937)."""
-    from scipy.stats import rankdata
-
     values = np.array([np.where(e.failed, math.inf, -e.values if most else e.values) for e in entrants])
-    return [float(rank) for rank in rankdata(values, axis=0).mean(axis=1)]
+    return [float(rank) for rank in np.apply_along_axis(ranks, 0, values).mean(axis=1)]
 
 
 @dataclass(frozen=True)

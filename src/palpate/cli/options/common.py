@@ -161,19 +161,15 @@ class FigureFile(JsonOption):
     """A figure, and an answer for programs."""
 
     figure: Path | None = None
-    no_figure: Annotated[bool, FLAG] = False
-    "Write no figure."
     json: Annotated[bool, FLAG] = False
-    "Print one JSON object and nothing else; a figure is written only if --figure is given."
+    "Print one JSON object and nothing else."
 
-    def picture(self, default: str, endings: tuple[str, ...] = (".png",)) -> Path | None:
-        """Path of the figure, checked before any work is done."""
-        if self.no_figure or (self.figure is None and self.json):
-            return None
-        path = self.figure or Path(default)
-        ending = path.suffix.lower()
-        check_place(path, "--figure", ending=ending if ending in endings else endings[0])
-        return path
+    def picture(self, endings: tuple[str, ...] = (".png",)) -> Path | None:
+        """Path of the figure, checked before any work is done; None where none is asked for."""
+        if self.figure is not None:
+            ending = self.figure.suffix.lower()
+            check_place(self.figure, "--figure", ending=ending if ending in endings else endings[0])
+        return self.figure
 
 
 DRAWN = Group("Figures", sort_key=4)

@@ -16,7 +16,6 @@ _CALL_OPTIONS = {
     "preset",
     "save-options",
     "figure",
-    "no-figure",
     "report",
     "json",
     "out",

@@ -92,7 +92,7 @@ class SimulatedOptions:
     seed: Annotated[int, WHOLE] = 0
     "Seed of the noise; the same seed gives the same numbers."
     out: Path | None = None
-    """Folder for record.parquet, summary.json, figures, film and report.html; runs/press-ARM-SEED when left
+    """Folder for record.parquet, summary.json, film and report.html; runs/press-ARM-SEED when left
     out."""
     replace: Annotated[bool, FLAG] = False
     "Replace the results at --out."

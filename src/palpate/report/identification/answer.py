@@ -319,13 +319,15 @@ def _foot(result: Identification, notes: Sequence[str]) -> Iterator[Text]:
     shown_codes = {*_SHOWN_OTHERWISE, *words.UNIT_WARNINGS}
     other_codes = dict.fromkeys(warn.code.word for warn in result.warnings if warn.code not in shown_codes)
     if other_codes:
-        yield Text(f"Seen, too: {', '.join(other_codes)} (--verbose explains each).", style="yellow")
+        yield Text(f"Also noted: {', '.join(other_codes)} (--verbose explains each).", style="yellow")
     read = next((note for note in notes if note.startswith("read as ")), None)
     if read is not None:
         yield Text(printable(f"R{read[1:]}"))
 
 
-_ONE_CLOCK = "Where one converter samples both channels, unfiltered: --lag 0:STD, STD the time of a row."
+_ONE_CLOCK = (
+    "If one A/D converter samples both channels unfiltered, give --lag 0:STD, where STD is the sample period."
+)
 
 
 def _assumed_lag(result: Identification) -> str:

@@ -8,7 +8,14 @@ from math import pi, sqrt
 import numpy as np
 
 from palpate.arrays import Array, Mask
-from palpate.identification.result import DynamicStiffness, Identification, Press, Tangent, Traces
+from palpate.identification.result import (
+    DynamicStiffness,
+    Identification,
+    Press,
+    Tangent,
+    Traces,
+    WorkingPoint,
+)
 from palpate.report.chart import Chart, Interval, Mark, Series
 from palpate.report.style import rows_shown, with_peaks
 
@@ -176,7 +183,7 @@ def _value_range(value: Array, half: Array, shown: Mask) -> tuple[float, float]:
 
 
 def _press_chart(result: Identification, press: Press, traces: Traces) -> Chart:
-    """Force over depth: loading and unloading, all of the contact, the slopes with their bands, the working point."""
+    """Force over depth: loading and unloading, all of the contact, the answer's stiffness, the working point."""
     scale, unit = (1e3, "mm") if traces.position_unit == "m" else (1.0, traces.position_unit)
     order = np.argsort(traces.fitted_position)
     depth, force = scale * traces.fitted_position[order], traces.fitted_force[order]
@@ -189,12 +196,13 @@ def _press_chart(result: Identification, press: Press, traces: Traces) -> Chart:
         if len(x):
             order = np.argsort(x)
             series.append(Series(scale * x[order], y[order], colour, name))
-    slopes = _slopes(press, scale)
-    series.extend(slope for slope, _ in slopes)
-    point = result.working_point
+    point, slopes = result.working_point, _slopes(press, scale)
     if point is not None:
+        if point.stiffness.value is not None and point.stiffness.ci95 is not None:
+            slopes = [_headline(point, traces, scale)]
         at = np.array([scale * point.depth_m]), np.array([point.force_N])
         series.append(Series(*at, "ink", "working point", dots=9.0, alpha=0.5))
+    series.extend(slope for slope, _ in slopes)
     name = "depth from touch" if _counts_from_touch(result, press) else "position"
     low, high = float(traces.fitted_force.min()), float(traces.fitted_force.max())
     room = 0.08 * (high - low) or 1.0
@@ -217,6 +225,17 @@ def _counts_from_touch(result: Identification, press: Press) -> bool:
 def _branch(press: Press) -> Array:
     """Depth [m] and force [N] of the loading, or of the unloading where the log has no loading, shape (2, n)."""
     return press.loading if press.loading.size else press.unloading
+
+
+def _headline(point: WorkingPoint, traces: Traces, scale: float) -> tuple[Series, Interval]:
+    """The stiffness of the answer with its interval, a line through the working point."""
+    depth = traces.fitted_position
+    steps = np.array([float(depth.min()), point.depth_m, float(depth.max())]) - point.depth_m
+    slope, (low, high) = point.stiffness.value or 0.0, point.stiffness.ci95 or (0.0, 0.0)
+    ends = point.force_N + np.outer([low, high], steps)
+    x = scale * (point.depth_m + steps)
+    line = Series(x, point.force_N + slope * steps, "K", "stiffness, 95 %", 2.4)
+    return line, Interval(x, ends.min(axis=0), ends.max(axis=0), "K")
 
 
 def _slopes(press: Press, scale: float) -> list[tuple[Series, Interval]]:

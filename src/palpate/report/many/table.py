@@ -272,15 +272,22 @@ def cells(rows: Sequence[LogRow], pooled: Pooled | None) -> tuple[Row, list[Row]
     columns = []
     for name in _names(rows, pooled_values):
         factor, unit = _scale(rows, name)
-        column = [(f"{_title(name)} {unit}".strip(), "± 95 %")]
+        title = _title(name)
+        column = [(f"{title} {unit}".strip(), f"{title} ± 95 % {unit}".strip())]
         column += [_number(row.parameter(name), factor) for row in rows]
         if name in pooled_values:
             column += _pooled_cells(pooled_values[name], factor, covariates)
         elif point and name == POINT:
             column.append(_middle_and_half(point.prediction95, factor))
         columns.append(column + [("", "")] * (len(labels) - len(column)))
+    verdicts = ["verdict", *(_place_and_verdict(row)[-1] for row in rows)]
+    verdicts += [""] * (len(labels) - len(verdicts))
+    if pooled:
+        stiffness = pooled_values[POINT if POINT in pooled_values else "K"].parameter
+        verdicts[len(rows) + 2] = str(stiffness.verdict)
     head, *body = [
-        (label, *chain.from_iterable(pairs)) for label, *pairs in zip(labels, *columns, strict=False)
+        (label, *chain.from_iterable(pairs), verdict)
+        for label, *pairs, verdict in zip(labels, *columns, verdicts, strict=False)
     ]
     return head, body
 

@@ -186,7 +186,7 @@ def thesis_table(summary: dict[str, Any]) -> Table:
     column = () if identifier is None else ("[identifier], 95 %",)
     head = ("", "thesis", "raw", "matched, 95 %", *column, "f / x", "truth")
     return Table(
-        "On line, if it is a spring: least squares on the thesis' signals, raw, and matched in lag",
+        "On-line estimates (spring-damper-mass model): least squares on the thesis' signals, raw, and matched in lag",
         head,
         rows,
     )
