@@ -1,6 +1,6 @@
 """Spring, damper and mass side by side."""
 
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from palpate._jit import part
 from palpate.environments.surface import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
@@ -55,6 +55,60 @@ class KelvinVoigt(NamedTuple):
     def truth(self):
         """Parameter names with value and unit, for reports."""
         return {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}
+
+
+def _check_layers(self):
+    _check(self)
+    require(self.thickness > 0, "thickness", "above 0 m", self.thickness)
+    require(self.behind > 0, "behind", "above 0 N/m", self.behind)
+
+
+@part
+@coerce_fields(_check_layers)
+class Layered(NamedTuple):
+    """A layer on something else, spring by spring: f = K p + B v up to its thickness, and from there on with K behind.
+
+    Args:
+        stiffness: K of the layer [N/m].
+        damping: B [N s/m].
+        mass: none: 0 [kg].
+        thickness: penetration at which what is behind the layer is felt [m].
+        behind: the stiffness from there on [N/m].
+    """
+
+    stiffness: float
+    damping: float
+    mass: float
+    thickness: float
+    behind: float
+
+    def start(self):
+        return UNTOUCHED
+
+    def force(self, state, p, v):
+        """Force on the surface at penetration p [m] and rate v [m/s] [N]."""
+        within = min(p, self.thickness)
+        return self.stiffness * within + self.behind * (p - within) + self.damping * v
+
+    def relax(self, state, p, v, dt):
+        """The state after a step in contact that ended at p, v."""
+        return SurfaceState(p, v, 0.0, 1.0)
+
+    def free(self, state, dt):
+        """The state after a free step: without mass the surface is back at once where there is no damper."""
+        weight = implicitness(self.mass, self.damping, self.stiffness, dt)
+        s, v = swing(self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt)
+        return SurfaceState(s, v, 0.0, 0.0)
+
+    def truth(self):
+        """Parameter names with value and unit, for reports."""
+        names = {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}
+        return names | {"thickness": (self.thickness, "m"), "behind": (self.behind, "N/m")}
+
+
+def stiffest(surface: Any) -> float:
+    """The largest stiffness that a surface of springs has at any depth [N/m]."""
+    return float(max(surface.stiffness, getattr(surface, "behind", 0.0)))
 
 
 class KelvinVoigtSurface(SurfaceTable, tag="kelvin-voigt"):

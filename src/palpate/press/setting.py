@@ -8,7 +8,7 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.tool_payload import weight_sign
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
 from palpate.force.lag import STRUCTURE
@@ -141,7 +141,7 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
 
 
 def cell_of(
-    arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL
+    arm: SerialArm, place: Place, surface: KelvinVoigt | Layered, loop: Arm, tool: HeldTool = NO_TOOL
 ) -> Workcell:
     """The simulated cell of an arm with its inner loop, before a surface, with the tool as its sensor shows it."""
     motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
@@ -151,7 +151,7 @@ def cell_of(
     spring, damper = np.zeros(arm.joints), np.zeros(arm.joints)
     first = second = 0.0
     along = place.normal @ J[:3]
-    fastest = np.sqrt(surface.stiffness * float(along @ np.linalg.solve(links, along)))
+    fastest = np.sqrt(stiffest(surface) * float(along @ np.linalg.solve(links, along)))
     if not isinstance(loop.inner, TorqueLoop):
         spring = _joint_springs(arm, links, along, loop.inner.stiffness)
         fastest = max(fastest, np.sqrt(_fastest(links, spring)))

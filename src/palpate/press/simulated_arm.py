@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,26 @@ from palpate.robots.serial.serial_arm import SerialArm
 from palpate.signals.rotations import matrix_from_vector
 from palpate.signals.types import Task
 
+
+class PoseForce(NamedTuple):
+    """Force along the normal that the sensor shows in free motion, by the place of the tip.
+
+    Args:
+        cable: that pulls the tip back, for each metre towards the surface [N/m].
+        ripple: amplitude of a force that changes with the pose, zero at the start [N].
+        wave: length over which it repeats [m].
+    """
+
+    cable: float = 0.0
+    ripple: float = 0.0
+    wave: float = 0.06
+
+    def at(self, depth: float) -> float:
+        """Force at a place along the normal, from the start [N]."""
+        return self.cable * depth + self.ripple * float(np.sin(2.0 * np.pi * depth / self.wave))
+
+
+NO_FREE_FORCE = PoseForce()
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
 
@@ -68,6 +88,7 @@ class SimulatedArm:
         physics: own or mujoco, or an engine of its own.
         seed: of the noise.
         resolution: of a joint's position [rad, m]; 0 for exact encoders.
+        free: the force that the sensor shows in free motion.
     """
 
     def __init__(
@@ -79,6 +100,7 @@ class SimulatedArm:
         physics: str | Engine = "own",
         seed: int = 0,
         resolution: float = ENCODER,
+        free: PoseForce = NO_FREE_FORCE,
     ):
         self.arm, self.loop, self.cell, self._resolution = arm, loop, cell, resolution
         self._generator = np.random.default_rng(seed)
@@ -93,7 +115,8 @@ class SimulatedArm:
         )
         by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._engine: Engine = by_name if isinstance(physics, str) else physics
-        self._k, self.zero = 0, 0.0
+        self._k, self.zero, self.slope = 0, 0.0, 0.0
+        self._start, self._free = float(place.normal @ place.pose[:3, 3]), free
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
         self._saturated, self._acted = np.zeros(arm.joints), False
         self._seen = self._before = self._encoders()
@@ -102,9 +125,11 @@ class SimulatedArm:
         self._line = deque([rest] * loop.delay_ticks)
 
     def read(self) -> TipSample:
-        """The readings at this tick."""
-        force = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
-        return TipSample(self._k * self.loop.tick, force, self.pose[:3, 3])
+        """The readings at this tick, without the sensor's zero and the slope of a free stroke."""
+        position, normal = self.pose[:3, 3], np.array(self.cell.normal)
+        depth = float(normal @ position) - self._start
+        force = self._touch.reading.value - self.zero + self._free.at(depth) - self.slope * depth
+        return TipSample(self._k * self.loop.tick, force * normal, position)
 
     @property
     def pose(self) -> Array:
@@ -167,7 +192,7 @@ class SimulatedArm:
         """
         touching, old = self._touch.surface, self.cell.surface
         if touching.contact == 1.0:
-            force = float(old.force(touching, touching.deflection, touching.rate))  # type: ignore[no-untyped-call]
+            force = float(old.force(touching, touching.deflection, touching.rate))
             depth = rest_for(cell.surface, force, touching.rate)
             cell = cell._replace(place=self.cell.place + touching.deflection - depth)
             self._touch = self._touch._replace(surface=touching._replace(deflection=depth))

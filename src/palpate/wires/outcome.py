@@ -48,6 +48,7 @@ class Outcome:
         surface: normal and friction at the end of a slide with their intervals; None of a press, or if it never slid.
         lateness: of the loop.
         rest: what was seen before.
+        free_stroke: force over the position in the free stroke, as plain JSON values; None without one.
         troubles: ticks of each trouble of the law, by its sentence.
     """
 
@@ -61,6 +62,7 @@ class Outcome:
     surface: Mapping[str, Any] | None
     lateness: Lateness
     rest: AtRest
+    free_stroke: Mapping[str, Any] | None
     troubles: Mapping[str, int]
 
     def to_json(self) -> dict[str, Any]:
@@ -76,6 +78,7 @@ class Outcome:
             **({"surface": self.surface} if self.surface else {}),
             "lateness": self.lateness.to_json(),
             **self.rest.to_json(),
+            "free_stroke": self.free_stroke,
             "troubles": dict(self.troubles),
         }
 
