@@ -211,7 +211,10 @@ WRONG = [
     (["--surface", "K=500,behind=1e5"], "thickness and behind together"),
     (["--surface", "K=500,thickness=20:mm,behind=1e5,M=1"], "without M"),
     (["--surface", "K=500,thickness=-1,behind=1e5"], "thickness must be above 0 m"),
-    (["--surface", "K=500,thickness=20:N,behind=1e5"], "thickness needs a unit of m, and 'N' is one of force"),
+    (
+        ["--surface", "K=500,thickness=20:N,behind=1e5"],
+        "thickness needs a unit of m, and 'N' is one of force",
+    ),
     (["--surface", "K=500,thickness=20:mm,behind=2e6"], "the gains are for at most"),
     (["--free-force", "rope=3"], "--free-force needs cable=20"),
     (["--free-force", "ripple=1,wave=0"], "the wave must be longer"),

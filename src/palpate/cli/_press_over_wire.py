@@ -17,7 +17,7 @@ from palpate.cli.options.values import si
 from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop
-from palpate.force.gains import check_same_force_max, reading_error
+from palpate.force.ceiling import check_same_force_max, reading_error
 from palpate.press.engines import mass_note
 from palpate.press.free_stroke import MAX_STROKE
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise, tool_notes

@@ -11,8 +11,9 @@ from palpate.contact_frame.payload import Payload
 from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
+from palpate.force.ceiling import check_same_force_max, usual_force_max
 from palpate.force.force_loop import ForceLoop
-from palpate.force.gains import Gains, check_same_force_max, load_gains, usual_force_max
+from palpate.force.gains import Gains, load_gains
 from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
 from palpate.press.free_stroke import StrokeMetError, StrokePlan, make_stroke
