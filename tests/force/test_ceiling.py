@@ -124,7 +124,7 @@ def test_residual_travel_is_above_the_lags_of_the_chain():
     assert residual_travel(arm) > known_lag(arm)
 
 
-@pytest.mark.parametrize(("name", "coarse"), [("_TIMES", 8), ("_DECAYS", 3.0), ("_STEPS", 1), ("_PHASES", 2)])
+@pytest.mark.parametrize(("name", "coarse"), [("_TIMES", 4), ("_DECAYS", 3.0), ("_STEPS", 1), ("_PHASES", 2)])
 def test_what_lies_between_and_beyond_the_samples_is_bounded(monkeypatch, name, coarse):
     """A bound of fewer times, cells, phases or decay times is no smaller: what is left out is added."""
     arm = load_arm("ur5e")
@@ -134,7 +134,7 @@ def test_what_lies_between_and_beyond_the_samples_is_bounded(monkeypatch, name, 
     _, weights, rest = ceiling._low_pass(arm)
     rough = residual_travel(arm), ceiling._tip_speed(arm), weights.sum() + rest
     ceiling._low_pass.cache_clear()
-    assert all(a >= 0.9975 * b for a, b in zip(rough, fine, strict=True)), (rough, fine)
+    assert all(a >= 0.9985 * b for a, b in zip(rough, fine, strict=True)), (rough, fine)
     assert rough != fine
 
 

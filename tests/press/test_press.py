@@ -167,17 +167,6 @@ def test_an_interrupted_press_keeps_what_there_is():
     assert np.count_nonzero(record["phase"] != RETREAT) == 400
 
 
-def test_a_commanded_pose_is_reached():
-    """Under gravity, weight compensated; of 2 mm and of what the tip turned meanwhile little is left after 0.5 s."""
-    one, _, place = simulated()
-    goal = place.pose.copy()
-    goal[:3, 3] -= 0.002 * place.normal
-    for _ in range(500):
-        one.move_to(goal)
-    assert one.read().position == pytest.approx(goal[:3, 3], abs=1e-5)
-    assert one.pose == pytest.approx(goal, abs=1e-4)
-
-
 def test_a_place_and_a_normal_of_ones_own():
     pressing = prepare_press(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
     place = pressing.request.place

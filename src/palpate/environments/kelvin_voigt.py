@@ -82,28 +82,17 @@ class Layered(NamedTuple):
     thickness: float
     behind: float
 
-    def start(self):
-        return UNTOUCHED
+    start, relax, free = KelvinVoigt.start, KelvinVoigt.relax, KelvinVoigt.free
 
     def force(self, state, p, v):
         """Force on the surface at penetration p [m] and rate v [m/s] [N]."""
         within = min(p, self.thickness)
         return self.stiffness * within + self.behind * (p - within) + self.damping * v
 
-    def relax(self, state, p, v, dt):
-        """The state after a step in contact that ended at p, v."""
-        return SurfaceState(p, v, 0.0, 1.0)
-
-    def free(self, state, dt):
-        """The state after a free step: without mass the surface is back at once where there is no damper."""
-        weight = implicitness(self.mass, self.damping, self.stiffness, dt)
-        s, v = swing(self.mass, self.damping, self.stiffness, 0.0, state.deflection, state.rate, weight, dt)
-        return SurfaceState(s, v, 0.0, 0.0)
-
     def truth(self):
         """Parameter names with value and unit, for reports."""
-        names = {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}
-        return names | {"thickness": (self.thickness, "m"), "behind": (self.behind, "N/m")}
+        known = {"K": self.stiffness, "thickness": self.thickness, "behind": self.behind}
+        return {name: (value, "m" if name == "thickness" else "N/m") for name, value in known.items()}
 
 
 def stiffest(surface: Any) -> float:

@@ -184,25 +184,18 @@ class _Response:
 
     def __init__(self, square: float, rate: float):
         self._square, self._rate = square, rate
-        self._root = np.sqrt(complex(0.25 * rate**2 - square))
-        self.decay = 0.5 * rate - self._root.real
+        root = np.sqrt(complex(0.25 * rate**2 - square))
+        self._root = root if abs(root) > 1e-6 * rate else complex(1e-6 * rate)  # of a double pole, to 1e-12
+        self.decay = 0.5 * rate - root.real
         """Slowest rate at which the answer decays [1/s]."""
-        swing = abs(self._root.imag)
+        swing = abs(root.imag)
         overshoot = exp(-0.5 * pi * rate / swing) if swing > 0.0 else 0.0
         self._variation = (1.0 + overshoot) / (1.0 - overshoot)
 
     def step(self, time: Array) -> Array:
         """S at times since the step [s]."""
         t, a, c = np.maximum(time, 0.0), 0.5 * self._rate, self._root
-        if abs(c) < 1e-6 * a:
-            return 1.0 - np.exp(-a * t) * (1.0 + a * t)
         return 1.0 - (np.exp(-a * t) * (np.cosh(c * t) + a / c * np.sinh(c * t))).real
-
-    def _slope(self, time: Array) -> Array:
-        t, a, c = time, 0.5 * self._rate, self._root
-        if abs(c) < 1e-6 * a:
-            return self._square * t * np.exp(-a * t)
-        return (self._square / c * np.exp(-a * t) * np.sinh(c * t)).real
 
     def summed_acceleration(self, tick: float) -> float:
         """Bound of the sum over ticks of T |S''| [1/s]."""
@@ -214,7 +207,9 @@ class _Response:
         """Bound of the tip's speed over that of the command: the sum over ticks of T |S'| at the worst phase."""
         phases, spacing = np.linspace(0.0, tick, _PHASES, retstep=True)
         later = tick * np.arange(int(_DECAYS / self.decay / tick) + 2)
-        sampled = tick * np.abs(self._slope(phases[:, None] + later)).sum(axis=1).max()
+        t, c = phases[:, None] + later, self._root
+        slope = (self._square / c * np.exp(-0.5 * self._rate * t) * np.sinh(c * t)).real
+        sampled = tick * np.abs(slope).sum(axis=1).max()
         rest = self._square / self.decay * self.tail(tick)
         return float(sampled) + 0.5 * spacing * self.summed_acceleration(tick) + rest
 

@@ -14,7 +14,7 @@ import numpy as np
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.force.gains import Gains
-from palpate.press.at_rest import DRIFT_SIGNIFICANCE, SURE
+from palpate.press.at_rest import DRIFT_SIGNIFICANCE
 from palpate.press.sequence import MovableArm, lag_ticks
 from palpate.press.unload import REST_LAGS
 
@@ -54,21 +54,16 @@ class StrokePlan(NamedTuple):
         return int(np.ceil(2.0 * self.length / (self.speed * self.gains.arm.tick)))
 
     @property
-    def rest(self) -> int:
-        """Ticks of rest after each way."""
-        return REST_LAGS * lag_ticks(self.gains)
-
-    @property
     def speeds(self) -> Array:
         """Speed along the normal in each tick [m/s], shape (n,): smooth, so that lag and inertia show little."""
         phase = 2.0 * np.pi * (np.arange(self.ticks) + 0.5) / self.ticks
-        there = np.concatenate([np.cos(phase) - 1.0, np.zeros(self.rest)])
+        there = np.concatenate([np.cos(phase) - 1.0, np.zeros(REST_LAGS * lag_ticks(self.gains))])
         return np.concatenate([there, -there]) * self.length / (self.ticks * self.gains.arm.tick)
 
     @property
     def seconds(self) -> float:
         """Duration of the stroke [s]."""
-        return 2.0 * (self.ticks + self.rest) * self.gains.arm.tick
+        return len(self.speeds) * self.gains.arm.tick
 
 
 class StrokeMetError(Exception):
@@ -104,7 +99,8 @@ class FreeForce:
             InputError: the force changes in another way, or was measured over a shorter way than the press may go.
         """
         allowed = f"and free motion may show {level:.2g} N"
-        changes = f"in free motion the force changes with the position by {self.words}"
+        slope, std = self.slope
+        changes = f"in free motion the force changes with the position by {slope:.3g} N/m (std {std:.2g})"
         bend = abs(self.bend[0]) - DRIFT_SIGNIFICANCE * self.bend[1]
         if bend * travel**2 > level:
             raise InputError(
@@ -117,26 +113,14 @@ class FreeForce:
                 f"in free motion the force changes with the position by {self.rest:.2g} N (standard deviation) beside a"
                 f" parabola, {allowed}: see what pulls at the tool, or whether it touches something"
             )
-        slope, std = self.slope
         if abs(slope) <= SLOPE_SIGNIFICANCE * std or abs(slope) * travel <= level:
             return 0.0
-        if travel > REACH * self.length:
+        if travel > REACH * self.length or SLOPE_SIGNIFICANCE * std * travel > level:
             raise InputError(
-                f"{changes} over {1e3 * self.length:.3g} mm, and the press may go {1e3 * travel:.3g} mm: give"
-                f" --free-stroke {1e3 * travel / REACH:.3g}:mm, or --travel-limit {1e3 * REACH * self.length:.3g}:mm"
-            )
-        if SLOPE_SIGNIFICANCE * std * travel > level:
-            raise InputError(
-                f"{changes}: over the {1e3 * travel:.3g} mm of this press that is known to"
-                f" {SLOPE_SIGNIFICANCE * std * travel:.2g} N, {allowed}; start closer (--travel-limit), or press harder"
+                f"{changes} over {1e3 * self.length:.3g} mm, which is not enough for the {1e3 * travel:.3g} mm of this"
+                f" press, {allowed}: make --free-stroke longer, or --travel-limit shorter"
             )
         return slope
-
-    @property
-    def words(self) -> str:
-        """Slope and standard deviation in words."""
-        slope, std = self.slope
-        return f"{slope:.3g} N/m (std {std:.2g})"
 
     def to_json(self, subtracted: float) -> dict[str, Any]:
         """Length, slope, inertia and the slope that is subtracted, as plain JSON values."""
@@ -155,21 +139,18 @@ def make_stroke(arm: MovableArm, plan: StrokePlan) -> FreeForce:
         StrokeMetError: the force has changed as by a surface; the tip is then where it was met.
     """
     normal = plan.normal
-    limit = MET_FRACTION * max(plan.force, SURE * plan.gains.arm.sensor.noise)
     rows: list[tuple[float, float, float]] = []
-    start = first = None
     for speed in plan.speeds.tolist():
         time, force, position, *_ = arm.read()
-        along, depth = float(normal @ force), float(normal @ position)
-        start, first = (depth, along) if start is None or first is None else (start, first)
-        rows.append((time, depth - start, along))
-        if abs(along - first) > limit:
+        rows.append((time, float(normal @ position), float(normal @ force)))
+        out, met = rows[-1][1] - rows[0][1], abs(rows[-1][2] - rows[0][2])
+        if met > MET_FRACTION * plan.force:
             raise StrokeMetError(
-                f"the tip met {abs(along - first):.3g} N, {1e3 * abs(depth - start):.3g} mm from the start: is --normal"
-                " right, is something behind the tool, or did it touch the surface before?"
+                f"the tip met {met:.3g} N, {1e3 * abs(out):.3g} mm from the start: is --normal right, is something"
+                " behind the tool, or did it touch the surface before?"
             )
         # An arm that came back faster than it went, as after lost ticks, stops at its start.
-        arm.move((0.0 if speed > 0.0 and depth >= start else speed) * normal)
+        arm.move((0.0 if speed > 0.0 and out >= 0.0 else speed) * normal)
     return fit_free_force(np.array(rows), plan.length)
 
 
@@ -177,11 +158,11 @@ def fit_free_force(rows: Array, length: float) -> FreeForce:
     """Fit the force over position, its square, speed, acceleration and time.
 
     Args:
-        rows: time [s], position along the normal from the start [m] and force along the normal [N], shape (n, 3).
+        rows: time [s], position along the normal [m] and force along the normal [N], shape (n, 3).
         length: of the stroke [m].
     """
     count = min(PARTS, len(rows) // 2)
-    t, u, f = np.array([part.mean(axis=0) for part in np.array_split(rows, count)]).T
+    t, u, f = np.array([part.mean(axis=0) for part in np.array_split(rows - rows[0], count)]).T
     step = float(np.ptp(t)) / (count - 1)
     speed, acceleration = np.gradient(u, step), np.zeros(count)
     acceleration[1:-1] = np.diff(u, 2) / step**2

@@ -163,7 +163,7 @@ def prepare_press(spec: PressSpec) -> PreparedPress:
     _check_words(spec)
     Plan(spec.force, spec.seconds, spec.probe)
     arm = _load(spec, arm_of(spec.arm, spec.site))
-    place = place_of(arm, _array(spec.at), _array(spec.normal))
+    place = place_of(arm, spec.at, spec.normal)
     gains = _gains(spec, arm, place)
     _check_surface(spec, gains)
     notes = check_able(arm, place, gains.approach, spec.force)
@@ -242,7 +242,7 @@ def surface_of(text: str) -> KelvinVoigt | Layered:
         raise InputError(f"--surface: {error}") from None
 
 
-def pose_force_of(text: str) -> PoseForce:
+def parse_pose_force(text: str) -> PoseForce:
     """`cable=20` and `ripple=1.5,wave=60:mm`, in SI or with units.
 
     Raises:
@@ -343,7 +343,3 @@ def _engine_notes(spec: PressSpec, arm: SerialArm) -> list[str]:
             "motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"
         ]
     return []
-
-
-def _array(values: tuple[float, float, float] | None) -> Array | None:
-    return None if values is None else np.array(values)

@@ -163,11 +163,6 @@ class SimulatedArm:
         if self._tip is not None and self._acted:
             self._goal = self.pose
 
-    def move_to(self, pose: Array) -> None:
-        """Moves the tip for a tick towards a pose, homogeneous, shape (4, 4)."""
-        self._goal = np.array(pose, dtype=float)
-        self._follow_goal()
-
     def _follow_goal(self) -> None:
         if self._tip is None:
             self._advance(self._follow() + self._sag)

@@ -139,7 +139,7 @@ def summarise(record: Record, request: PressRequest) -> dict[str, Any]:
         "tare_N": record.meta["tare_N"],
         "free_stroke": record.meta["free_stroke"],
         "sensor_saturated": _mean(
-            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= _full_scale(request)
+            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= request.gains.arm.sensor.full_scale
         ),
         "notes": list(request.notes),
     }
@@ -187,10 +187,6 @@ def _loop(request: PressRequest) -> dict[str, Any]:
         "approach_speed_m_s": gains.approach,
         "series_stiffness": series_of(gains.arm),
     }
-
-
-def _full_scale(request: PressRequest) -> float:
-    return float(request.gains.arm.sensor.full_scale)
 
 
 def _mean(values: Any) -> float:

@@ -18,6 +18,7 @@ from palpate.errors import InputError
 from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
 from palpate.force import SlidingLoop
 from palpate.logs import write_record
+from palpate.press.at_rest import SETTLING_BAND
 from palpate.press.sequence import mean_over
 from palpate.press.unload import Unloading
 from palpate.records import Record
@@ -25,11 +26,6 @@ from palpate.units import cone95
 from palpate.wires.at_rest import AtRest
 from palpate.wires.order import Order
 from palpate.wires.realtime import Lateness
-
-RETREAT = 4.0
-"""Phase of the rows of a retreat; those of the law are below it."""
-SETTLING_BAND = 0.05
-"""Relative error of the force within which a press counts as settled."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.bench.summary import RETREAT
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.press.at_rest import SATURATED
 from palpate.press.free_stroke import FreeForce, StrokeMetError, make_stroke
@@ -28,7 +29,7 @@ from palpate.press.unload import HELD, Glimpse, RetreatPlan, Unloading, unload
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise
 from palpate.wires.guard import Guard, Moment, end_if, reading_fault, reason_to_stop
 from palpate.wires.order import Order
-from palpate.wires.outcome import RETREAT, Outcome, Rows, describe_surface, force_reached, settling_time
+from palpate.wires.outcome import Outcome, Rows, describe_surface, force_reached, settling_time
 from palpate.wires.realtime import CLOCK, Clock, Stopwatch, defer_interrupts
 from palpate.wires.wire import ArmReading, Command, PressEndedError, Wire, triple
 
@@ -334,13 +335,17 @@ class _Press:
         normal = -self._direction if out else read_belief(self._driver.loop, self._direction).normal
         arm.into = normal if np.isfinite(normal).all() else self._direction
         arm.watching, arm.on_retreat = watching, self._keep_retreat
-        depth = float(arm.commanded @ arm.into) if out else arm.deepest
+        depth, clearance, speed = arm.deepest, order.task.retreat, order.limits.speed
+        if out:
+            depth = float(arm.commanded @ arm.into)
+            clearance = min(clearance, depth)
+            depth -= clearance
         plan = RetreatPlan(
             gains=order.loop.gains,
             normal=arm.into,
-            speed=order.slow_speed if watching or out else order.limits.speed,
-            clearance=min(order.task.retreat, depth) if out else order.task.retreat,
-            depth=max(depth - order.task.retreat, 0.0) if out else depth,
+            speed=order.slow_speed if watching or out else speed,
+            clearance=clearance,
+            depth=depth,
             noise=arm.rest.noise,
             force=order.task.force,
         )

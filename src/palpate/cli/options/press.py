@@ -131,7 +131,7 @@ class SimulatedOptions:
 
     def spec(self, task: AskOptions, surface: KelvinVoigt | None = None) -> PressSpec:
         """The press to simulate, on a surface that is given here or by --surface."""
-        from palpate.press.prepare import PressSpec, pose_force_of, surface_of
+        from palpate.press.prepare import PressSpec, parse_pose_force, surface_of
         from palpate.press.simulated_arm import NO_FREE_FORCE
 
         if self.arm is None:
@@ -161,7 +161,7 @@ class SimulatedOptions:
             payload=task.tool,
             end=task.end,
             force_max=si(task.force_max),
-            free=NO_FREE_FORCE if self.free_force is None else pose_force_of(self.free_force),
+            free=NO_FREE_FORCE if self.free_force is None else parse_pose_force(self.free_force),
         )
 
     @property
