@@ -97,7 +97,7 @@ def test_a_cable_is_taken_off_a_simulated_press(tmp_path):
 def test_a_simulated_press_on_air_has_no_stiffness(free):
     request = prepare_press(question()).request
     arm, driver, place = simulated()
-    arm._free, arm.cell = free, arm.cell._replace(place=arm.cell.place + 1.0)
+    arm.free, arm.cell = free, arm.cell._replace(place=arm.cell.place + 1.0)
     record = press(arm, driver, place, Plan(20.0, 1.0, longest=4.0), driver.loop.gains)
     assert record.meta["end"] in {"no contact", "force not reached"}
     record.meta.update(truth={}, tare_N=0.0, free_stroke=None)

@@ -250,5 +250,4 @@ def _low_pass(arm: Arm) -> tuple[Array, Array, float]:
     bent = step**2 / 8.0 * grown * np.linalg.norm(states[:-1], axis=1)
     weights = step * (0.5 * (size[:-1] + size[1:]) + bent)
     summed = int(_DECAYS / low_pass.decay / step) + 1
-    ages: Array = step * np.arange(1, summed + 1, dtype=np.float64)
-    return ages, np.asarray(weights[:summed]), float(weights[summed:].sum())
+    return step * np.arange(1.0, summed + 1.0), weights[:summed], float(weights[summed:].sum())

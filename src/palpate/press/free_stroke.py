@@ -66,7 +66,7 @@ class StrokePlan(NamedTuple):
         return len(self.speeds) * self.gains.arm.tick
 
 
-class StrokeMetError(Exception):
+class StrokeMetError(InputError):
     """The stroke has met something; the text says what was seen."""
 
 
@@ -126,8 +126,8 @@ class FreeForce:
         """Length, slope, inertia and the slope that is subtracted, as plain JSON values."""
         return {
             "length_m": self.length,
-            "slope_N_per_m": list(self.slope),
-            "inertia_kg": list(self.inertia),
+            "slope_N_per_m": self.slope,
+            "inertia_kg": self.inertia,
             "subtracted_N_per_m": subtracted,
         }
 

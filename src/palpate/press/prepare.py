@@ -16,7 +16,7 @@ from palpate.force.force_loop import ForceLoop
 from palpate.force.gains import Gains, load_gains
 from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
-from palpate.press.free_stroke import StrokeMetError, StrokePlan, make_stroke
+from palpate.press.free_stroke import StrokePlan, make_stroke
 from palpate.press.pressing import Progress, press
 from palpate.press.sequence import CautiousDriver, Plan, PressDriver, plan_for
 from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
@@ -95,11 +95,10 @@ class PreparedPress:
         loop = request.gains.arm
         cell = cell_of(request.arm, request.place, request.surface, loop, held_tool(request.payload))
         arm, resting = (
-            SimulatedArm(
-                request.arm, loop, request.place, cell, request.physics, request.seed, free=request.free
-            )
+            SimulatedArm(request.arm, loop, request.place, cell, request.physics, request.seed)
             for _ in range(2)
         )
+        arm.free = resting.free = request.free
         if request.payload is not None:
             arm.tare()
             max_force = self.plan.force + SURE * loop.sensor.noise
@@ -116,10 +115,7 @@ class PreparedPress:
         reach = gains.approach * self.plan.longest
         speed = min(10.0 * gains.approach, gains.speed_at(self.plan.force))
         plan = StrokePlan(self.request.place.normal, reach, speed, gains, self.plan.force)
-        try:
-            free = make_stroke(resting, plan)
-        except StrokeMetError as reason:
-            raise InputError(f"in the free stroke {reason}") from None
+        free = make_stroke(resting, plan)
         arm.slope = free.slope_to_subtract(reach, gains.level)
         return free.to_json(arm.slope)
 

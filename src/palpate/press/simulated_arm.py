@@ -88,7 +88,6 @@ class SimulatedArm:
         physics: own or mujoco, or an engine of its own.
         seed: of the noise.
         resolution: of a joint's position [rad, m]; 0 for exact encoders.
-        free: the force that the sensor shows in free motion.
     """
 
     def __init__(
@@ -100,7 +99,6 @@ class SimulatedArm:
         physics: str | Engine = "own",
         seed: int = 0,
         resolution: float = ENCODER,
-        free: PoseForce = NO_FREE_FORCE,
     ):
         self.arm, self.loop, self.cell, self._resolution = arm, loop, cell, resolution
         self._generator = np.random.default_rng(seed)
@@ -116,7 +114,9 @@ class SimulatedArm:
         by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._engine: Engine = by_name if isinstance(physics, str) else physics
         self._k, self.zero, self.slope = 0, 0.0, 0.0
-        self._start, self._free = float(place.normal @ place.pose[:3, 3]), free
+        self._start = float(place.normal @ place.pose[:3, 3])
+        self.free = NO_FREE_FORCE
+        """Force that the sensor shows in free motion."""
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
         self._saturated, self._acted = np.zeros(arm.joints), False
         self._seen = self._before = self._encoders()
@@ -128,7 +128,7 @@ class SimulatedArm:
         """The readings at this tick, without the sensor's zero and the slope of a free stroke."""
         position, normal = self.pose[:3, 3], np.array(self.cell.normal)
         depth = float(normal @ position) - self._start
-        force = self._touch.reading.value - self.zero + self._free.at(depth) - self.slope * depth
+        force = self._touch.reading.value - self.zero + self.free.at(depth) - self.slope * depth
         return TipSample(self._k * self.loop.tick, force * normal, position)
 
     @property

@@ -290,8 +290,8 @@ class _Press:
         except BaseException:
             self._unload(out=True)
             raise
-        gains = self._order.loop.gains
-        self._arm.slope = self._free_force.slope_to_subtract(self._order.limits.travel, gains.level)
+        level, travel = self._order.loop.gains.level, self._order.limits.travel
+        self._arm.slope = self._free_force.slope_to_subtract(travel, level)
         return None
 
     def _press(self) -> tuple[str, bool]:
@@ -335,7 +335,7 @@ class _Press:
         normal = -self._direction if out else read_belief(self._driver.loop, self._direction).normal
         arm.into = normal if np.isfinite(normal).all() else self._direction
         arm.watching, arm.on_retreat = watching, self._keep_retreat
-        depth, clearance, speed = arm.deepest, order.task.retreat, order.limits.speed
+        depth, clearance = arm.deepest, order.task.retreat
         if out:
             depth = float(arm.commanded @ arm.into)
             clearance = min(clearance, depth)
@@ -343,7 +343,7 @@ class _Press:
         plan = RetreatPlan(
             gains=order.loop.gains,
             normal=arm.into,
-            speed=order.slow_speed if watching or out else speed,
+            speed=order.slow_speed if watching or out else order.limits.speed,
             clearance=clearance,
             depth=depth,
             noise=arm.rest.noise,
