@@ -5,9 +5,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from palpate.errors import InputError
-from palpate.force import ForceLoop, load_arm, tune
+from palpate.force import ForceLoop, ceiling, load_arm, tune
 from palpate.force.ceiling import residual_travel
 from palpate.force.gains import gains_for, known_lag
 
@@ -121,6 +122,40 @@ def test_residual_travel_is_above_the_lags_of_the_chain():
     lags = 1.8 / (2 * math.pi * 10.0) + 0.01 + 2.0 / (2 * math.pi * 120.0) + 1.0 / 480.0
     assert lags < residual_travel(arm) < lags + 0.02
     assert residual_travel(arm) > known_lag(arm)
+
+
+@pytest.mark.parametrize(("name", "coarse"), [("_TIMES", 4), ("_DECAYS", 3.0), ("_STEPS", 1), ("_PHASES", 2)])
+def test_what_lies_between_and_beyond_the_samples_is_bounded(monkeypatch, name, coarse):
+    """A bound of fewer times, cells, phases or decay times is no smaller: what is left out is added."""
+    arm = load_arm("ur5e")
+    fine = residual_travel(arm), ceiling._tip_speed(arm), ceiling._low_pass(arm)[1].sum()
+    monkeypatch.setattr(ceiling, name, coarse)
+    ceiling._low_pass.cache_clear()
+    _, weights, rest = ceiling._low_pass(arm)
+    rough = residual_travel(arm), ceiling._tip_speed(arm), weights.sum() + rest
+    ceiling._low_pass.cache_clear()
+    assert all(a >= 0.9985 * b for a, b in zip(rough, fine, strict=True)), (rough, fine)
+    assert rough != fine
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.7, 1.0, 3.0])
+@pytest.mark.parametrize("tick", [0.002, 0.05])
+def test_the_bounds_of_a_step_response(damping, tick):
+    """Against its exact discretisation, by phases and times of its own."""
+    w, fine = 30.0, np.linspace(0.0, 6.0, 600_001)
+    bound = ceiling._Response(w * w, 2 * damping * w)
+    plant = scipy.signal.lti([w * w], [1.0, 2 * damping * w, w * w])
+    _, answer = scipy.signal.step(plant, T=fine)
+    every = round(tick / 1e-5)
+    speed = np.abs(np.gradient(answer, 1e-5))
+    assert bound.step(fine) == pytest.approx(answer, abs=1e-6)
+    shown = max(tick * speed[k::every].sum() for k in range(0, every, max(every // 97, 1)))
+    assert shown <= bound.speed(tick) < (1.05 if tick * w < 0.1 else 4.0) * shown
+    late = round(ceiling._DECAYS / bound.decay * 1e5)
+    left = max(tick * np.abs(1.0 - answer[late + k :: every]).sum() for k in range(0, every, 37))
+    assert left <= bound.tail(tick) + 1e-12
+    bend = np.abs(np.gradient(np.gradient(answer, 1e-5), 1e-5))[2:]
+    assert max(tick * bend[k::every].sum() for k in range(0, every, 37)) <= bound.summed_acceleration(tick)
 
 
 def test_a_higher_desired_force_lowers_the_speed():

@@ -167,17 +167,6 @@ def test_an_interrupted_press_keeps_what_there_is():
     assert np.count_nonzero(record["phase"] != RETREAT) == 400
 
 
-def test_a_commanded_pose_is_reached():
-    """Under gravity, weight compensated; of 2 mm and of what the tip turned meanwhile little is left after 0.5 s."""
-    one, _, place = simulated()
-    goal = place.pose.copy()
-    goal[:3, 3] -= 0.002 * place.normal
-    for _ in range(500):
-        one.move_to(goal)
-    assert one.read().position == pytest.approx(goal[:3, 3], abs=1e-5)
-    assert one.pose == pytest.approx(goal, abs=1e-4)
-
-
 def test_a_place_and_a_normal_of_ones_own():
     pressing = prepare_press(question(at=(0.45, 0.1, 0.4), normal=(0.3, 0.0, -1.0)))
     place = pressing.request.place
@@ -207,7 +196,18 @@ WRONG = [
     (["--force", "20:m"], "unit of force"),
     (["--force", "0.5"], "standard deviations of the sensor's noise"),
     (["--force", "500"], "force limit|full scale"),
-    (["--surface", "soft"], "needs K=..,B=.."),
+    (["--surface", "soft"], "needs K=5000,B=50"),
+    (["--surface", "K=500,behind=1e5"], "thickness and behind together"),
+    (["--surface", "K=500,thickness=20:mm,behind=1e5,M=1"], "without M"),
+    (["--surface", "K=500,thickness=-1,behind=1e5"], "thickness must be above 0 m"),
+    (
+        ["--surface", "K=500,thickness=20:N,behind=1e5"],
+        "thickness needs a unit of m, and 'N' is one of force",
+    ),
+    (["--surface", "K=500,thickness=20:mm,behind=2e6"], "the gains are for at most"),
+    (["--free-force", "rope=3"], "--free-force needs cable=20"),
+    (["--free-force", "ripple=1,wave=0"], "the wave must be longer"),
+    (["--free-force", "ripple=1.5"], "in free motion the force changes with the position by"),
     (["--surface", "B=50"], "needs a stiffness"),
     (["--surface", "K=5000,K=3"], "has K twice"),
     (["--surface", "K=many"], "K needs a number"),

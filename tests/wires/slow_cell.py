@@ -62,7 +62,7 @@ ADDRESSES = (f"127.{40 + os.getpid() % 200}.{os.getpid() // 200 % 250}.{last}" f
 PATIENCE = 60.0
 """For which a process may take to start, or to end [s]."""
 WORDS = ("--force", "10:N", "--normal", "0,0,-1", "--force-limit", "25:N", "--speed-limit", "50:mm/s",
-         "--travel-limit", "30:mm", "--time-limit", "20:s")  # fmt: skip
+         "--travel-limit", "30:mm", "--time-limit", "20:s", "--free-stroke", "0:mm")  # fmt: skip
 
 
 def cell(folder: Path, text: str = ARM, **changed: float) -> Path:

@@ -17,11 +17,20 @@ from palpate.cli.options.values import si
 from palpate.cli.toolkit import command, print_answer, print_lines, say
 from palpate.errors import InputError
 from palpate.force import ForceLoop
-from palpate.force.gains import check_same_force_max, reading_error
+from palpate.force.ceiling import check_same_force_max, reading_error
 from palpate.press.engines import mass_note
+from palpate.press.free_stroke import MAX_STROKE
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise, tool_notes
 from palpate.wires.opening import open_wire, wire_class_name
-from palpate.wires.order import Order, PressLimits, PressTask, check_order, safe_travel, stiffest_contact
+from palpate.wires.order import (
+    STROKE_FRACTION,
+    Order,
+    PressLimits,
+    PressTask,
+    check_order,
+    safe_travel,
+    stiffest_contact,
+)
 from palpate.wires.order import Path as SlidePath
 from palpate.wires.outcome import Outcome, Rows, recover
 from palpate.wires.pressing import press
@@ -63,7 +72,11 @@ def press_over(
     assert request.gains is not None
     loop = ForceLoop.load(request.gains, options.certificate)
     check_same_force_max(loop.gains, si(request.force_max))
-    order = check_order(loop, replace(task, path=path), press_limits)
+    if path is not None:
+        if si(options.free_stroke):
+            raise InputError("--free-stroke is for a press; leave it out, or give 0")
+        task = replace(task, path=path, free_stroke=0.0)
+    order = check_order(loop, task, press_limits)
     tool = request.tool
     with PluginOptions().consent(given=wire_class_name(str(options.wire))[0] or ""):
         arm = open_wire(str(options.wire))
@@ -112,9 +125,18 @@ def press_task(request: AskOptions, wire: WireOptions, limits: LimitOptions) -> 
     else:
         travel = limits.travel_limit.si
     retreat = min(RETREAT, travel) if wire.retreat is None else wire.retreat.si
+    usual = min(MAX_STROKE, STROKE_FRACTION * travel)
+    stroke = usual if wire.free_stroke is None else wire.free_stroke.si
     press_limits = PressLimits(force, limits.speed_limit.si, travel, limits.time_limit.si)
     task = PressTask(
-        request.desired_force, normal.si, request.seconds, retreat, request.probe or 0.0, end=request.end
+        request.desired_force,
+        normal.si,
+        request.seconds,
+        retreat,
+        request.probe or 0.0,
+        None,
+        request.end,
+        stroke,
     )
     return task, press_limits
 
@@ -194,9 +216,14 @@ def _describe_plan(arm: Wire, order: Order, record: Path | None) -> list[str]:
     path = task.path
     along = "" if path is None else f" while it slides along a {path.name} of {1e3 * path.length:.3g} mm"
     back = f"goes back to free motion and {1e3 * task.retreat:g} mm, rests"
+    stroke = (
+        f"goes back {1e3 * order.stroke.length:.3g} mm and returns at {1e3 * order.stroke.speed:.3g} mm/s, "
+        if order.stroke
+        else ""
+    )
     end = "rests in contact" if task.end == "hold" else back
     does = (
-        f"rests 0.5 s in free motion and tares, approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
+        f"rests 0.5 s in free motion and tares, {stroke}approaches along ({x:.3g}, {y:.3g}, {z:.3g}) of the base at"
         f" {1e3 * gains.approach:.3g} mm/s at most, presses with {task.force:g} N for {task.hold:g} s{lowered}{along},"
         f" {end}"
     )
@@ -260,6 +287,12 @@ def _print_outcome(outcome: Outcome, words: str, where: Path | None, json: bool)
     lines = [f"ended: {outcome.ended}; the arm rests", outcome.unloading.how]
     if not outcome.touched:
         lines.append("no surface was held before that; --normal is the direction into it, in the base's axes")
+    if outcome.free_stroke and outcome.free_stroke["subtracted_N_per_m"]:
+        lines.append(
+            "the force in free motion changes by {:.3g} N/m (std {:.2g}), which was subtracted".format(
+                *outcome.free_stroke["slope_N_per_m"]
+            )
+        )
     lines += [f"trouble in {ticks} ticks: {trouble}" for trouble, ticks in outcome.troubles.items()]
     if outcome.force is not None:
         settled = (

@@ -142,7 +142,7 @@ def _tuned(identified: Path | None, parameters: GivenOptions, law: LawOptions) -
         InputError: no arm or no force.
     """
     from palpate.force import Known, known_from, load_arm, tune
-    from palpate.force.gains import usual_force_max
+    from palpate.force.ceiling import usual_force_max
 
     if parameters.arm is None or law.force is None:
         raise InputError(

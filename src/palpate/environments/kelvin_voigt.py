@@ -1,6 +1,6 @@
 """Spring, damper and mass side by side."""
 
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from palpate._jit import part
 from palpate.environments.surface import UNTOUCHED, SurfaceState, SurfaceTable, implicitness, swing
@@ -55,6 +55,49 @@ class KelvinVoigt(NamedTuple):
     def truth(self):
         """Parameter names with value and unit, for reports."""
         return {"K": (self.stiffness, "N/m"), "B": (self.damping, "N s/m"), "M": (self.mass, "kg")}
+
+
+def _check_layers(self):
+    _check(self)
+    require(self.thickness > 0, "thickness", "above 0 m", self.thickness)
+    require(self.behind > 0, "behind", "above 0 N/m", self.behind)
+
+
+@part
+@coerce_fields(_check_layers)
+class Layered(NamedTuple):
+    """A layer on something else, spring by spring: f = K p + B v up to its thickness, and from there on with K behind.
+
+    Args:
+        stiffness: K of the layer [N/m].
+        damping: B [N s/m].
+        mass: none: 0 [kg].
+        thickness: penetration at which what is behind the layer is felt [m].
+        behind: the stiffness from there on [N/m].
+    """
+
+    stiffness: float
+    damping: float
+    mass: float
+    thickness: float
+    behind: float
+
+    start, relax, free = KelvinVoigt.start, KelvinVoigt.relax, KelvinVoigt.free
+
+    def force(self, state, p, v):
+        """Force on the surface at penetration p [m] and rate v [m/s] [N]."""
+        within = min(p, self.thickness)
+        return self.stiffness * within + self.behind * (p - within) + self.damping * v
+
+    def truth(self):
+        """Parameter names with value and unit, for reports."""
+        known = {"K": self.stiffness, "thickness": self.thickness, "behind": self.behind}
+        return {name: (value, "m" if name == "thickness" else "N/m") for name, value in known.items()}
+
+
+def stiffest(surface: Any) -> float:
+    """The largest stiffness that a surface of springs has at any depth [N/m]."""
+    return float(max(surface.stiffness, getattr(surface, "behind", 0.0)))
 
 
 class KelvinVoigtSurface(SurfaceTable, tag="kelvin-voigt"):

@@ -15,8 +15,8 @@ from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.errors import InputError
 from palpate.files import as_toml, read_text
-from palpate.force.arm import Arm, PositionLoop, Positive, Sensor, ServoLoop, Table, from_toml
-from palpate.force.ceiling import speed_ceiling
+from palpate.force.arm import Arm, PositionLoop, Positive, ServoLoop, Table, from_toml
+from palpate.force.ceiling import BIAS_FRACTION, check_force_max, force_ceiling
 from palpate.force.lag import lag_of, relief_of
 from palpate.force.law import Cautious, gain
 from palpate.force.sampled_loop import filter_of
@@ -33,8 +33,6 @@ LEVEL_FRACTION = 0.0075
 """Fraction of F_d that a sensor may show in free motion, or two standard deviations if that is more.
 Measured by benchmarks/force/free_motion.py: twice as much costs 0.05 s on the softest surfaces, hums exceed half as
 much."""
-BIAS_FRACTION = 0.1
-"""Fraction of F_d that is taken out of the readings as bias: the press is too hard by that if it was a surface's."""
 MIN_DRIFT = 0.35
 """Drift that is followed, whatever a sensor's maker states [N/s]: what rises more slowly at the approach is no surface.
 Above the 0.3 N/s that benchmarks/force/free_motion.py puts to it; the softest surface is this over the approach."""
@@ -257,68 +255,6 @@ def gains_for(
         force_limit=limit or force_max or arm.sensor.full_scale, force_max=force_max,
         approach=approach, level=free_motion_level(arm, force),
     )  # fmt: skip
-
-
-_ERROR_DEVIATIONS = 4.0
-"""Standard deviations of the sensor's noise that a reading is taken to be off: beyond, once in 16,000 readings."""
-
-
-def reading_error(arm: Arm, force: float) -> float:
-    """epsilon of F_max [N]: noise, half a step, and the force at rest that may have been taken out as bias."""
-    step = arm.sensor.resolution or 0.0
-    return BIAS_FRACTION * force + _ERROR_DEVIATIONS * arm.sensor.noise + 0.5 * step
-
-
-def force_ceiling(arm: Arm, force: float, force_max: float, cap: float, theta: float) -> float:
-    """Largest commanded speed below which the force cannot exceed F_max [m/s]."""
-    return speed_ceiling(arm, force, force_max, reading_error(arm, force), cap, theta)
-
-
-FORCE_MAX_RATIO = 5.0
-"""F_max over the desired force where none is given."""
-
-
-def usual_force_max(force: float, sensor: Sensor) -> float:
-    """F_max where none is given [N]: the sensor must read it."""
-    return min(FORCE_MAX_RATIO * force, sensor.full_scale)
-
-
-def check_same_force_max(gains: Gains, force_max: float | None) -> None:
-    """Refuse another F_max than the one that gains were tuned for.
-
-    Raises:
-        InputError: it names both.
-    """
-    if force_max is not None and force_max != gains.force_max:
-        known = "no F_max" if gains.force_max is None else f"F_max = {gains.force_max:g} N"
-        raise InputError(
-            f"--force-max is {force_max:g} N, and the gains are for {known}; tune with --force-max {force_max:g}:N"
-        )
-
-
-def check_force_max(arm: Arm, force: float, force_max: float | None) -> None:
-    """Refuse an F_max that no speed keeps, or that the sensor cannot read.
-
-    Raises:
-        InputError: it says what is needed.
-    """
-    if force_max is None:
-        return
-    if force >= arm.sensor.full_scale:
-        raise InputError(
-            f"the force of {force:g} N is not below the sensor's full scale of {arm.sensor.full_scale:g} N; ask for "
-            "less"
-        )
-    least = force + reading_error(arm, force)
-    if not force_max > least:
-        raise InputError(
-            f"F_max must be above {least:.4g} N, the force of {force:g} N and what a reading may be off, "
-            f"got {force_max:g} N; raise it, or press more softly"
-        )
-    if force_max > arm.sensor.full_scale:
-        raise InputError(
-            f"F_max must be at most the sensor's full scale of {arm.sensor.full_scale:g} N, got {force_max:g} N"
-        )
 
 
 def free_motion_level(arm: Arm, force: float) -> float:

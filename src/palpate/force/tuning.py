@@ -100,7 +100,7 @@ class Tuning(Result):
     @property
     def softest(self) -> float:
         """The softest surface that is known of [N/m]."""
-        return min(self.known.stiffness[0] if self.known else MIN_STIFFNESS, self.gains.cap)
+        return _softest(self.known, self.gains.cap)
 
     @property
     def exact(self) -> tuple[float, float]:
@@ -224,7 +224,7 @@ def tune(
     farther = () if known is None or cap is not None else _beyond_log(arm, known, force)
     stiffest = arm.limits.stiffness if farther else _cap(arm, known, cap, theta)
     gains = gains_for(arm, force, cap=stiffest, theta=theta, force_max=force_max)
-    soft = min(known.stiffness[0] if known else MIN_STIFFNESS, stiffest)
+    soft = _softest(known, stiffest)
     felt = arm.seen(soft) if arm.kind == "position" else soft
     steps = step_of(gains, felt), step_of(gains, gains.seen_cap)
     nothing = Certificate(form=FORM, gains=gains, claims=())
@@ -238,6 +238,11 @@ def tune(
         )
         tuning = replace(tuning, warnings=(*tuning.warnings, ("inner-loop-wide", text)))
     return tuning
+
+
+def _softest(known: Known | None, cap: float) -> float:
+    """The softest surface that is known of, or that there may be [N/m]."""
+    return min(known.stiffness[0] if known else MIN_STIFFNESS, cap)
 
 
 def _check(force: float, known: Known | None, cap: float | None) -> None:

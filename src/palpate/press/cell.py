@@ -3,12 +3,11 @@
 The arm's own laws fill M, h and J, or MuJoCo does; contact, sensor and motors are the same laws for both.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from palpate._jit import kernel, law, part
 from palpate._vector import ZERO3, Mat3, Vec3
 from palpate.arrays import Array
-from palpate.environments.kelvin_voigt import KelvinVoigt
 from palpate.environments.surface import SurfaceState, contact_force, follow, opposing
 from palpate.robots.serial.chain import KinematicChain, Room, axis_of, chain_motion
 from palpate.robots.serial.linear import Wrench, backward, cross, factorise, forward_both, product
@@ -91,7 +90,7 @@ class Workcell(NamedTuple):
     chain: KinematicChain
     normal: Vec3
     place: float
-    surface: KelvinVoigt
+    surface: Any
     sensor: WristSensor
     tool: HeldTool
     step: float

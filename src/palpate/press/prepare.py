@@ -2,31 +2,36 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from palpate.arrays import Array
 from palpate.contact_frame.payload import Payload
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError, unknown
 from palpate.force.arm import Sensor
+from palpate.force.ceiling import check_same_force_max, usual_force_max
 from palpate.force.force_loop import ForceLoop
-from palpate.force.gains import Gains, check_same_force_max, load_gains, usual_force_max
+from palpate.force.gains import Gains, load_gains
 from palpate.press.at_rest import SURE, check_drift, check_range, fitting, noise_and_drift
 from palpate.press.engines import ENGINES, MODES, check_mode, loop_of, mass_note, press_gains, usual_mode
+from palpate.press.free_stroke import StrokePlan, make_stroke
 from palpate.press.pressing import Progress, press
 from palpate.press.sequence import CautiousDriver, Plan, PressDriver, plan_for
 from palpate.press.setting import GAP, Place, cell_of, check_able, held_tool, place_of, with_tool
-from palpate.press.simulated_arm import SimulatedArm
+from palpate.press.simulated_arm import NO_FREE_FORCE, PoseForce, SimulatedArm
 from palpate.press.summary import PressRequest
 from palpate.press.tip_controller import CONTROLLERS, TorqueDriver
 from palpate.records import Record
 from palpate.robots.serial.from_toml import names
 from palpate.robots.serial.loading import mujoco
 from palpate.robots.serial.serial_arm import SerialArm
+from palpate.units import unit
 
 CAUTIOUS = "cautious"
-_UNITS = {"K": "N/m", "B": "N s/m", "M": "kg"}
+_SURFACE = {"K": "N/m", "B": "N s/m", "M": "kg", "thickness": "m", "behind": "N/m"}
+_FREE_FORCE = {"cable": "N/m", "ripple": "N", "wave": "m"}
 
 
 @dataclass(frozen=True)
@@ -50,11 +55,12 @@ class PressSpec:
         payload: of `palpate payload`: the arm carries this tool, and its sensor shows what that one did.
         end: hold, to rest in contact after a press that is done; else retreat.
         force_max: F_max, see `force.ceiling` [N]; that of the gains, else five times the force, if left out.
+        free: force that the sensor shows in free motion, by the place of the tip.
     """
 
     arm: str
     force: float
-    surface: KelvinVoigt
+    surface: KelvinVoigt | Layered
     site: str | None = None
     mode: str | None = None
     physics: str = "own"
@@ -68,6 +74,7 @@ class PressSpec:
     payload: Payload | None = None
     end: str = "retreat"
     force_max: float | None = None
+    free: PoseForce = NO_FREE_FORCE
 
 
 @dataclass(frozen=True)
@@ -91,15 +98,26 @@ class PreparedPress:
             SimulatedArm(request.arm, loop, request.place, cell, request.physics, request.seed)
             for _ in range(2)
         )
+        arm.free = resting.free = request.free
         if request.payload is not None:
             arm.tare()
             max_force = self.plan.force + SURE * loop.sensor.noise
             check_range(abs(arm.zero), max_force, loop.sensor.full_scale)
         gains = fit_gains(request.gains, resting.at_rest(), self.plan)
+        stroke = self._free_stroke(resting, gains, arm) if request.controller == CAUTIOUS else None
         driver = _driver(request, arm, gains, self.plan.force)
         record = press(arm, driver, request.place, self.plan, gains, progress, request.end)
-        meta = {**record.meta, **request.meta(record), "tare_N": arm.zero}
+        meta = {**record.meta, **request.meta(record), "tare_N": arm.zero, "free_stroke": stroke}
         return Record(record.columns, record.units, meta)
+
+    def _free_stroke(self, resting: SimulatedArm, gains: Gains, arm: SimulatedArm) -> dict[str, Any]:
+        """Make the free stroke with the arm that rested; take its slope off the readings of the other."""
+        reach = gains.approach * self.plan.longest
+        speed = min(10.0 * gains.approach, gains.speed_at(self.plan.force))
+        plan = StrokePlan(self.request.place.normal, reach, speed, gains, self.plan.force)
+        free = make_stroke(resting, plan)
+        arm.slope = free.slope_to_subtract(reach, gains.level)
+        return free.to_json(arm.slope)
 
 
 def _driver(request: PressRequest, arm: SimulatedArm, gains: Gains, force: float) -> PressDriver:
@@ -141,7 +159,7 @@ def prepare_press(spec: PressSpec) -> PreparedPress:
     _check_words(spec)
     Plan(spec.force, spec.seconds, spec.probe)
     arm = _load(spec, arm_of(spec.arm, spec.site))
-    place = place_of(arm, _array(spec.at), _array(spec.normal))
+    place = place_of(arm, spec.at, spec.normal)
     gains = _gains(spec, arm, place)
     _check_surface(spec, gains)
     notes = check_able(arm, place, gains.approach, spec.force)
@@ -158,6 +176,7 @@ def prepare_press(spec: PressSpec) -> PreparedPress:
         payload=spec.payload,
         notes=tuple(notes),
         end=spec.end,
+        free=spec.free,
     )
     return PreparedPress(request, plan_for(spec.force, spec.seconds, spec.probe, GAP, gains.approach))
 
@@ -196,38 +215,69 @@ def arm_of(name: str, site: str | None) -> SerialArm:
     raise unknown("arm", name, [*names(), "FILE.toml", "FILE.xml", "FILE.urdf"])
 
 
-def surface_of(text: str) -> KelvinVoigt:
-    """`K=5000,B=50`, and M=0.1 if it has a mass, in SI.
+def surface_of(text: str) -> KelvinVoigt | Layered:
+    """`K=5000,B=50`, and M=0.1 if it has a mass; `K=500,thickness=20:mm,behind=1e5` of a layer on something hard.
 
     Raises:
         InputError: another text, a number out of range.
     """
-    numbers: dict[str, float] = {}
-    for part in text.split(","):
-        name, sign, number = (word.strip() for word in part.partition("="))
-        if name not in _UNITS or not sign:
-            raise InputError(
-                f"--surface needs K=..,B=.. in N/m and N s/m (and M=.. in kg), as K=5000,B=50; got {text!r}"
-            )
-        if name in numbers:
-            raise InputError(f"--surface has {name} twice: {text!r}")
-        numbers[name] = _number(name, number)
+    numbers = _numbers("--surface", text, _SURFACE, "K=5000,B=50 or K=500,thickness=20:mm,behind=1e5")
     if "K" not in numbers:
         raise InputError(f"--surface needs a stiffness, as K=5000; got {text!r}")
+    if ("thickness" in numbers) != ("behind" in numbers) or {"M", "behind"} <= set(numbers):
+        raise InputError(
+            "--surface needs thickness and behind together and without M, as K=500,thickness=20:mm,behind=1e5; got"
+            f" {text!r}"
+        )
+    stiffness, damping = numbers.pop("K"), numbers.pop("B", 0.0)
     try:
-        return KelvinVoigt(numbers["K"], numbers.get("B", 0.0), numbers.get("M", 0.0))
+        if "behind" not in numbers:
+            return KelvinVoigt(stiffness, damping, numbers.get("M", 0.0))
+        return Layered(stiffness, damping, 0.0, numbers["thickness"], numbers["behind"])
     except InputError as error:
         raise InputError(f"--surface: {error}") from None
 
 
-def _number(name: str, text: str) -> float:
+def parse_pose_force(text: str) -> PoseForce:
+    """`cable=20` and `ripple=1.5,wave=60:mm`, in SI or with units.
+
+    Raises:
+        InputError: another text, a wave without length.
+    """
+    force = PoseForce(**_numbers("--free-force", text, _FREE_FORCE, "cable=20,ripple=1.5,wave=60:mm"))
+    if not force.wave > 0.0:
+        raise InputError(f"--free-force: the wave must be longer than 0 m, got {force.wave:g}")
+    return force
+
+
+def _numbers(option: str, text: str, units: dict[str, str], example: str) -> dict[str, float]:
+    """Numbers of `NAME=NUMBER` or `NAME=NUMBER:UNIT`, separated by commas, in SI."""
+    numbers: dict[str, float] = {}
+    for part in text.split(","):
+        name, sign, number = (word.strip() for word in part.partition("="))
+        if name not in units or not sign:
+            names = ", ".join(f"{known} in {si}" for known, si in units.items())
+            raise InputError(f"{option} needs {example} ({names}); got {text!r}")
+        if name in numbers:
+            raise InputError(f"{option} has {name} twice: {text!r}")
+        numbers[name] = _number(option, name, number, units[name])
+    return numbers
+
+
+def _number(option: str, name: str, text: str, si: str) -> float:
+    plain, _, symbol = text.partition(":")
     try:
-        value = float(text)
+        value = float(plain)
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise InputError(f"--surface: {name} needs a number in {_UNITS[name]}, got {text!r}")
-    return value
+        raise InputError(f"{option}: {name} needs a number in {si}, got {text!r}")
+    if not symbol:
+        return value
+    given = unit(symbol)
+    if given.si != si:
+        raise InputError(f"{option}: {name} needs a unit of {si}, and {symbol!r} is one of {given.quantity}")
+    return value * given.factor
 
 
 def _check_words(spec: PressSpec) -> None:
@@ -275,7 +325,7 @@ def _check_sensor(spec: PressSpec, sensor: Sensor, max_force: float) -> None:
 
 
 def _check_surface(spec: PressSpec, gains: Gains) -> None:
-    total = spec.surface.stiffness + spec.surface.damping / gains.theta
+    total = stiffest(spec.surface) + spec.surface.damping / gains.theta
     if total > gains.cap:
         raise InputError(
             f"the surface has K + B/theta = {total:.4g} N/m, and the gains are for at most {gains.cap:.4g} N/m; "
@@ -289,7 +339,3 @@ def _engine_notes(spec: PressSpec, arm: SerialArm) -> list[str]:
             "motors and contacts of the model itself are off: torques are the controller's, the surface is --surface"
         ]
     return []
-
-
-def _array(values: tuple[float, float, float] | None) -> Array | None:
-    return None if values is None else np.array(values)

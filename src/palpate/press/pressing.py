@@ -112,7 +112,7 @@ def press(
         unloading = Unloading("could not unload: the simulated arm has diverged", completed=False)
     elif ending.end != summary.DONE or end != "hold":
         unloading = _unload(arm, place, gains, plan.force, rows)
-    return _record(arm, rows, ending, unloading)
+    return _record(arm, rows, ending, unloading, touched=sequence.touched)
 
 
 def _unload(arm: SimulatedArm, place: Place, gains: Gains, force: float, rows: _Rows) -> Unloading:
@@ -185,11 +185,14 @@ def _judge(
     return summary.Ending(summary.NO_CONTACT, f"no surface was felt within {plan.longest:.3g} s")
 
 
-def _record(arm: SimulatedArm, rows: _Rows, ending: summary.Ending, unloading: Unloading) -> Record:
+def _record(
+    arm: SimulatedArm, rows: _Rows, ending: summary.Ending, unloading: Unloading, *, touched: bool
+) -> Record:
     units = rows.columns()
     for i, slides in enumerate(arm.arm.chain.slide, start=1):
         if slides:
             units |= {f"q{i}": "m", f"qd{i}": "m/s", f"torque{i}": "N"}
     table = np.array(rows.rows).reshape(-1, len(units))
     columns = {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(units)}
-    return Record(columns, units, {"end": ending.end, "why": ending.why, "unloaded": unloading.how})
+    meta = {"end": ending.end, "why": ending.why, "unloaded": unloading.how, "touched": touched}
+    return Record(columns, units, meta)

@@ -3,14 +3,16 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from palpate._vector import Mat3, Vec3
 from palpate.arrays import Array
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.tool_payload import weight_sign
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.kelvin_voigt import KelvinVoigt, Layered, stiffest
 from palpate.errors import InputError
 from palpate.force.arm import Arm, PositionLoop, ServoLoop, TorqueLoop
+from palpate.force.gains import padded_vector
 from palpate.force.lag import STRUCTURE
 from palpate.force.sampled_loop import filter_of, zero_order_hold
 from palpate.press.cell import NO_TOOL, HeldTool, Workcell, WristSensor
@@ -56,7 +58,7 @@ class Place:
         return tip + (self.place - tip @ self.normal) * self.normal
 
 
-def place_of(arm: SerialArm, at: Array | None, normal: Array | None, gap: float = GAP) -> Place:
+def place_of(arm: SerialArm, at: ArrayLike | None, normal: ArrayLike | None, gap: float = GAP) -> Place:
     """Pose at which the arm starts, and the surface before it.
 
     Args:
@@ -141,7 +143,7 @@ def _check_torques(arm: SerialArm, place: Place, J: Array, force: float) -> None
 
 
 def cell_of(
-    arm: SerialArm, place: Place, surface: KelvinVoigt, loop: Arm, tool: HeldTool = NO_TOOL
+    arm: SerialArm, place: Place, surface: KelvinVoigt | Layered, loop: Arm, tool: HeldTool = NO_TOOL
 ) -> Workcell:
     """The simulated cell of an arm with its inner loop, before a surface, with the tool as its sensor shows it."""
     motors, servo = isinstance(loop.inner, PositionLoop), isinstance(loop.inner, ServoLoop)
@@ -151,7 +153,7 @@ def cell_of(
     spring, damper = np.zeros(arm.joints), np.zeros(arm.joints)
     first = second = 0.0
     along = place.normal @ J[:3]
-    fastest = np.sqrt(surface.stiffness * float(along @ np.linalg.solve(links, along)))
+    fastest = np.sqrt(stiffest(surface) * float(along @ np.linalg.solve(links, along)))
     if not isinstance(loop.inner, TorqueLoop):
         spring = _joint_springs(arm, links, along, loop.inner.stiffness)
         fastest = max(fastest, np.sqrt(_fastest(links, spring)))
@@ -198,8 +200,8 @@ def _sensor(loop: Arm, step: float) -> WristSensor:
     wide[: len(b), : len(b)] = E
     return WristSensor(
         E=Mat3(*map(triple, wide)),
-        e=_pad(e),
-        c=_pad(c),
+        e=padded_vector(e),
+        c=padded_vector(c),
         d=0.0 if len(b) else 1.0,
         step=float(step),
         sampling=float(loop.sensor.sampling),
@@ -228,16 +230,12 @@ def _axes(normal: Array) -> Array:
     return np.array([normal, y, np.cross(normal, y)])
 
 
-def _unit(direction: Array) -> Array:
+def _unit(direction: ArrayLike) -> Array:
     v = np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(v))
     if not (np.isfinite(length) and length > 0.0):
         raise InputError(f"a normal needs a length, got {v.tolist()}")
     return v / length
-
-
-def _pad(values: Array) -> Vec3:
-    return triple(np.concatenate([values, np.zeros(3 - len(values))]))
 
 
 def held_tool(payload: Payload | None) -> HeldTool:

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,26 @@ from palpate.robots.serial.serial_arm import SerialArm
 from palpate.signals.rotations import matrix_from_vector
 from palpate.signals.types import Task
 
+
+class PoseForce(NamedTuple):
+    """Force along the normal that the sensor shows in free motion, by the place of the tip.
+
+    Args:
+        cable: that pulls the tip back, for each metre towards the surface [N/m].
+        ripple: amplitude of a force that changes with the pose, zero at the start [N].
+        wave: length over which it repeats [m].
+    """
+
+    cable: float = 0.0
+    ripple: float = 0.0
+    wave: float = 0.06
+
+    def at(self, depth: float) -> float:
+        """Force at a place along the normal, from the start [N]."""
+        return self.cable * depth + self.ripple * float(np.sin(2.0 * np.pi * depth / self.wave))
+
+
+NO_FREE_FORCE = PoseForce()
 ENCODER = 1e-7
 """Resolution of a joint's position [rad, m]: a motor's encoder of 19 bits before a gear of 100."""
 
@@ -93,7 +113,10 @@ class SimulatedArm:
         )
         by_name = ByMuJoCo(arm, cell, place.q) if physics == "mujoco" else Own()
         self._engine: Engine = by_name if isinstance(physics, str) else physics
-        self._k, self.zero = 0, 0.0
+        self._k, self.zero, self.slope = 0, 0.0, 0.0
+        self._start = float(place.normal @ place.pose[:3, 3])
+        self.free = NO_FREE_FORCE
+        """Force that the sensor shows in free motion."""
         self._goal, self._setpoint = place.pose.copy(), place.q.copy()
         self._saturated, self._acted = np.zeros(arm.joints), False
         self._seen = self._before = self._encoders()
@@ -102,9 +125,11 @@ class SimulatedArm:
         self._line = deque([rest] * loop.delay_ticks)
 
     def read(self) -> TipSample:
-        """The readings at this tick."""
-        force = (self._touch.reading.value - self.zero) * np.array(self.cell.normal)
-        return TipSample(self._k * self.loop.tick, force, self.pose[:3, 3])
+        """The readings at this tick, without the sensor's zero and the slope of a free stroke."""
+        position, normal = self.pose[:3, 3], np.array(self.cell.normal)
+        depth = float(normal @ position) - self._start
+        force = self._touch.reading.value - self.zero + self.free.at(depth) - self.slope * depth
+        return TipSample(self._k * self.loop.tick, force * normal, position)
 
     @property
     def pose(self) -> Array:
@@ -138,11 +163,6 @@ class SimulatedArm:
         if self._tip is not None and self._acted:
             self._goal = self.pose
 
-    def move_to(self, pose: Array) -> None:
-        """Moves the tip for a tick towards a pose, homogeneous, shape (4, 4)."""
-        self._goal = np.array(pose, dtype=float)
-        self._follow_goal()
-
     def _follow_goal(self) -> None:
         if self._tip is None:
             self._advance(self._follow() + self._sag)
@@ -167,7 +187,7 @@ class SimulatedArm:
         """
         touching, old = self._touch.surface, self.cell.surface
         if touching.contact == 1.0:
-            force = float(old.force(touching, touching.deflection, touching.rate))  # type: ignore[no-untyped-call]
+            force = float(old.force(touching, touching.deflection, touching.rate))
             depth = rest_for(cell.surface, force, touching.rate)
             cell = cell._replace(place=self.cell.place + touching.deflection - depth)
             self._touch = self._touch._replace(surface=touching._replace(deflection=depth))

@@ -9,13 +9,14 @@ from palpate.arrays import Array
 from palpate.bench import summary
 from palpate.contact_frame.payload import Payload
 from palpate.contact_frame.press_or_slide import identify_contact
-from palpate.environments.kelvin_voigt import KelvinVoigt
+from palpate.environments.kelvin_voigt import KelvinVoigt, Layered
 from palpate.errors import InputError
 from palpate.force.arm import PositionLoop
 from palpate.force.gains import Gains
 from palpate.identification.sample_clock import sample_clock_of
 from palpate.press.engines import series_of
 from palpate.press.setting import Place, held_tool
+from palpate.press.simulated_arm import NO_FREE_FORCE, PoseForce
 from palpate.records import Record
 from palpate.robots.serial.serial_arm import SerialArm
 
@@ -35,18 +36,20 @@ class PressRequest:
         notes: for the reader of the results.
         payload: the tool that the arm carries; None without one.
         end: hold, to rest in contact after a press that is done; else retreat.
+        free: force that the sensor shows in free motion.
     """
 
     arm: SerialArm
     gains: Gains
     place: Place
-    surface: KelvinVoigt
+    surface: KelvinVoigt | Layered
     controller: str
     physics: str
     seed: int
     notes: tuple[str, ...]
     payload: Payload | None = None
     end: str = "retreat"
+    free: PoseForce = NO_FREE_FORCE
 
     def meta(self, record: Record) -> dict[str, Any]:
         """Metadata of the record, plain values."""
@@ -134,8 +137,9 @@ def summarise(record: Record, request: PressRequest) -> dict[str, Any]:
         "loop": _loop(request),
         "pose": {"smallest_singular_value": request.place.weakest, "tip_mass_kg": request.place.mass},
         "tare_N": record.meta["tare_N"],
+        "free_stroke": record.meta["free_stroke"],
         "sensor_saturated": _mean(
-            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= _full_scale(request)
+            np.abs(record["force_sampled"] + record.meta["tare_N"]) >= request.gains.arm.sensor.full_scale
         ),
         "notes": list(request.notes),
     }
@@ -147,7 +151,8 @@ def summarise(record: Record, request: PressRequest) -> dict[str, Any]:
             float(np.mean(record[name][last])) - zero for name, zero in zip(("y", "z"), start, strict=True)
         ]
         result["tip"] = {"slipped_mm": 1e3 * float(np.hypot(*moved))}
-        result["identified"] = identify_record(record, request)
+        # A contact in which the force was never reached may be a ripple of the sensor, and has no stiffness.
+        result["identified"] = identify_record(record, request) if record.meta["touched"] else None
     return result
 
 
@@ -182,10 +187,6 @@ def _loop(request: PressRequest) -> dict[str, Any]:
         "approach_speed_m_s": gains.approach,
         "series_stiffness": series_of(gains.arm),
     }
-
-
-def _full_scale(request: PressRequest) -> float:
-    return float(request.gains.arm.sensor.full_scale)
 
 
 def _mean(values: Any) -> float:

@@ -112,7 +112,7 @@ def retune_for_noise(rest: AtRest, order: Order) -> tuple[Order, str | None]:
     Raises:
         InputError: the noise is above that of the gains, and a certificate or the force does not allow another.
     """
-    gains = fitting(order.loop.gains, rest.noise, _count(rest))
+    gains = fitting(order.loop.gains, rest.noise, max(round(TARE * rest.rate), _MIN_READINGS))
     if gains is None:
         return order, None
     expected = order.loop.gains.arm.sensor.noise
@@ -139,10 +139,6 @@ def position_lag_fault(sense: ArmReading, theta: float) -> str | None:
         f"the tool's position was taken {abs(lag):.3g} s {'before' if lag > 0.0 else 'after'} the force, more than the"
         f" loop's lag of {1e3 * theta:.3g} ms; have the positions ended, or are their clocks not set alike?"
     )
-
-
-def _count(rest: AtRest) -> int:
-    return max(round(TARE * rest.rate), _MIN_READINGS)
 
 
 def _check_clock(offsets: Array, theta: float) -> None:

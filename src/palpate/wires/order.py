@@ -15,6 +15,7 @@ from palpate.force.sliding.paths import directions, duration
 from palpate.force.sliding.slide_domain import numbers_of
 from palpate.force.sliding.slide_state import beside
 from palpate.press.at_rest import TARE
+from palpate.press.free_stroke import StrokePlan
 from palpate.press.sequence import Plan
 from palpate.press.unload import REST_LAGS
 from palpate.wires.wire import Triple, triple
@@ -97,6 +98,7 @@ class PressTask:
         probe: share of the force by which it is lowered now and then.
         path: along the surface; None for a press.
         end: retreat or hold: what follows the hold. Every other end is a retreat.
+        free_stroke: length of a stroke before the press, away from the surface and back [m]; 0 for none.
 
     Raises:
         InputError: a probe that is no share, a hold that is no time, another end.
@@ -109,6 +111,7 @@ class PressTask:
     probe: float = 0.0
     path: Path | None = None
     end: Literal["retreat", "hold"] = "retreat"
+    free_stroke: float = 0.0
 
     def __post_init__(self) -> None:
         self.plan  # noqa: B018 - it refuses what it cannot be
@@ -150,6 +153,15 @@ class Order:
         return min(0.5 * self.limits.speed, 10.0 * self.loop.gains.approach)
 
     @property
+    def stroke(self) -> StrokePlan | None:
+        """The free stroke before the press, as slow as its retreat and as F_max demands; None without one."""
+        task, gains = self.task, self.loop.gains
+        if not task.free_stroke:
+            return None
+        speed = min(self.slow_speed, gains.speed_at(task.force))
+        return StrokePlan(np.array(task.direction), task.free_stroke, speed, gains, task.force)
+
+    @property
     def retreat_time(self) -> float:
         """Longest time of a retreat [s]: back by twice the travel limit and the clearance, slowly, and the rest."""
         distance = 2.0 * (self.limits.travel + self.task.retreat)
@@ -164,6 +176,10 @@ class Order:
         gains = certificate.proved_gains
         ticks = max((c.jitter(gains) for c in certificate.claims if c.kind == "adapting"), default=None)
         return None if ticks is None else ticks * self.loop.gains.arm.tick
+
+
+STROKE_FRACTION = 0.9
+"""Largest free stroke over the travel limit: the tip of a position arm goes a little beyond its command."""
 
 
 def stiffest_contact(gains: Gains) -> float:
@@ -211,9 +227,16 @@ def check_order(loop: ForceLoop, task: PressTask, limits: PressLimits) -> Order:
             f"the speed limit must lie between the certified approach of {1e3 * gains.approach:.3g} mm/s and the arm's"
             f" {1e3 * gains.arm.limits.speed:g} mm/s, got {1e3 * limits.speed:g} mm/s; at twice the limit the arm stops"
         )
-    if not (task.hold > 0.0 and task.hold + TARE < limits.seconds):
+    if not 0.0 <= task.free_stroke <= STROKE_FRACTION * limits.travel:
         raise InputError(
-            f"--seconds must be above 0 and leave time for the approach within the limit of {limits.seconds:g} s"
+            f"--free-stroke must be from 0 to {STROKE_FRACTION:g} of the travel limit of {1e3 * limits.travel:.3g} mm"
+        )
+    stroke = Order(loop, task, limits).stroke
+    before = TARE if stroke is None else TARE + stroke.seconds
+    if not (task.hold > 0.0 and task.hold + before < limits.seconds):
+        raise InputError(
+            f"--seconds must be above 0 and leave time for rest, free stroke ({before:.2g} s) and approach within the"
+            f" limit of {limits.seconds:g} s"
         )
     if not 0.0 <= task.retreat <= limits.travel:
         raise InputError(f"--retreat must be from 0 to the travel limit of {1e3 * limits.travel:g} mm")

@@ -18,6 +18,7 @@ from palpate.errors import InputError
 from palpate.files import RECORD, check_place, fresh_folder, with_author, write_json
 from palpate.force import SlidingLoop
 from palpate.logs import write_record
+from palpate.press.at_rest import SETTLING_BAND
 from palpate.press.sequence import mean_over
 from palpate.press.unload import Unloading
 from palpate.records import Record
@@ -25,11 +26,6 @@ from palpate.units import cone95
 from palpate.wires.at_rest import AtRest
 from palpate.wires.order import Order
 from palpate.wires.realtime import Lateness
-
-RETREAT = 4.0
-"""Phase of the rows of a retreat; those of the law are below it."""
-SETTLING_BAND = 0.05
-"""Relative error of the force within which a press counts as settled."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +44,7 @@ class Outcome:
         surface: normal and friction at the end of a slide with their intervals; None of a press, or if it never slid.
         lateness: of the loop.
         rest: what was seen before.
+        free_stroke: force over the position in the free stroke, as plain JSON values; None without one.
         troubles: ticks of each trouble of the law, by its sentence.
     """
 
@@ -61,6 +58,7 @@ class Outcome:
     surface: Mapping[str, Any] | None
     lateness: Lateness
     rest: AtRest
+    free_stroke: Mapping[str, Any] | None
     troubles: Mapping[str, int]
 
     def to_json(self) -> dict[str, Any]:
@@ -76,6 +74,7 @@ class Outcome:
             **({"surface": self.surface} if self.surface else {}),
             "lateness": self.lateness.to_json(),
             **self.rest.to_json(),
+            "free_stroke": self.free_stroke,
             "troubles": dict(self.troubles),
         }
 

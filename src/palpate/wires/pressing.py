@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.arrays import Array
+from palpate.bench.summary import RETREAT
 from palpate.force import ForceLoop, SlidingLoop
 from palpate.press.at_rest import SATURATED
+from palpate.press.free_stroke import FreeForce, StrokeMetError, make_stroke
 from palpate.press.sequence import (
     CautiousDriver,
     ForceToReach,
@@ -27,7 +29,7 @@ from palpate.press.unload import HELD, Glimpse, RetreatPlan, Unloading, unload
 from palpate.wires.at_rest import AtRest, check_at_rest, retune_for_noise
 from palpate.wires.guard import Guard, Moment, end_if, reading_fault, reason_to_stop
 from palpate.wires.order import Order
-from palpate.wires.outcome import RETREAT, Outcome, Rows, describe_surface, force_reached, settling_time
+from palpate.wires.outcome import Outcome, Rows, describe_surface, force_reached, settling_time
 from palpate.wires.realtime import CLOCK, Clock, Stopwatch, defer_interrupts
 from palpate.wires.wire import ArmReading, Command, PressEndedError, Wire, triple
 
@@ -130,6 +132,8 @@ class GuardedArm:
         """Largest way of tip or command along the direction [m]."""
         self.now = Moment(rest.last, 0.0, 0.0, 0.0, 0, 0.0, 0.0)
         self.into = self._direction
+        self.slope = 0.0
+        """Slope of the free force over the depth, which is taken off the readings [N/m]."""
         self.on_retreat: Callable[[], None] = lambda: None
         self.fault: str | None = None
         """Stop condition that was met first in the retreat of a press that no stop condition had ended."""
@@ -145,8 +149,13 @@ class GuardedArm:
         end_if(self._take(sense))
         end_if(reason_to_stop(self.now, self._order, self.rest))
         self.deepest = max(self.deepest, self.now.depth)
-        force = np.array(sense.force) - self.rest.bias
-        return TipSample(sense.stamp, force, np.array(sense.position), float(self.now.missed))
+        return TipSample(sense.stamp, self.net_force, np.array(sense.position), float(self.now.missed))
+
+    @property
+    def net_force(self) -> Array:
+        """Force of the present reading without that of free motion [N], shape (3,)."""
+        free = self.rest.bias + self.slope * self.now.depth * self._direction
+        return np.asarray(np.array(self.now.sense.force) - free)
 
     def _take(self, sense: ArmReading) -> str | None:
         """Make a reading the current one; return the reason if it is unusable."""
@@ -156,10 +165,11 @@ class GuardedArm:
         last = self.now.sense
         ticks = (sense.stamp - last.stamp) / self._tick
         moving = sense.stamp - sense.position_lag - (last.stamp - last.position_lag)
+        depth = float((np.array(sense.position) - self.rest.position) @ self._direction)
         self.now = Moment(
             sense=sense,
-            force=float((np.array(sense.force) - self.rest.bias) @ self._direction),
-            depth=float((np.array(sense.position) - self.rest.position) @ self._direction),
+            force=float((np.array(sense.force) - self.rest.bias) @ self._direction) - self.slope * depth,
+            depth=depth,
             speed=math.dist(sense.position, last.position) / max(moving, self._tick),
             missed=max(round(ticks) - 1, 0),
             age=self.watch.age(sense.stamp, self.clock.monotonic()),
@@ -182,13 +192,13 @@ class GuardedArm:
             sense = self.guard.glimpse()
             if sense is not None:
                 self._take(sense)
-        sense, depth = self.now.sense, self.now.depth
+        sense, depth = self.now.sense, self.now.depth * float(np.sign(self.into @ self._direction))
         if sense is before:
             return Glimpse(None, None)
         force = np.array(sense.force)
         saturated = np.abs(force).max() >= SATURATED * self._order.loop.gains.arm.sensor.full_scale
         stuck = sense.position == before.position or not abs(depth) <= self._order.limits.travel
-        along = float((force - self.rest.bias) @ self.into)
+        along = float(self.net_force @ self.into)
         return Glimpse(None if saturated else along, None if stuck else depth)
 
     def retreat(self, velocity: Array) -> str | None:
@@ -240,22 +250,49 @@ class _Press:
         self._pressed: list[tuple[float, float]] = []
         self._stiffness: tuple[float, float] | None = None
         self._last_sense = arm.rest.last
+        self._free_force: FreeForce | None = None
 
     def run(self) -> Outcome:
-        """Run the press from its start to its end."""
-        arm = self._arm
-        arm.guard.begin()
+        """Run the press from its start to its end.
+
+        Raises:
+            InputError: the force in free motion is none with which to press.
+        """
+        guard = self._arm.guard
+        guard.begin()
+        try:
+            met = self._measure_free_force()
+            result = self._press_and_unload() if met is None else (met, False, self._unload(out=True))
+        finally:
+            guard.stop()
+        return self._outcome(*result)
+
+    def _press_and_unload(self) -> tuple[str, bool, Unloading]:
+        """Press; return the reason of the end, True if the hold was completed, and how the tip was unloaded."""
         try:
             ended, ok = self._press()
             unloading = self._rest() if ok and self._order.task.end == "hold" else self._unload(watching=ok)
-            if arm.fault is not None:
-                ended, ok = arm.fault, False
         except BaseException:
             self._rows.about["unloaded"] = self._unload().to_json()
             raise
-        finally:
-            arm.guard.stop()
-        return self._outcome(ended, ok, unloading)
+        fault = self._arm.fault
+        return (ended, ok, unloading) if fault is None else (fault, False, unloading)
+
+    def _measure_free_force(self) -> str | None:
+        """Make the free stroke, and take its slope off the readings; the reason if it has ended early."""
+        stroke = self._order.stroke
+        if stroke is None:
+            return None
+        try:
+            self._free_force = make_stroke(self._arm, stroke)
+        except (StrokeMetError, PressEndedError) as reason:
+            return f"in the free stroke {reason}"
+        except BaseException:
+            self._unload(out=True)
+            raise
+        level, travel = self._order.loop.gains.level, self._order.limits.travel
+        self._arm.slope = self._free_force.slope_to_subtract(travel, level)
+        return None
 
     def _press(self) -> tuple[str, bool]:
         """Approach and press; return the reason of the end, and True if the hold was completed."""
@@ -287,22 +324,28 @@ class _Press:
         self._arm.retreat(np.zeros(3))
         return HELD
 
-    def _unload(self, watching: bool = False) -> Unloading:
+    def _unload(self, watching: bool = False, out: bool = False) -> Unloading:
         """Lead the tip out of the surface; a Ctrl-C waits until it is out.
 
         Args:
             watching: the stop conditions are watched, and the retreat is slow: of a press that none of them ended.
+            out: the tip is on its free stroke, out of which it goes back to its start.
         """
         arm, order = self._arm, self._order
-        normal = read_belief(self._driver.loop, self._direction).normal
+        normal = -self._direction if out else read_belief(self._driver.loop, self._direction).normal
         arm.into = normal if np.isfinite(normal).all() else self._direction
         arm.watching, arm.on_retreat = watching, self._keep_retreat
+        depth, clearance = arm.deepest, order.task.retreat
+        if out:
+            depth = float(arm.commanded @ arm.into)
+            clearance = min(clearance, depth)
+            depth -= clearance
         plan = RetreatPlan(
             gains=order.loop.gains,
             normal=arm.into,
-            speed=order.slow_speed if watching else order.limits.speed,
-            clearance=order.task.retreat,
-            depth=arm.deepest,
+            speed=order.slow_speed if watching or out else order.limits.speed,
+            clearance=clearance,
+            depth=depth,
             noise=arm.rest.noise,
             force=order.task.force,
         )
@@ -317,7 +360,7 @@ class _Press:
         if touch is None:
             self._pressed.clear()
         else:
-            force = float((np.array(sense.force) - arm.rest.bias) @ known.normal)
+            force = float(arm.net_force @ known.normal)
             self._pressed.append((sense.stamp - touch.time, force))
         if self._sequence.reached:
             self._rows.note_hold(sense.stamp)
@@ -366,5 +409,6 @@ class _Press:
             surface=describe_surface(loop) if isinstance(loop, SlidingLoop) and touched else None,
             lateness=self._arm.watch.summary(),
             rest=self._arm.rest,
+            free_stroke=None if self._free_force is None else self._free_force.to_json(self._arm.slope),
             troubles=self._driver.troubles.ticks,
         )

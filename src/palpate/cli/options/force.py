@@ -66,7 +66,7 @@ class PressOptions:
 
     def highest_force(self, arm: Arm, *, slides: bool) -> float | None:
         """F_max, as given or as usual, in newtons; None for a slide."""
-        from palpate.force.gains import usual_force_max
+        from palpate.force.ceiling import usual_force_max
 
         if self.force_max is not None:
             return self.force_max.si

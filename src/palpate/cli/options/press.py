@@ -78,7 +78,11 @@ class SimulatedOptions:
     arm: Annotated[SerialArm | None, QUIET] = None
     "ur5e, fr3, panda, iiwa14, or a file: .toml, .xml (MJCF), .urdf."
     surface: str | None = None
-    "The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass."
+    """The surface: K=5000,B=50 in N/m and N s/m, and M=0.1 in kg if it has a mass; a layer on something hard:
+    K=500,thickness=20:mm,behind=1e5."""
+    free_force: str | None = None
+    """Force that the sensor shows in free motion: a cable that pulls at the tool, a ripple of the pose, as
+    cable=20:N/m,ripple=1.5:N,wave=60:mm."""
     site: str | None = None
     "The tip in the file: a site or a body of MJCF, a link of URDF."
     mode: Annotated[Mode | None, QUIET] = None
@@ -127,7 +131,8 @@ class SimulatedOptions:
 
     def spec(self, task: AskOptions, surface: KelvinVoigt | None = None) -> PressSpec:
         """The press to simulate, on a surface that is given here or by --surface."""
-        from palpate.press.prepare import PressSpec, surface_of
+        from palpate.press.prepare import PressSpec, parse_pose_force, surface_of
+        from palpate.press.simulated_arm import NO_FREE_FORCE
 
         if self.arm is None:
             raise InputError(
@@ -156,6 +161,7 @@ class SimulatedOptions:
             payload=task.tool,
             end=task.end,
             force_max=si(task.force_max),
+            free=NO_FREE_FORCE if self.free_force is None else parse_pose_force(self.free_force),
         )
 
     @property
@@ -201,6 +207,9 @@ class WireOptions:
     "File of palpate certify; without it the lateness is measured, and nothing is proved."
     retreat: values.Length | None = None
     "Clearance of the retreat from the surface; 2 mm if left out, or the travel limit if that is shorter."
+    free_stroke: values.Length | None = None
+    """Way of a stroke before the press, away from the surface and back, that learns how the force in free motion
+    changes with the position; 0 for none. If left out, 20 mm, or 0.9 of the travel limit if that is shorter."""
     ordinary_priority: Annotated[bool, FLAG] = False
     "Do not request real-time priority from the system."
     recover: Path | None = None
